@@ -33,7 +33,7 @@ from balancing.influence import (
 from balancing.iso21940 import GRADES, Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
-from balancing.noise import Gaussian, white_rows
+from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
 from balancing.planes import Subsets, best_subsets, compare_planes
 from balancing.regions import Region, real_parts, region_edge
@@ -118,7 +118,6 @@ __all__ = [
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",
-    "white_rows",
     "with_check_runs",
     "with_parameters",
 ]

@@ -68,7 +68,7 @@ class CheckComparison(Answered):
     weights
         What was mounted, for the bare rotor, shape (R, P).
     as_proposed
-        Whether these are the proposed corrections (the check runs do not say what was mounted).
+        Whether what was proposed was mounted (the check runs do not say what was mounted).
     before, predicted, achieved
         Vibration of the bare rotor (S, C), and with `weights` mounted: predicted and read (mean of the
         repeats), shape (R, S, C).
@@ -192,9 +192,10 @@ class CheckComparison(Answered):
 
     @property
     def headline(self) -> str:
-        """Whether the rotor does what was predicted, and what is left, in a sentence."""
+        """Whether the rotor does what was predicted, and what is left in the last run, in a sentence."""
         scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        before, predicted, achieved = (rms(z) * scale for z in (self.before, self.predicted, self.achieved))
+        last = self.before, self.predicted[-1], self.achieved[-1]
+        before, predicted, achieved = (rms(z) * scale for z in last)
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
         left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
         return f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
@@ -204,7 +205,7 @@ class CheckComparison(Answered):
         """Whether the rotor does what was predicted, what is left, and all readings beside the prediction."""
         labels = self.labels
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
-        mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
+        mounted = "what was proposed" if self.as_proposed else "what its weights table says"
         return Answer(
             f"{self.headline} {sentence(self.verdict)}",
             f"Largest in run {self.runs[-1]!r}{largest}",

@@ -129,24 +129,28 @@ def correct(  # noqa: PLR0913
         limits=kept,
         remove=tuple(name for name in part.planes if name in remove),
     )
-    return replace(result, decision=decide(result, case, (unclear,) if unclear else (), limits))
+    if not result.told_apart:
+        unclear = unclear or _alike(case, counts, known=False)
+    return replace(result, decision=decide(result, case, unclear, limits))
 
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
-    """Refuse planes that the coefficients tell apart only by their errors, or say so."""
-    part, W, n = case.part, case.W[counts], 2 * len(case.names)
-    check_planes(W, part.planes)
-    known, every = (
-        part.channels(known=only)[..., 2:, 2:].reshape(-1, n, n)[counts] for only in (True, False)
-    )
-    measured = part.trials is not None or part.known_errors
-    words = unresolved(W, part.planes, known) if measured else ""
+    """Refuse planes that known errors of the coefficients alone tell apart, or say so."""
+    part = case.part
+    check_planes(case.W[counts], part.planes)
+    words = _alike(case, counts, known=True) if part.trials is not None or part.known_errors else ""
     if words and refuse:
         first = part.remarks.contradictions
         rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in first]
         so = f"so {words}" if first else words
         raise UndeterminedError("\n".join((*first, so, *remedies(case), *rest)))
-    return words or (unresolved(W, part.planes, every) if every.any() else "")
+    return words
+
+
+def _alike(case: Case, counts: BoolArray, *, known: bool) -> str:
+    """Which planes act alike within errors that are known, or any; empty where none do."""
+    covariance = case.part.channels(known=known)[..., 2:, 2:]
+    return unresolved(case.W[counts], case.names, covariance[counts.reshape(case.part.baseline.shape)])
 
 
 def fit_part(
@@ -223,6 +227,6 @@ def _drawn(part: Influence, fitted: Solution, D: ComplexArray) -> tuple[ComplexA
         squares += np.einsum("nsci,nscj->scij", error, error)
     if not sizes:
         return np.zeros((0, P), dtype=complex), np.full((S, C, 2, 2), np.nan), float("nan")
-    solved = np.concatenate([np.zeros((0, P), dtype=complex), *weights])
+    solved = np.concatenate(weights)
     bound = float(np.quantile(np.concatenate(sizes), LEVEL))
     return solved[np.isfinite(solved).all(axis=1)], squares / DRAWS, bound

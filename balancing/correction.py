@@ -65,7 +65,8 @@ class MountDecision:
     Attributes
     ----------
     word
-        "mount", "do not mount", or "measure again" (runs contradict each other besides).
+        "mount", "determined in part" (not what each plane needs), "do not mount", or "measure again" (runs
+        contradict each other besides).
     cause
         A clause; empty: nothing is wrong.
     instead
@@ -78,7 +79,7 @@ class MountDecision:
         What is not determined, what contradicts, what to do; what the user may want to know.
     """
 
-    word: Literal["mount", "do not mount", "measure again"] = "mount"
+    word: Literal["mount", "determined in part", "do not mount", "measure again"] = "mount"
     cause: str = ""
     instead: tuple[str, ...] = ()
     before: float = 0.0
@@ -111,8 +112,8 @@ class MountDecision:
         """Sentences; none for "mount"."""
         if self.word == "mount":
             return ()
-        heads = {"do not mount": "Do not mount these weights", "measure again": "Measure again"}
-        return (f"{heads[self.word]}: {self.cause}.", *self.instead)
+        head = "Do not mount these weights" if self.word == "do not mount" else capital(self.word)
+        return (f"{head}: {self.cause}.", *self.instead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +172,7 @@ class Correction(Prediction, Answered):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user may want to know."""
-        together = (self.combination,) if self.combination else ()
-        return (*self.influence.remarks.notes, *together, *self.decision.notes)
+        return (*self.influence.remarks.notes, *self.decision.notes)
 
     @property
     def sound(self) -> bool:
@@ -265,23 +265,24 @@ class Correction(Prediction, Answered):
         labels = self.labels
         if not self.sound:
             first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
-            stop, *instead = self.decision.lines() or ("",)
-            together = f"{capital(self.combination)}." if self.combination else ""
-            return "\n".join(filter(None, (*first, stop, together, *instead)))
+            first += self.decision.lines()
+            if self.decision.word == "determined in part":
+                first.insert(len(self.contradictions) + 1, f"With these weights: {self._left()}.")
+            return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
         what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
         if self.others:
             ways = {"phase": f"phases {labels.phase}", "angles": f"angles count {labels.angle_words}"}
             what += f", if {' and '.join(ways[name] for name in labels.assumed)} as assumed"
-        return f"{what}: {f'{self.combination}. Predicted: ' if self.combination else ''}{self._left()}."
+        return f"{what}: {self._left()}."
 
     @property
     def answer(self) -> Answer:
         """Whether to mount the weights, these with their 95 %, the largest readings left; then the tables."""
         first, test, predicted = self.sentence(), self.convention_test, self._left()
         warnings = list(self.warnings[len(self.contradictions) :])
-        notes = [note for note in self.notes if note != self.combination]
+        notes = list(self.notes)
         if assumed := " ".join(assumptions(self.labels, test, self.others)):
             (notes if test is not None and test.verdict == "confirmed" else warnings).insert(0, assumed)
         largest = largest_readings(

@@ -8,7 +8,8 @@ Weights are not worth mounting
 - where the errors add half or more of what is promised, zᴴ F z − F₀₀ ≥ (R₀₀ − zᴴ R z)/2;
 - where fewer planes with weights a third as large leave hardly more;
 - where 95 of 100 check runs stay only below 0.9 of the present vibration;
-- where planes are not determined and the bound is not clearly below the present vibration;
+- where no weight is clear of its error, and 95 of 100 check runs stay only below 0.7 of it;
+- where planes act alike within the errors: the answer is what is determined, and what would determine it all;
 - where a run that was read, with its weights, is better than what is promised.
 """
 
@@ -22,11 +23,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.conditioning import REMEDY, acting_alike
+from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.planes import error_form
 from balancing.tables import reading_names, rms
-from rotorid.base.text import figures, listing
+from rotorid.base.text import capital, figures, listing
 from rotorid.regression import solution
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ GOOD = 1 / 3
 """Of the rms before: what a run reads that may stay as it is."""
 WORTH = 1.25
 """Of the rms before: what something else may leave at most (95 %) to be proposed."""
-WEAK, CLEAR = 3.0, 5.0
-"""Effect of a trial weight in units of its errors: too small below, and of a good one."""
+WEAK = 3.0
+"""Effect of a trial weight in units of its errors: too small below."""
 COARSE = 0.1
 """Of a reading: a digit that is one of few."""
 _ALL = 4
@@ -136,6 +137,7 @@ class Case:
         at = [self.names.index(plane) for plane in choice.planes]
         return float((np.abs(choice.weights) * self.effect[at]).max())
 
+    @cached_property
     def fewer(self) -> tuple[Choice, ...]:
         """Choices of fewer planes within the limits of weights: all of four planes, one left out of more."""
         P = len(self.names)
@@ -156,7 +158,7 @@ class Case:
         return f"{figures(size * self.labels.vibration_scale, digits)} {self.labels.vibration_in}".rstrip()
 
 
-def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limits | None) -> MountDecision:
+def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) -> MountDecision:
     """Whether to mount a correction, and what to do instead.
 
     Parameters
@@ -166,26 +168,27 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
     case
         What it is made of.
     unclear
-        Clauses that planes are not determined.
+        That planes are not determined; empty where they are.
     limits
         Of all speeds and planes; None: none.
     """
     D, before = result.weights, case.before
-    whole, fewer = case.choice(range(len(D)), D), case.fewer()
+    some = D.any()
+    whole, fewer = case.choice(range(len(D)), D), case.fewer
     made = MountDecision(
         before=before, expected=whole.expected, choices=fewer, warnings=_contradicted(result)
     )
     calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
     fighting = any(case.strength(whole) >= FIGHTING * case.strength(c) for c in calm)
-    sound = case.sound(whole) and not fighting
-    if sound and D.any() and (better := _better_run(result, case, whole.rms)):
-        return replace(made, word="do not mount", cause=better[0], instead=better[1:])
     bound = result.check_rms / rms(result.before) if result.errors_known else 0.0
-    if not D.any() or (sound and bound <= HARDLY_BELOW and not (unclear and bound**2 > 1 - EATEN)):
-        together = "; each weight alone is uncertain, what they leave together is not"
-        alike = () if result.combination else unclear
-        open_ = (words.removesuffix(REMEDY) + together for words in alike)
-        warnings = (*open_, *made.warnings, *_rising(result, case.today, limits))
+    sound = case.sound(whole) and not fighting and (result.clear.any() or bound**2 <= 1 - EATEN)
+    if sound and (better := _better_run(result, case, whole.rms)):
+        return replace(made, word="do not mount", cause=better[0], instead=better[1:])
+    if not some or (sound and bound <= HARDLY_BELOW):
+        cause = result.combination or unclear.removesuffix(REMEDY)
+        if cause and some:
+            made = replace(made, word="determined in part", cause=cause, instead=remedies(case))
+        warnings = (*made.warnings, *_rising(result, case.today, limits))
         return replace(made, warnings=warnings, notes=coarse(case.today))
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
@@ -193,32 +196,29 @@ def decide(result: Correction, case: Case, unclear: Sequence[str], limits: Limit
         f"it is {case.shown(before)}"
     )
     if contradictions := case.today.remarks.contradictions:
-        instead = ("Instead: mend the table, or measure these runs again until they agree.",)
         return replace(
-            made, word="measure again", cause="; ".join((*contradictions, outlook)), instead=instead
+            made,
+            word="measure again",
+            cause="; ".join((*contradictions, outlook)),
+            instead=("Instead: mend the table, or measure these runs again until they agree.",),
         )
-    causes = [words.removesuffix(REMEDY) + "; their weights are not determined" for words in unclear]
-    if not sound:
-        causes = _causes(result, case)
-    elif not causes:
-        causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
-    cause = "; ".join((*causes, outlook))
-    return replace(made, word="do not mount", cause=cause, instead=remedies(case, fewer))
+    causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
+    causes = causes if sound else _causes(result, case)
+    determined = [f"{capital(result.combination)}."] if result.combination else []
+    instead = (*determined, *remedies(case))
+    return replace(made, word="do not mount", cause="; ".join((*causes, outlook)), instead=instead)
 
 
-def remedies(case: Case, fewer: Sequence[Choice] | None = None) -> tuple[str, ...]:
+def remedies(case: Case) -> tuple[str, ...]:
     """What to do instead of mounting weights in all the planes, in sentences with numbers.
 
     Parameters
     ----------
     case
         What weights would be made of.
-    fewer
-        Choices of fewer planes, if they are known.
     """
     weak, words = case.weak, []
-    every = case.fewer() if fewer is None else fewer
-    good = [c for c in every if case.sound(c) and c.most < WORTH * case.before]
+    good = [c for c in case.fewer if case.sound(c) and c.most < WORTH * case.before]
     if good:
         best = min(good, key=lambda c: c.most)
         planes = listing(map(repr, best.planes), "and")

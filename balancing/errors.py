@@ -65,7 +65,7 @@ SPLITS = np.array([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.5, 0, 0.5), (0, 0.5
 """Of what readings have in common, in the variance: of the reading, of what weights do, further unbalance."""
 OWN_SHARES = np.array([0.0, 0.1, 0.4, 1.0])
 """Of stated errors, in the variance; only spare runs show that nothing is common."""
-EVENLY = (0.5, 1.0)
+EVENLY = (0.0, 0.5, 1.0)
 """How much of the own part is alike at all sensors."""
 NOTICEABLE = 0.1
 """Relative errors between runs that deserve a question."""

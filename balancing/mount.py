@@ -126,7 +126,9 @@ class Mounted(Answered):
         each = [f"{one['pieces']} → {three_figures(one['rms_after'])} {unit}".rstrip() for one in fewer]
         lines += [f"With fewer pieces: {', '.join(each)}."] if each else []
         if not self.discrete.enough:
-            lines.append("No set of pieces is enough: this one leaves hardly more than the best.")
+            lines.append(
+                f"No set of pieces is enough: these are the fewest that leave {FEW} times the least."
+            )
         return Answer(
             f"{first} {left} (with any weights {small(rms(free), old.max())}).",
             "\n".join(lines),
@@ -231,17 +233,23 @@ def _bound(c: Correction) -> Callable[[ComplexArray], float]:
 def _enough(
     c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float]
 ) -> Callable[[ComplexArray], bool]:
-    """Whether weights D (P,), added to what reads Y, leave little enough."""
+    """Whether weights D (P,), added to what reads Y, leave little enough.
+
+    Limits that not even any weights are sure to keep ask for no more pieces.
+    """
     limits = np.full(Y.shape, np.inf) if c.limits is None else c.limits.residual
     limited = np.isfinite(limits)
     covariance = np.nan_to_num(c.after_covariance)[limited]
     most = max(FEW * bound(c.after), LITTLE * rms(Y))
 
+    def kept(left: ComplexArray) -> bool:
+        return bool((largest(left[limited], covariance) <= limits[limited]).all())
+
+    judged = limited.any() and kept(c.after)
+
     def enough(D: ComplexArray) -> bool:
         left = Y + c.influence.W @ D
-        if limited.any():
-            return bool((largest(left[limited], covariance) <= limits[limited]).all())
-        return bound(left) <= most
+        return kept(left) if judged else bound(left) <= most
 
     return enough
 

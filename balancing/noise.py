@@ -11,7 +11,7 @@ each kind (readings, own part of a run, what is common to it, further unbalance,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,10 +22,8 @@ from balancing.errors import (
     RunErrors,
     job_columns,
     own_variance,
-    reading_of,
     rms,
     unbalances,
-    usual_run_errors,
 )
 from balancing.regions import real_parts
 from balancing.trials import Trials
@@ -247,39 +245,3 @@ class Whitening:
     def chi_square(self, difference: ComplexArray) -> float:
         """Of differences (S, C, R)."""
         return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))
-
-
-def white_rows(
-    trials: Trials, W: ComplexArray, take: FloatArray, least: float = 0.0
-) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, bool]:
-    """Joint errors, of readings and between runs, of rows that combine the runs' mean readings.
-
-    Parameters
-    ----------
-    trials
-        R runs at S speeds by C sensors.
-    W
-        Coefficients of their planes, shape (S, C, P), of about the right size.
-    take
-        Rows (X, R) as combinations of runs, real.
-    least
-        Error of a reading, in its unit, that is added in either direction.
-
-    Returns
-    -------
-    What makes vectors (S, 2 X C, j) independent and of variance 1, flat; the variance (S, 2 X C) of each by
-    itself; whether none of the errors are assumed.
-    """
-    reading, run = reading_of(trials), usual_run_errors(trials)
-    (S, C), X = W.shape[:2], len(take)
-    noise = run_noise(trials, W, take.astype(complex), reading, run)
-    noise.own[READING] += np.kron(take @ take.T, np.eye(2)) * least**2
-    whitening = Whitening(noise, kind_sizes(run))
-
-    def white(vectors: FloatArray) -> FloatArray:
-        parts = vectors.reshape(S, X, C, 2, -1).swapaxes(1, 2)
-        return whitening.white(parts.reshape(S, C, 2 * X, -1))
-
-    alone = np.einsum("scii->sci", whitening.own)
-    variance = alone.reshape(S, C, X, 2).swapaxes(1, 2).reshape(S, -1)
-    return white, variance, "assumed" not in (reading.source, run.origin)

@@ -111,14 +111,14 @@ class Prediction:
         size = np.abs(self.weights)
         draws = self.draws if self.region_known else np.full((1, len(size)), np.nan)
         along = draws / np.exp(1j * np.angle(self.weights))
-        sizes = np.where(self._clear, np.abs(draws), along.real) - size
-        return sizes, np.where(self._clear, np.angle(along), np.nan)
+        sizes = np.where(self.clear, np.abs(draws), along.real) - size
+        return sizes, np.where(self.clear, np.angle(along), np.nan)
 
     @cached_property
-    def _clear(self) -> BoolArray:
+    def clear(self) -> BoolArray:
         """Whether the 95 % region of each weight (P,) leaves zero out, so that its angle is determined."""
         if not self.region_known:
-            return np.asarray(self.weights != 0)
+            return np.ones(len(self.weights), dtype=bool)
         return np.array([bool(w) and not self.region([p]).holds(0 * w) for p, w in enumerate(self.weights)])
 
     @property
@@ -136,15 +136,22 @@ class Prediction:
         return half_width(self._off[0]), half_width(self._off[1])
 
     @property
+    def told_apart(self) -> bool:
+        """Whether planes act differently enough, or the regions of their weights leave zero out."""
+        alike = self.conditioning.condition_number > HARDLY_APART
+        return not alike or bool(self.clear[self.conditioning.weakest].all())
+
+    @property
     def combination(self) -> str:
         """What is determined of two planes that are hardly told apart, and what is not; else empty.
 
         The columns w of both planes, scaled to length 1, differ by little but a factor: w₂ ≈ ρ w₁. Then
         D₁ + ρ D₂, the weight in the first plane that does the same, is determined, and
-        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple.
+        (D₁ − ρ D₂) / 2 is not. With ρ ≈ 1 they are the static part and the couple. Where the regions of both
+        weights leave zero out, each is determined, whatever the couple.
         """
         apart, labels = self.conditioning, self.labels
-        if len(self.planes) != 2 or not self.region_known or apart.condition_number <= HARDLY_APART:
+        if len(self.planes) != 2 or self.told_apart:
             return ""
         v = apart.directions[:, 0].conj() * apart.lengths
         ratio = v[1] / v[0]

@@ -146,7 +146,7 @@ def after_check_run(
         word, why = "done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})"
     elif settled and not worth:
         word = "done"
-    elif blocked or (worth and not c.sound and pieces is None):
+    elif blocked or (worth and c.decision.word == "do not mount" and pieces is None):
         why = blocked or c.decision.cause
     elif worth:
         word, why = "trim", change

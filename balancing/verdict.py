@@ -134,8 +134,8 @@ class Verdict(Answered):
         why = {
             "pass": "kept",
             "fail": "not kept",
-            "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; repeated "
-            "readings or stated errors would tell",
+            "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; one more "
+            "run, or stated errors, would tell",
         }[self.overall]
         others = near[_SHOWN:]
         return Answer(

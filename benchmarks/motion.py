@@ -29,7 +29,7 @@ SPEED, TIME, STEPS, UNBALANCE = 3000 * np.pi / 30, 0.5, 2000, 1e-2
 
 def ours(rotor: fem.Rotor) -> np.ndarray:
     whole = rotor_system(rotor, 0.0, SPEED, unbalance={PLANE: UNBALANCE}, gravity=0.0)
-    system = reduced_system(whole, (PLANE, *SENSORS, 2, 22), MODES).system
+    system = reduced_system(whole, (PLANE, *SENSORS, 2, 22), MODES)
     rest = np.zeros(system.size)
     return move(system, (SPEED, SPEED), TIME, (rest, rest), nodes=SENSORS, rate=STEPS / TIME).z
 

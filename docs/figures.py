@@ -23,7 +23,6 @@ RESPONSE = (
     f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv "
     f"--speeds 1000:15000:100rpm {PROBES}"
 )
-CALIBRATE = f"calibrate {COMPRESSOR} sample_data/calibration/trial.toml --estimate 'bearing[*].*'"
 MOTION = "sample_data/motion"
 RUN_UP = "sample_data/waveforms/run_up.wav --tacho 1 --sensors 2,3,4 --unit um --phase lag"
 THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
@@ -261,13 +260,6 @@ GALLERY = (
         dense=True,
     ),
     Picture(
-        "calibration",
-        "identification",
-        f"{CALIBRATE} --prior 'bearing[*].*=20%'",
-        "One run with two weights tells stiffness and damping of both bearings, known to 20 % before, to 1.4 "
-        "to 7 %, and nothing of their cross-coupled stiffness or of the discs.",
-    ),
-    Picture(
         "run-up-bode",
         "instruments",
         f"runup {RUN_UP}",
@@ -285,24 +277,9 @@ GALLERY = (
     Picture(
         "tacho",
         "instruments",
-        f"vectors {RUN_UP} --picture tacho",
+        f"vectors {RUN_UP}",
         "No mark is missing. At the end a pulse is half a sample, 0.8°, early or late; the angle, "
         "through all of them, is not.",
-        dense=True,
-    ),
-    Picture(
-        "orbit",
-        "instruments",
-        f"vectors {RUN_UP} --picture orbit",
-        "Near the second critical speed the shaft goes round in a circle, with the rotation; each turn "
-        "begins at the mark.",
-        dense=True,
-    ),
-    Picture(
-        "waterfall",
-        "instruments",
-        f"vectors {RUN_UP} --picture waterfall",
-        "What goes with the speed lies on the line of 1×, and grows where it crosses the two modes.",
         dense=True,
     ),
     Picture(

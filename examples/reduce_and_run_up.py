@@ -41,7 +41,7 @@ def main() -> dict[str, float]:
     print("loads in N, of the small model and of the rotor:", *(np.round(load, 3) for load in loads))
     (lost,) = periodic_motion(system, 5000 * RPM, 8000 * RPM).branches[0].bifurcations
     assert whole.stability is not None
-    thresholds = lost.point.orbit.speed / RPM, (whole.stability.threshold or np.nan) / RPM
+    thresholds = lost.speed / RPM, (whole.stability.threshold or np.nan) / RPM
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
 
     # Half a percent of external damping moves the threshold far up. There a limit cycle begins.
@@ -49,11 +49,10 @@ def main() -> dict[str, float]:
     system, speed = rotor_system(damped, 500 * RPM, 13000 * RPM), 9000 * RPM
     rest, cycle, *_ = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
     (lost,) = rest.bifurcations
-    print(f"with 0.5 % of damping: stable up to {lost.point.orbit.speed / RPM:.0f} rpm; its limit cycle:")
-    for one in cycle.bifurcations:
-        orbit = one.point.orbit
+    print(f"with 0.5 % of damping: stable up to {lost.speed / RPM:.0f} rpm; its limit cycle:")
+    for orbit in cycle.bifurcations:
         whirl = 2 * np.pi / orbit.period / orbit.speed
-        print(f"  {one.kind} at {orbit.speed / RPM:.0f} rpm, whirl at {whirl:.3f} of the speed")
+        print(f"  {orbit.bifurcation} at {orbit.speed / RPM:.0f} rpm, whirl at {whirl:.3f} of the speed")
 
     # And yet, far below, a push makes it whip.
     whirls = []
@@ -88,7 +87,7 @@ def main() -> dict[str, float]:
         "load_N": float(loads[0][0]),
         "threshold_rpm": round(float(thresholds[0]), 1),
         "rotor_threshold_rpm": round(float(thresholds[1]), 1),
-        "damped_threshold_rpm": round(float(lost.point.orbit.speed / RPM), 1),
+        "damped_threshold_rpm": round(float(lost.speed / RPM), 1),
         "whip_rpm": round(float(whip[0])),
         "whip_eccentricity": round(float(whip[1]), 2),
         "first_critical_rpm": round(float(peaks[800][0])),

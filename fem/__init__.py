@@ -22,7 +22,7 @@ from fem.forces import (
     SqueezeFilm,
     Stop,
 )
-from fem.orbits import DIRECTION_NAMES, Orbits, orbits, probe, whirl_direction
+from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peaks import (
     CRITICALLY_DAMPED,
     LARGEST_MARGINS,
@@ -78,6 +78,7 @@ from fem.stability import (
     runs_away,
     stability_threshold,
     threshold_of,
+    windows_of,
 )
 from fem.state_space import Motion, StateSpace, equations_of_motion, state_space
 from fem.static import GRAVITY, StaticDeflection, compliance, static_deflection
@@ -86,7 +87,6 @@ from fem.undamped import (
     MeshCheck,
     Modes,
     Pencil,
-    Spectrum,
     critical_speeds,
     critical_speeds_below,
     critical_speeds_near,
@@ -110,7 +110,6 @@ from fem.whirl import (
 
 __all__ = [
     "CRITICALLY_DAMPED",
-    "DIRECTION_NAMES",
     "GRAVITY",
     "KINDS",
     "LARGEST_MARGINS",
@@ -145,7 +144,6 @@ __all__ = [
     "Rotor",
     "Sensor",
     "SensorLike",
-    "Spectrum",
     "SpeedMap",
     "SqueezeFilm",
     "Stability",
@@ -206,4 +204,5 @@ __all__ = [
     "whirl_direction",
     "whirl_modes",
     "whole_rotor",
+    "windows_of",
 ]

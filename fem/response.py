@@ -205,7 +205,7 @@ class Response(Result):
 
     def sentence(self) -> str:
         """The highest peak of a steady response and where it is."""
-        return f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes. {self.highest}"
+        return f"Unbalance response at {speed_range(self.speeds)}, {self.nodes.size} nodes. {self.highest}"
 
     @property
     def highest(self) -> str:

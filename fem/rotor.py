@@ -345,12 +345,8 @@ class Calibration:
     covariance
         Of the parameters as they now stand in the rotor, shape (n, n): of absolute ones in their unit, of a
         scale relative to the rotor as it is now.
-    speeds
-        Where the model was compared with readings, rad/s, shape (S,).
-    sensors
-        Of which it was, length C.
     lack_of_fit
-        Relative standard deviation of a coefficient that the model leaves, shape (S, C).
+        Relative standard deviation of a coefficient that the model leaves.
     needs_trial_run
         Whether the data contradict the model, so that its coefficients alone are not to be trusted.
     data
@@ -366,21 +362,16 @@ class Calibration:
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
-    speeds: FloatArray = ()  # type: ignore[assignment]
-    sensors: tuple[str, ...] = ()
-    lack_of_fit: FloatArray = ()  # type: ignore[assignment]
+    lack_of_fit: float = 0.0
     needs_trial_run: bool = False
     data: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("names", "sensors"):
-            labels = tuple(getattr(self, name))
-            object.__setattr__(self, name, labels)
-            if len({*labels}) < len(labels):
-                raise ValueError(f"calibration: one of its {name} comes twice")
-        n, S, C = len(self.names), np.size(self.speeds), len(self.sensors)
-        shapes = {"values": (n,), "covariance": (n, n), "speeds": (S,), "lack_of_fit": (S, C)}
-        for name, shape in shapes.items():
+        object.__setattr__(self, "names", tuple(self.names))
+        n = len(self.names)
+        if len({*self.names}) < n:
+            raise ValueError("calibration: one of its names comes twice")
+        for name, shape in {"values": (n,), "covariance": (n, n)}.items():
             array = np.array(getattr(self, name), dtype=float)
             if array.size != math.prod(shape) or not np.isfinite(array).all():
                 raise ValueError(f"calibration: {name} must be finite and of the shape {shape}")
@@ -388,10 +379,10 @@ class Calibration:
             read_only(getattr(self, name))
         R = self.correlation
         possible = np.allclose(R, R.T, rtol=0.0, atol=1e-9) and (np.linalg.eigvalsh(R) > -1e-9).all()
-        if not possible or (self.lack_of_fit < 0).any():
+        if not possible or not 0 <= self.lack_of_fit < np.inf:
             raise ValueError(
                 "calibration: the covariance must be symmetric and must not be negative in any direction, "
-                "lack_of_fit not negative"
+                "lack_of_fit finite and not negative"
             )
 
     @property

@@ -98,18 +98,18 @@ def draw_unbalance(found: Unbalance, ax: Axes | None = None) -> Axes:
     """
     labels, Q = found.labels, len(found.stations)
     sizes, angles = labels.weight(found.unbalance)
-    longest = float(sizes.max()) or 1.0
+    edges = np.repeat(found.unbalance[:, None], 91, axis=1)
+    for q in np.flatnonzero(found.determined & np.isfinite(found.covariance).all()):
+        block = found.covariance[2 * q : 2 * q + 2, 2 * q : 2 * q + 2]
+        edges[q] = region_edge(found.unbalance[q], block, 91)
+    tips, edges = (on_paper(labels, each * labels.weight_scale) for each in (found.unbalance, edges))
+    longest = np.abs(edges).max() or 1.0
     places = np.arange(Q) * 2.6 * longest * min(1.0, 8 / Q)
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
     ax.axhline(0, color="0.8", lw=4, zorder=0)
-    tips = on_paper(labels, found.unbalance * labels.weight_scale)
-    arrows(ax, places, tips, [BLUE if sure else "0.6" for sure in found.determined])
-    for q in np.flatnonzero(found.determined & np.isfinite(found.covariance).all()):
-        block = found.covariance[2 * q : 2 * q + 2, 2 * q : 2 * q + 2]
-        edge = on_paper(labels, region_edge(found.unbalance[q], block, 91) * labels.weight_scale)
-        ax.plot(places[q] + edge.real, edge.imag, color="black", lw=1)
-    title = "blue: determined, with 95 % regions; grey: not determined by the readings"
-    ax.set_title(title, fontsize=TEXT)
+    arrows(ax, places, tips, np.where(found.determined, BLUE, "0.6"))
+    ax.plot(places + edges.real.T, edges.imag.T, color="black", lw=1)
+    ax.set_title("blue: determined, with 95 % regions; grey: not determined by the readings", fontsize=TEXT)
     plain(ax)
     ends = -1.3 * longest, places[-1] + 1.3 * longest
     ax.set(aspect="equal", xlim=ends, ylim=(-1.15 * longest, 1.15 * longest))

@@ -69,7 +69,7 @@ def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = 
     polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
 
 
-def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: Sequence[str]) -> None:
+def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike) -> None:
     """Arrows with black edges from places of the horizontal axis, in the scale of the vertical one."""
     look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009}
     x = np.broadcast_to(at, tips.shape)

@@ -19,13 +19,13 @@ def lazy_names(package: str, home: Mapping[str, str]) -> tuple[Callable[[str], A
     package
         Its name.
     home
-        Module of each name, as seen from the package; the name itself for a module.
+        Module of each name, seen from the package (`.files.runs`: of its neighbour); itself for a module.
     """
 
     def load(name: str) -> Any:  # noqa: ANN401 - PEP 562
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module = import_module(f"{package}.{home[name]}")
+        module = import_module(f".{home[name]}", package)
         value = module if home[name] == name else getattr(module, name)
         setattr(sys.modules[package], name, value)
         return value

@@ -9,13 +9,15 @@ gradient is exact). Rows are divided by the root of the joint covariance of read
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from balancing import Trials, white_rows
+from balancing import RunErrors, Trials, reading_of, real_parts, usual_run_errors
+from balancing.noise import Noise, Whitening, kind_sizes, run_noise
 from fem import (
     MatrixChange,
     Rotor,
@@ -33,7 +35,7 @@ from fem.parameters import typical_size, with_changes, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.calibration.unknowns import as_they_stand
-from rotorid.regression import least_squares, solution, stretch
+from rotorid.regression import covariance_root, least_squares, solution
 
 STEP = 1e-4
 """Of a number's typical size, for differences of matrices."""
@@ -72,12 +74,6 @@ class RunReadings:
     key_phasor: float = 0.0
     unbalance: tuple[int, ...] = ()
     bow: int = 0
-
-    @property
-    def size(self) -> int:
-        """Number of real rows."""
-        R, S, C = self.trials.mean.shape
-        return int(2 * S * C * (R if self.modelled else R - 1))
 
     @property
     def modelled(self) -> bool:
@@ -167,11 +163,43 @@ class RunReadings:
 
     def rows(self, W: ComplexArray) -> ReadingRows:
         """The rows with their errors, which coefficients W (S, C, P + q) of about this size tell."""
-        R = len(self.trials.runs)
+        R, trials = len(self.trials.runs), self.trials
         take = np.eye(R) if self.modelled else np.column_stack((-np.ones(R - 1), np.eye(R - 1)))
-        least = NO_ERROR * float(np.abs(self.trials.mean).max())
-        rows = white_rows(self.trials, W[..., : len(self.nodes)], take, least)
-        return ReadingRows(self, take, *rows)
+        reading, run = reading_of(trials), usual_run_errors(trials)
+        noise = run_noise(trials, W[..., : len(self.nodes)], take.astype(complex), reading, run)
+        least = NO_ERROR * float(np.abs(trials.mean).max())
+        noise.own[0] += np.kron(take @ take.T, np.eye(2)) * least**2
+        stated = "assumed" not in (reading.source, run.origin)
+        return ReadingRows(self, take, noise, Whitening(noise, kind_sizes(run)), stated)
+
+
+class _AnyShare(RunErrors):
+    """Run errors of which the last size, drawn as the others, has no part in weights of least squares."""
+
+    @property
+    def typical(self) -> FloatArray:
+        """As without it."""
+        return RunErrors(self.sizes[:-1], self.probability[:-1], self.origin).typical
+
+
+def run_errors(trials: Trials) -> RunErrors:
+    """What changes from run to run where a model stands in place of coefficients.
+
+    Parameters
+    ----------
+    trials
+        The runs, whose statement counts.
+
+    Returns
+    -------
+    RunErrors
+        Stated or assumed. No spare run tells how much of stated ones a run has in common: it may be nothing.
+    """
+    run = usual_run_errors(trials)
+    if run.origin != "stated":
+        return run
+    sizes = np.vstack((run.sizes, np.linalg.norm(run.sizes[0]) * np.eye(4)[:1]))
+    return _AnyShare(sizes, np.full(len(sizes), 1 / len(sizes)), run.origin, run.level, run.evenly)
 
 
 class Bare(NamedTuple):
@@ -202,19 +230,42 @@ class ReadingRows:
         What they are of.
     take
         How rows are made of the runs: these themselves, or differences from the first, (x, R).
-    white
-        Divides vectors (S, 2 x C, j) by the root of their covariance.
-    variance
-        Of single rows by errors that no other row shares, (S, 2 x C).
+    noise
+        Errors of readings, and between runs, of the rows.
+    whitening
+        Divides them by the root of their joint covariance, with usual shares of errors between runs.
     stated
         Whether the errors are stated or measured, not assumed.
     """
 
     data: RunReadings
     take: FloatArray
-    white: Callable[[FloatArray], FloatArray]
-    variance: FloatArray
+    noise: Noise
+    whitening: Whitening
     stated: bool
+
+    @property
+    def variance(self) -> FloatArray:
+        """Of single rows by errors that no other row shares, (S, x, C), in each direction."""
+        alone = np.einsum("scii->sci", self.whitening.own)
+        return np.asarray(alone.reshape(*alone.shape[:2], -1, 2).mean(axis=3).swapaxes(1, 2))
+
+    def spreads(self, W: ComplexArray) -> list[FloatArray]:
+        """Roots (m, k) of covariances of the residuals, one for each share that runs may have in common.
+
+        Of stated errors also one by which readings have as much in common at each speed alone.
+        """
+        run, basis, spreads = run_errors(self.data.trials), self.residual(W)[1], []
+        for k in range(len(run.sizes) + (run.origin == "stated")):
+            own, columns = self.noise.at(np.array([1.0, *run.sizes[k % len(run.sizes)], 1.0]))
+            S, C, n, _ = own.shape
+            alone = block_diag(*covariance_root(own, np.einsum("...ii->...i", own)).reshape(-1, n, n))
+            shared = np.moveaxis(real_parts(columns), 0, -1)
+            if k == len(run.sizes):
+                shared = block_diag(*shared.reshape(S, C * n, -1)).reshape(S, C, n, -1)
+            E = self.whitening.white(np.concatenate((alone.reshape(S, C, n, -1), shared), axis=-1))
+            spreads.append(E - basis @ solution(basis, E) if basis.size else E)
+        return spreads
 
     def raw(self, W: ComplexArray) -> ComplexArray:
         """What weights do less what was read, (S, x, C)."""
@@ -269,6 +320,5 @@ class ReadingRows:
     def _white(self, columns: ComplexArray) -> FloatArray:
         """Complex columns (S, x, C, j) as whitened real ones, (m, j)."""
         S, x, C, j = columns.shape
-        flat = np.moveaxis(columns.reshape(S, x * C, j), -1, 1)
-        real = np.moveaxis(stretch(flat[..., None])[..., 0], 1, -1)
-        return self.white(real).reshape(-1, j)
+        real = np.stack((columns.real, columns.imag), axis=2).reshape(S, 2 * x, C, j)
+        return self.whitening.white(real.swapaxes(1, 2))

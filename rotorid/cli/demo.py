@@ -60,8 +60,8 @@ def demo(
 
 def _copy(folder: Path, pictures: list[Path]) -> None:
     """Write the files of the job; what would be overwritten is refused before anything is written."""
+    from rotorid.files.table_writing import write_files
     from rotorid.samples import sample_data
-    from rotorid.tables.reader.table_writing import write_files
 
     samples, remedy = sample_data(), "choose another folder: rotorid demo DIR"
     places = [samples / name for name in _SOURCES]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -81,10 +80,13 @@ def left_to_do(
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
             there = runs.runs[-1], runs.planes, runs.weights[-1]
             result = replace(result, mounted=type(result.mounted)(*there))
-    if pieces is None and not stop:
-        with suppress(ValueError):  # no holes, or none that can be used: a trim at any angle
+    no_pieces = ""
+    if pieces is None and job.holes and not stop:
+        try:
             pieces = mount(result, *known, job.holes, on_top=True)
-    return after_check_run(
+        except ValueError as error:  # a trim at any angle
+            no_pieces = f"; not as pieces: {error}"
+    left = after_check_run(
         result,
         runs,
         explained=None if check is None else check.explained,
@@ -93,3 +95,4 @@ def left_to_do(
         pieces=pieces,
         bare=None if check is None else check.before,
     )
+    return replace(left, why=left.why + no_pieces) if left.word == "trim" else left

@@ -91,8 +91,8 @@ class Destination:
         ValueError
             For a file that could not be written, before any work is done, and for one that was read.
         """
-        from rotorid.tables.reader.problems import printable
-        from rotorid.tables.reader.table_writing import write_files
+        from rotorid.files.problems import printable
+        from rotorid.files.table_writing import write_files
 
         further: Mapping[str, Sequence[str]] = getattr(options, "writes", {})
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
@@ -212,7 +212,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
 
     def run_command(**typed: Any) -> None:  # noqa: ANN401 - what typer has read
-        from rotorid.tables.reader.input_file import each_file_once
+        from rotorid.files.input_file import each_file_once
 
         _check_sizes(typed)
         given = [typed.pop(name) for name in arguments]
@@ -232,7 +232,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
 
 def _check_sizes(typed: Mapping[str, Any]) -> None:
     """Refuse numbers whose squares no computer holds."""
-    from rotorid.tables.reader.decimal_numbers import LARGEST_STATED, NotANumber, check_size
+    from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size
 
     for name, value in typed.items():
         if isinstance(value, float):

@@ -220,6 +220,8 @@ def _answer(parts: Mapping[str, Any], job: Job, influence: Influence) -> Answer:
         if job.check_pieces is not None:
             pieces = job.check_pieces.in_holes()
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
+        elif not (job.check_mounted or job.check_of_weights):
+            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
         tables = [_behind(part.answer) for part in (mounted, result) if part]
         every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
         return replace(every, judgement="\n".join([" ".join(first), *cause]))

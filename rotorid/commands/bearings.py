@@ -11,9 +11,9 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
-from rotorid.base.text import capital, figures
+from rotorid.base.text import figures, sentence
 from rotorid.commands.moving import moving
-from rotorid.commands.quantities import Speeds, rising_speeds
+from rotorid.commands.quantities import Speeds, degrees, rising_speeds
 from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
@@ -37,9 +37,12 @@ class BearingsOptions:
     ----------
     speeds : SPEEDS
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:9000:250rpm.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
     """
 
     speeds: Speeds
+    gravity_direction: float = -90.0
     outputs: ClassVar[tuple[str, ...]] = (".csv", ".xlsx", ".toml")
     to: ClassVar[tuple[str, ...]] = USUAL
 
@@ -86,7 +89,7 @@ class BearingEquilibria(Answered):
         every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
         shown = [*self.found[:-1:every], self.found[-1]]
         return Answer(
-            capital(self.stability.sentence()) if self.stability else "One speed: no threshold is sought.",
+            sentence(self.stability.sentence()) if self.stability else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),
             self.warnings,
             tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),
@@ -183,7 +186,7 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     from rotorid.motion.linear_coefficients import linear_rotor, threshold
 
     speeds = rising_speeds(options.speeds)
-    what = moving(rotor)
+    what = moving(rotor, direction=degrees(options.gravity_direction, "--gravity-direction"))
     system = what.system(speeds[0], speeds[-1])
     if not (system.walls < float("inf")).any():
         raise ValueError("the rotor has no [[journal_bearing]], [[squeeze_film]] or [[annular_seal]]")

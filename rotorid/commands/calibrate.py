@@ -1,19 +1,28 @@
-"""`calibrate`: numbers of a rotor file from trial runs, critical speeds and modes."""
+"""`calibrate`: numbers of a rotor file from trial runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import range_text
+from rotorid.base.text import capital, counted, error_figures
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from fem import Rotor
-    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
+    from rotorid.base.arrays import BoolArray
+    from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
+    from rotorid.regression.estimate import Uncertain
 
 
 @dataclass(frozen=True)
@@ -45,19 +54,137 @@ class CalibrateOptions:
     unbalance_at: Nodes | None = None
     bow: int = 0
     outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Calibrated(Answered):
+    """The calibrated rotor."""
+
+    found: CalibratedRotor
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the model explains the data; the wished numbers; what the data do not tell."""
+        from rotorid.regression.estimate import parameter_text
+
+        found = self.found
+        fits = "explains" if found.explained else "does NOT explain"
+        chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
+        first = [f"The model {fits} the data ({chi})."]
+        speeds = [speed for data in found.readings for speed in data.trials.speeds.tolist()]
+        if seen := found.seen:
+            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
+            first.append(capital(f"{at}{seen}."))
+        why = {} if found.prior is None else found.prior.why
+        beside = ~found.wished
+        tables = [parameter_text(*self._part(which), why) for which in (~beside, beside) if which.any()]
+        if found.bare:
+            tables.append(text(self._unbalance(), width=COLUMNS))
+        more = "what else is not known exactly" if beside.any() else "unbalance"
+        notes = []
+        if found.searches > 1:
+            notes.append(f"searched from {found.searches} starting values")
+        if found.exact:
+            exact = counted(len(found.exact), "number")
+            notes.append(f"± count what {exact} taken as exact may be off")
+        return Answer(
+            "\n".join(first),
+            tables[0],
+            found.warnings,
+            tuple(notes),
+            tables=tuple(tables[1:]),
+            more=more if tables[1:] else "",
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per number: value, standard deviation, 95 % interval, share of the data."""
+        from rotorid.regression.estimate import parameter_columns
+
+        every = parameter_columns(*self._part(self.found.wished | True))
+        return frame((*every, Column("data_share", self.found.data_share)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance; None where not determined."""
+        import numpy as np
+
+        from rotorid.regression.estimate import parameter_dict
+
+        found, estimate = self.found, self.found.fit.estimate
+        names, every = self._part(found.wished | True)
+        parameters = parameter_dict(names, every)
+        for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
+            parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
+        return plain(
+            {
+                "parameters": parameters,
+                "rank": estimate.rank,
+                "condition_number": estimate.condition_number,
+                "identifiable": estimate.full_rank,
+                "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
+                "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+                "correlation": every.correlation,
+                "seen": found.seen or None,
+                "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
+                "chi_square": found.chi_square,
+                "degrees_of_freedom": found.dof,
+                "probability": found.chance,
+                "exact": found.exact,
+                "explained": found.explained,
+                "lack_of_fit": found.lack_of_fit,
+                "unbalance": rows(self._unbalance()) if found.bare else [],
+                "warnings": found.warnings,
+                "rotor": None,
+            }
+        )
+
+    def rotor_files(self, path: Path) -> Mapping[Path, bytes]:
+        """The calibrated rotor as a rotor file, with its tables.
+
+        Raises
+        ------
+        ValueError
+            For numbers that the data do not determine.
+        """
+        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+
+        if why := self.found.undetermined:
+            raise ValueError(f"{path}: no rotor file can be written, {why}")
+        return rotor_file_bytes(path, self.found.rotor)
+
+    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+        """Names of some of the numbers, and these with their errors."""
+        import numpy as np
+
+        from rotorid.regression.estimate import Uncertain
+
+        found, part = self.found, Uncertain()
+        part.values, part.errors_stated, part.dof = found.values[which], True, 0
+        part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
+        return tuple(name for name, taken in zip(found.names, which, strict=True) if taken), part
+
+    def _unbalance(self) -> tuple[Column, ...]:
+        """What the bare rotor's readings say of its unbalances and bows."""
+        import numpy as np
+
+        names, values = self.found.bare, np.concatenate(self.found.unbalance)
+        return (
+            Column("unbalance", names, str),
+            Column("size", np.abs(values), "{:.4g}".format),
+            Column("std", np.concatenate(self.found.unbalance_std), error_figures, "±"),
+            Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names], str),
+            Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
+        )
 
 
 class Prepared(NamedTuple):
-    """What is calibrated: the rotor, unknown numbers, data; files of both; what was assumed."""
+    """What is calibrated: the rotor, unknown numbers, data; files of both."""
 
     rotor: Rotor
     numbers: list[Unknown]
     readings: list[RunReadings]
-    frequencies: list[MeasuredFrequencies]
     rotor_files: tuple[Path, ...]
     data_files: list[Path]
-    assumed: list[str]
 
     @property
     def probes(self) -> list[str]:
@@ -82,7 +209,7 @@ def calibrate(
     rotor : ROTOR
         Rotor table (.csv, .xlsx) or rotor file (.toml).
     data : DATA
-        Jobs with trial runs (.toml, .xlsx), tables of critical speeds, frequencies or modes.
+        Jobs with trial runs (.toml, .xlsx).
     options
         What is unknown, and what is known of it.
 
@@ -92,7 +219,6 @@ def calibrate(
         For files or options that cannot be, and for data that say nothing of the rotor.
     """
     from rotorid import calibration
-    from rotorid.calibration.plots import calibration_figure
     from rotorid.commands.unknown_numbers import unknowns
 
     given = prepared(rotor, data, options)
@@ -100,29 +226,14 @@ def calibrate(
     paths = {number.path for number in given.numbers}
     beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
     exact = [number for number in beside if number.path not in paths]
-    result = calibration.calibrate(*given[:4], exact=exact)
+    result = calibration.calibrate(*given[:3], exact=exact)
     of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
     made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-
-    def rotor_file(path: Path) -> Mapping[Path, bytes]:
-        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
-
-        if why := result.undetermined:
-            raise ValueError(f"{path}: no rotor file can be written, {why}")
-        return rotor_file_bytes(path, result.rotor)
-
-    return outcome_of(
-        result,
-        origin,
-        notes=(*result.answer.notes, *given.assumed),
-        keys=lambda: {**result.to_dict(), "rotor": None},
-        files={".toml": rotor_file},
-        pictures={"The numbers, with what was known of them.": lambda: calibration_figure(result)},
-        title="Calibration",
-    )
+    calibrated = Calibrated(found=result)
+    return outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
 
 
 def prepared(
@@ -151,8 +262,8 @@ def prepared(
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
-    readings, frequencies, read, assumed = read_data(sources, model, places, options.bow)
-    without = Prepared(model, [], readings, frequencies, files, read, assumed)
+    readings, read = read_data(sources, model, places, options.bow)
+    without = Prepared(model, [], readings, files, read)
     numbers = unknowns(
         model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
     )

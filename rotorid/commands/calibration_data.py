@@ -1,4 +1,4 @@
-"""Data of a calibration, from files: jobs with runs, critical speeds, natural frequencies with shapes."""
+"""Data of a calibration, from files: jobs with runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.text import counted
-from rotorid.calibration import MeasuredFrequencies, RunReadings
+from rotorid.calibration import RunReadings
 from rotorid.commands.model_places import model_places
 
 if TYPE_CHECKING:
@@ -19,36 +19,19 @@ if TYPE_CHECKING:
 
 def read_data(
     files: Sequence[Path], rotor: Rotor, unbalance: Sequence[int], bow: int
-) -> tuple[list[RunReadings], list[MeasuredFrequencies], list[Path], list[str]]:
-    """Readings and frequencies of these files, all files that were read, and what was assumed.
-
-    Parameters
-    ----------
-    files
-        Jobs (.toml, or a workbook), tables of critical speeds or natural frequencies, tables of modes.
-    rotor
-        Knows the nodes.
-    unbalance, bow
-        As `RunReadings`, of all jobs.
-    """
+) -> tuple[list[RunReadings], list[Path]]:
+    """Readings of these jobs (.toml, or a workbook), and all files that were read."""
     from rotorid.tables import read_job
-    from rotorid.tables.data.frequency_table import is_job, read_frequencies
 
-    readings, frequencies, read, assumed = [], [], list[Path](), list[str]()
+    readings, read = [], list[Path]()
     for file in files:
-        if is_job(file):
-            job = read_job(file)
-            try:
-                readings.append(run_readings(job, rotor, unbalance, bow))
-            except ValueError as error:
-                raise ValueError(f"{file.name}: {error}") from None
-            read += job.files
-        else:
-            table = read_frequencies(file, rotor)
-            frequencies.append(table.data)
-            read.append(file)
-            assumed += [f"{file.name}: {each}" for each in table.assumed]
-    return readings, frequencies, read, assumed
+        job = read_job(file)
+        try:
+            readings.append(run_readings(job, rotor, unbalance, bow))
+        except ValueError as error:
+            raise ValueError(f"{file.name}: {error}") from None
+        read += job.files
+    return readings, read
 
 
 def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0) -> RunReadings:

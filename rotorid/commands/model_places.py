@@ -39,7 +39,7 @@ def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPl
     ValueError
         Where the job has no rotor, or no place in it for a plane or sensor.
     """
-    from rotorid.tables.reader.units import weight
+    from rotorid.files.units import weight
 
     if job.rotor is None:
         raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
@@ -73,7 +73,7 @@ def _quantity(unit: str) -> Quantity:
     ValueError
         For a unit that is only a label.
     """
-    from rotorid.tables.reader.units import vibration
+    from rotorid.files.units import vibration
 
     kinds: dict[str, Quantity] = {
         "length": "displacement",

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import ComplexArray
-    from rotorid.identify.modes_readings import Readings
-    from rotorid.identify.modes_result import FittedModes
+    from rotorid.identify.modes_result import FittedModes, Readings
 
 Excitation = Literal["force", "unbalance"]
 """What excites: the same, or as F, at every frequency; or growing with its square."""
@@ -81,7 +80,7 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
     fit = fit_modes(readings, SteadyAnswers(readings.speeds, force), bands(options.bands) or None)
 
     def picture() -> Figure:
-        from rotorid.identify.plots_modes import figure_modes
+        from rotorid.identify.plots import figure_modes
 
         return figure_modes(fit)
 
@@ -112,7 +111,7 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
     import numpy as np
 
     from balancing import Labels
-    from rotorid.identify.modes_readings import Readings
+    from rotorid.identify.modes_result import Readings
     from rotorid.tables.data.measurements import read_amplitudes
 
     errors = options.amplitude_error, options.phase_error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +15,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
-from rotorid.commands.moving import moving
+from rotorid.commands.moving import moving, reduction, reduction_notes
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from rotorid.commands.moving import Moving
     from rotorid.motion.run import MotionRun
     from rotorid.motion.steady import SteadyEnd
-    from rotorid.motion.system import MotionSystem, ReducedSystem
+    from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
 View = Literal["motion", "orbits", "bode"]
@@ -63,8 +65,14 @@ class MotionOptions:
         From one speed to another one, up or down, evenly: 500:9000rpm, 9000:500rpm.
     time : TIME
         How long, 2s.
+    acceleration : A
+        Of a run-up or a run-down, in place of its time: 300rpm/s; without a unit rad/s².
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
+    bow : FILE
+        Table of the shaft's bow at rest; in place of a small model's own.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
     start
         At rest in equilibrium, or in steady motion at the first speed.
     displaced : LIST
@@ -84,7 +92,10 @@ class MotionOptions:
     speed: str | float | None = None
     run_up: Speeds | None = None
     time: str | float | None = None
+    acceleration: str | float | None = None
     unbalance: Path | str | Mapping[int, complex] | None = None
+    bow: Path | str | Mapping[int, complex] | None = None
+    gravity_direction: float = -90.0
     start: Start = "rest"
     displaced: str | Mapping[str, complex] | None = None
     sensors: Nodes | None = None
@@ -107,8 +118,6 @@ class Motion(Answered):
     ----------
     motion
         What was found.
-    reduced
-        What moved, if it is a rotor with fewer unknowns than it has.
     end
         What it has come to; None where the speed changes or too little is known.
     error
@@ -121,7 +130,6 @@ class Motion(Answered):
     """
 
     motion: MotionRun
-    reduced: ReducedSystem | None
     end: SteadyEnd | None
     error: float
     warnings: tuple[str, ...]
@@ -131,7 +139,7 @@ class Motion(Answered):
         """As JSON types, without the provenance."""
         import numpy as np
 
-        motion, end, reduced = self.motion, self.end, self.reduced
+        motion, end = self.motion, self.end
         ranges = motion.eccentricity() if end is None else end.eccentricity
         nodes = [str(node) for node in motion.nodes]
         deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
@@ -160,7 +168,7 @@ class Motion(Answered):
                 "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
                 "tolerance": motion.tolerance,
                 "position_error": self.error,
-                "reduction": reduced and {"modes": reduced.modes, "frequency_error": reduced.error},
+                "reduction": reduction(motion.system),
                 "warnings": self.warnings,
             }
         )
@@ -169,8 +177,8 @@ class Motion(Answered):
         """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
         import numpy as np
 
-        from rotorid.motion.periodic import repeating
         from rotorid.motion.run import run
+        from rotorid.motion.steady import repeating
 
         motion, end = self.motion, self.end
         if end is None or end.at_rest or not end.periodic or not end.speed:
@@ -286,13 +294,13 @@ class Motion(Answered):
         )
 
     def _notes(self) -> tuple[str, ...]:
-        motion, reduced = self.motion, self.reduced
+        motion = self.motion
         step = 1e3 * motion.time[-1] / motion.steps
         found = (
             f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
             f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
         )
-        return found if reduced is None else (*found, reduced.note)
+        return (*found, *reduction_notes(motion.system))
 
     def figure(self) -> Figure:
         """What was asked for: time and spectrum, orbits, or the Bode picture of a run-up."""
@@ -330,14 +338,13 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
 
     one_of(options.view, "--view", get_args(View))
     ends, time = _course(options)
-    source = moving(model, options.unbalance)
+    direction = degrees(options.gravity_direction, "--gravity-direction")
+    source = moving(model, options.unbalance, options.bow, direction)
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    reduced = None
     if options.modes is not None or system.size > _SMALL:
-        reduced = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
-        system = reduced.system
+        system = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
     found = move(tolerance=_TOLERANCE)
@@ -350,7 +357,6 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
     result = Motion(
         motion=found,
-        reduced=reduced,
         end=steady_end(found),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),
@@ -365,6 +371,8 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
         raise ValueError("one of --speed and --run-up is needed")
     if options.speed is not None:
         speed = one_speed(options.speed, "--speed")
+        if options.acceleration is not None:
+            raise ValueError("--acceleration belongs to --run-up")
         ends = (speed, speed)
     else:
         given = options.run_up or ""
@@ -374,12 +382,30 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
                 f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
             )
         ends = (found[0], found[1])
+    if (options.time is None) == (options.acceleration is None):
+        one = (
+            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
+        )
+        raise ValueError(one)
     if options.time is None:
-        raise ValueError("--time is needed")
+        return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
     time = number(str(options.time).strip().removesuffix("s"))
     if not 0 < time < FASTEST:
         raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")
     return ends, time
+
+
+def _acceleration(given: str | float) -> float:
+    """Read "300rpm/s", or a number in rad/s², as --run-up without a unit is in rad/s."""
+    text = re.sub(r"/s(²|\^?2)$", "/s/s", str(given).strip())
+    if math.isnan(number(text)) and not re.search("(rpm|Hz|rad[/_]s)/s$", text):
+        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
+    value = one_speed(text.removesuffix("/s") if math.isnan(number(text)) else text, "--acceleration")
+    if not value > 0:
+        raise ValueError(
+            f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"
+        )
+    return value
 
 
 def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[int, ...]:
@@ -404,7 +430,7 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     import numpy as np
 
     from rotorid.commands.option_quantities import quantity
-    from rotorid.tables.reader import units
+    from rotorid.files import units
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")

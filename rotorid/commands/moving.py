@@ -1,12 +1,13 @@
-"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance and weight."""
+"""What `bearings`, `motion` and `periodic` take: a rotor or a small model, its unbalance, bow and weight."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import counted, percent
 from rotorid.report.options import rotor_source
 
 if TYPE_CHECKING:
@@ -25,14 +26,18 @@ class Moving:
     ----------
     model
         The rotor or the small model.
-    unbalance
-        By node, kg·m, complex; None: the small model's own.
+    unbalance, bow
+        By node, kg·m and m, complex; None: the small model's own.
+    direction
+        Of gravity, degrees from x with the rotation.
     files
         Read for it.
     """
 
     model: Rotor | SmallModel
     unbalance: Mapping[int, complex] | None
+    bow: Mapping[int, complex] | None
+    direction: float
     files: tuple[Path, ...]
 
     def node(self, name: str | int) -> int:
@@ -43,14 +48,36 @@ class Moving:
         """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
         from rotorid.motion.system import rotor_system
 
-        return rotor_system(self.model, lowest, highest, unbalance=self.unbalance)
+        return rotor_system(
+            self.model, lowest, highest, unbalance=self.unbalance, bow=self.bow, direction=self.direction
+        )
+
+
+def reduction(system: MotionSystem) -> dict[str, Any] | None:
+    """What a reduced system has of the rotor's, for JSON; None of others."""
+    if system.modes is None:
+        return None
+    return {"modes": system.modes, "frequency_error": system.frequency_error}
+
+
+def reduction_notes(system: MotionSystem) -> tuple[str, ...]:
+    """How many unknowns of a rotor move, and what that costs; none where all do."""
+    if system.modes is None:
+        return ()
+    size, modes = counted(system.size, "unknown"), counted(system.modes, "mode")
+    high = f"natural frequencies without films are high by {percent(system.frequency_error)} % at most"
+    if system.frequency_error == float("inf"):
+        high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+    return (f"of the rotor {size} move, {modes} among them; {high}",)
 
 
 def moving(
     given: Rotor | SmallModel | Path | str,
     unbalance: Table | None = None,
+    bow: Table | None = None,
+    direction: float = -90.0,
 ) -> Moving:
-    """Read a rotor table, a rotor file or a small model, and a table of unbalance.
+    """Read a rotor table, a rotor file or a small model, and tables of unbalance and bow.
 
     Raises
     ------
@@ -58,7 +85,7 @@ def moving(
         For files that cannot be read.
     """
     from rotorid.reduction import SmallModel
-    from rotorid.tables import read_small_model, read_unbalance, rotor_files
+    from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
     from rotorid.tables.models.small_model_file import is_small_model
 
     model: Rotor | SmallModel
@@ -72,4 +99,7 @@ def moving(
     if isinstance(unbalance, Path | str):
         files = (*files, Path(unbalance))
         unbalance = read_unbalance(files[-1], model)
-    return Moving(model, unbalance, files)
+    if isinstance(bow, Path | str):
+        files = (*files, Path(bow))
+        bow = read_bow(files[-1], model)
+    return Moving(model, unbalance, bow, direction, files)

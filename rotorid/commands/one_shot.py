@@ -1,7 +1,7 @@
 """Balancing with a calibrated rotor: coefficients with its errors.
 
 The parameters of the rotor err by L ε with L Lᵀ their covariance and independent real ε; a coefficient by
-Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by the lack of fit at each speed and sensor.
+Σ ∂W/∂θ L ε, the same ε at all speeds and sensors, and by its lack of fit.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Gaussian, Trials, usual_run_errors, with_parameters
+from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
-from rotorid.calibration import RunReadings
-from rotorid.tables.reader.input_file import sha256
+from rotorid.calibration import RunReadings, run_errors
+from rotorid.files.input_file import sha256
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from balancing import Influence
-    from fem import Calibration, Rotor
-    from rotorid.base.arrays import ComplexArray, FloatArray
+    from fem import Rotor
+    from rotorid.base.arrays import ComplexArray
     from rotorid.commands.model_places import ModelPlaces
     from rotorid.tables import Job
 
@@ -41,27 +41,14 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
-    lack = lack_at(calibration, influence.speeds, influence.sensors)
+    lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
-    errors = Gaussian(none.own[0], none.columns, influence.reading, usual_run_errors(job.trials))
+    errors = Gaussian(none.own[0], none.columns, influence.reading, run_errors(job.trials))
     found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
     if not calibration.needs_trial_run:
         return found
     warnings = *found.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(found, remarks=found.remarks._replace(warnings=warnings))
-
-
-def lack_at(calibration: Calibration, speeds: FloatArray, sensors: Sequence[str]) -> FloatArray:
-    """Lack of fit at other speeds, rad/s, and sensors, shape (S', C').
-
-    That of the nearest speed; of a sensor that was not compared the largest of all; 0 where nothing was.
-    """
-    if not calibration.lack_of_fit.size:
-        return np.zeros((speeds.size, len(sensors)))
-    lack = calibration.lack_of_fit[np.abs(speeds[:, None] - calibration.speeds).argmin(axis=1)].T
-    columns = dict(zip(calibration.sensors, lack, strict=True))
-    values = [columns.get(sensor, lack.max(axis=0)) for sensor in sensors]
-    return np.reshape(values, (-1, speeds.size)).T
 
 
 def counted_before(job: Job) -> bool:

@@ -14,14 +14,14 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import Angles
 from rotorid.commands.quantities import degrees, one_of, one_speed, pairs
-from rotorid.tables.reader import units
-from rotorid.tables.reader.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
-from rotorid.tables.reader.units import Unit, UnitError, spelt
+from rotorid.files import units
+from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
+from rotorid.files.units import Unit, UnitError, spelt
 
 if TYPE_CHECKING:
     from balancing import Labels
+    from rotorid.files.settings_keys import Quantity
     from rotorid.tables import Job
-    from rotorid.tables.reader.settings_keys import Quantity
 
 Amount = str | float
 """A number with its unit, or a number in SI."""
@@ -118,8 +118,8 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.tables.reader.settings_keys import Quantity
-    from rotorid.tables.reader.weights_with_units import in_job_units
+    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.weights_with_units import in_job_units
 
     own = labels.weight_unit
     value, unit = _weight(given, what, example) if isinstance(given, str) else (given, _si(own))
@@ -283,7 +283,7 @@ def _limits(
 
 
 def _limit(value: float, unit: Unit, given: object, what: str, example: str) -> Quantity:
-    from rotorid.tables.reader.settings_keys import Quantity
+    from rotorid.files.settings_keys import Quantity
 
     return Quantity(f"{what} {given!r}", _above_zero(value, given, what, example), unit)
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from rotorid.report.outcome import Written
     from rotorid.tables.data.modes_table import MeasuredModes
 
+Place = Literal["best", "compromise", "mac", "book"]
+"""Which of all places of the masses is taken."""
+Rows = Literal["equal", "relative"]
+"""How rows of the regression are weighted."""
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
@@ -53,12 +57,22 @@ class ReduceOptions:
     ----------
     nodes : LIST
         Where the masses stand: nodes or stations, 7,12,18.
+    place
+        Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
+        (extrema of the first two modes).
     rank
-        Rank all places of the masses; without --nodes the masses are those of the best compromise.
+        Rank all places of the masses; without --nodes or --place they are those of the best compromise.
     masses : N from 1
-        How many masses are ranked; default: 3.
+        How many masses are placed or ranked; default: 3.
+    candidates : LIST
+        Nodes that places are chosen from.
     modes : N from 1
         How many modes the regression uses; default: 2.
+    rows
+        Rows of the regression as they stand (the book: the first mode dominates), or of each mode relative
+        to its 1/ω².
+    nonnegative
+        No mass below 0.
     measured : FILE
         Table of measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.
     compliance : FILE
@@ -80,6 +94,8 @@ class ReduceOptions:
         Unbalance response beside the full rotor's, at speeds in rad/s or with a unit; or auto.
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
+    force : LIST
+        Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
@@ -91,9 +107,13 @@ class ReduceOptions:
     """
 
     nodes: Nodes | None = None
+    place: Place | None = None
     rank: bool = False
     masses: int | None = None
+    candidates: Nodes | None = None
     modes: int | None = None
+    rows: Rows = "equal"
+    nonnegative: bool = False
     measured: Path | str | None = None
     compliance: Path | str | None = None
     seals: str | Mapping[str, float] | None = None
@@ -104,13 +124,14 @@ class ReduceOptions:
     methods: bool = False
     response: Speeds | None = None
     stability: Band | None = None
+    force: Nodes | None = None
     keep_supports: bool = False
     model: Path | None = None
     state_space: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank masses methods errors supports_apart",
-        "Small model": "response stability model state_space damping keep_supports",
+        "Method": "rank place masses candidates methods rows nonnegative errors supports_apart",
+        "Small model": "response stability model state_space damping force keep_supports",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
     writes: ClassVar[Mapping[str, Sequence[str]]] = {
@@ -158,6 +179,8 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     result: Reduction = parts[""]
     small: SmallModel | None = parts.get("small_model")
     placement: Placement | None = parts.get("placement")
+    force = [] if options.force is None else nodes(options.force, "--force")
+    forces = force if result.rotor is None else [result.rotor.node(node) for node in force]
     speed = _speed(result.rotor, options)
     first = [] if placement is None else [placement.answer]
     if options.keep_supports and result.rotor is not None:
@@ -168,7 +191,8 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     def model(path: Path) -> Written:
         from rotorid.commands.reduce_result import model_files
 
-        return model_files(path, result, small, speed, name, keeps_supports=options.keep_supports)
+        kept = options.keep_supports
+        return model_files(path, result, small, speed, name, keeps_supports=kept, forces=forces)
 
     def state_space(path: Path) -> Written:
         from rotorid.commands.reduce_result import small_of, state_space_bytes
@@ -199,7 +223,7 @@ def _pictures(parts: Mapping[str, Any]) -> dict[str, Callable[[], Figure]]:
     captions = {
         "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
         "response": "Response of both models, and their difference.",
-        "methods": "What each method loses: errors of the frequencies, and 1 - MAC of the shapes.",
+        "methods": "What each method loses: errors of frequencies.",
         "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
         "": "Mode shapes of the small model over those it was made from.",
     }
@@ -209,10 +233,9 @@ def _pictures(parts: Mapping[str, Any]) -> dict[str, Callable[[], Figure]]:
             from rotorid.base.plot_style import new_figure
             from rotorid.plots import plot
 
-            two = key in ("methods", "response")
+            two = key == "response"
             figure = new_figure(6.2 if two else 5.0)
-            ratios = (1, 1) if key == "methods" else (3, 2)
-            axes = [*figure.subplots(2, sharex=True, height_ratios=ratios)] if two else figure.add_subplot()
+            axes = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
             plot(parts[key], axes)
             return figure
 
@@ -231,17 +254,19 @@ def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
-    computed = ("rank", "methods", "response", "stability")
+    computed = ("rank", "place", "methods", "response", "stability")
     given = [name for name, value in vars(options).items() if value is not None and value is not False]
-    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "state_space")
+    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "state_space", "force")
+    ranks = options.rank or options.place is not None
     wrong = (
         (
             not has_rotor,
-            (*computed, "speed", "supports_apart", "damping", "keep_supports"),
+            (*computed, "candidates", "speed", "supports_apart", "damping", "keep_supports"),
             "needs a rotor: give ROTOR instead of --compliance",
         ),
         (has_rotor, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both"),
-        (not options.rank, ("masses",), "does nothing without --rank"),
+        (not ranks, ("masses", "candidates"), "does nothing without --rank or --place"),
+        (options.model is None, ("force",), "does nothing without --model"),
         (
             options.keep_supports,
             on_supports,
@@ -298,13 +323,15 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         speed=at,
         supports_apart=options.supports_apart,
         measured=None if data is None else (data.frequencies, data.shapes),
+        rows=options.rows,
+        nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
     )
     parts: dict[str, Any] = {"": result}
-    if placement is not None:
+    if placement is not None and options.rank:
         parts["placement"] = placement
     if options.methods:
-        parts["methods"] = compare_methods(machine, places, modes=result.modes, speed=at)
+        parts["methods"] = compare_methods(result)
     stable = band(options.stability, "--stability")
     small, ratios = None, _damping_ratios(options.damping)
     if options.keep_supports:
@@ -327,26 +354,40 @@ def _places(
     speed: float | None,
     held: Sequence[int],
 ) -> tuple[Placement | None, list[int]]:
-    """The ranking if it is asked for, and nodes of the masses: as given, its best, or of measured shapes."""
-    from rotorid.reduction import rank_nodes
+    """The ranking if it is needed, and nodes of the masses: as given, by rule, or of the measured shapes."""
+    from rotorid.reduction import book_nodes, rank_nodes
 
     masses, placement = 3 if options.masses is None else options.masses, None
-    if options.rank:
-        modes = min(2, masses) if options.modes is None else options.modes
-        free = [node for node in range(1, rotor.n_nodes + 1) if node not in held]
-        placement = rank_nodes(rotor, masses, modes, candidates=free, speed=speed)
+    if options.rank or options.place not in (None, "book"):
+        candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]
+        placement = rank_nodes(
+            rotor,
+            masses,
+            min(2, masses) if options.modes is None else options.modes,
+            candidates=candidates
+            if options.candidates is None
+            else nodes(options.candidates, "--candidates"),
+            speed=speed,
+            rows=options.rows,
+        )
     if options.nodes is not None:
         return placement, [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
+    if options.place == "book":
+        return placement, list(book_nodes(rotor, masses, speed=speed))
     if placement is not None:
-        if placement.compromise is None:
+        bests = {"mac": placement.best_by_mac, "best": placement.best_by_frequency}
+        which = bests.get(options.place or "", placement.compromise)
+        if which is None:
             raise ValueError(
                 f"no choice of {counted(masses, 'node')} gives positive masses with "
                 f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
             )
-        return placement, placement.nodes[placement.compromise].tolist()
+        return placement, placement.nodes[which].tolist()
     if data is not None:
         return None, [rotor.node(node) for node in data.nodes]
-    raise ValueError("say where the masses stand: --nodes 7,12,18, or --rank")
+    raise ValueError(
+        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
+    )
 
 
 def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
@@ -379,6 +420,8 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
         used,
         nodes=wanted,
         seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
+        rows=options.rows,
+        nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
     )
     return result, (Path(options.compliance), Path(options.measured))

@@ -44,8 +44,10 @@ def model_files(
     name: str = "",
     *,
     keeps_supports: bool = False,
+    forces: Sequence[int | str] = (),
 ) -> dict[Path, bytes]:
-    """The small model as a file, with tables of supports over speed; `name`: of the rotor.
+    """The small model as a file, with tables of supports over speed; `name`: of the rotor,
+    `forces`: nodes of measured ones.
 
     For `fit` dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
     Without a rotor (`small` None) it is a file of equations.
@@ -53,7 +55,7 @@ def model_files(
     Raises
     ------
     ValueError
-        For masses that are not positive.
+        For masses that are not positive, and forces where no mass stands.
     """
     from rotorid.tables.models.model_writing import ode_model_bytes
     from rotorid.tables.models.small_model_file import linear_equations, small_model_files
@@ -71,18 +73,25 @@ def model_files(
     places = {x: motion.index(x) for x in masses if x in motion.coordinates}
     critical = {f"d_{x}": 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x, i in places.items()}
     estimate = {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()}
+    inputs = [f"f_x{node}" for node in forces]
+    if lost := [x for x in inputs if x.removeprefix("f_") not in places]:
+        raise ValueError(
+            f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
+            f"{', '.join(map(str, result.nodes))}"
+        )
     if small is None:
         dampers = {x.removeprefix("d_"): value for x, value in estimate.items()}
-        return {path: ode_model_bytes(motion, dampers, comments=[f"{made}, the plane x, SI"], inputs=[])}
+        return {path: ode_model_bytes(motion, dampers, comments=[f"{made}, the plane x, SI"], inputs=inputs)}
     equations: dict[str, Any] = {
         "speed_rad_s": speed,
+        "inputs": inputs,
         "estimate": estimate,
         "bounds": {x: [0.0, math.inf] for x in estimate},
     }
     comments = [
         f"{made}, SI",
         "For fit, identify and simulate: what is known of the start stands in [equations.initial], where "
-        "v_x7 is the velocity of x7; forces of time in [equations.force]; measured ones in inputs.",
+        "v_x7 is the velocity of x7; forces of time in [equations.force]; measured ones: --force NODES.",
     ]
     return small_model_files(path, small, comments, {k: v for k, v in equations.items() if v})
 

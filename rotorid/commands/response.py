@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.json import cell
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, figures, listing
+from rotorid.base.text import counted, error_figures, figures, listing
+from rotorid.commands.moving import moving
 from rotorid.commands.quantities import (
     Band,
     Sensor,
@@ -24,7 +24,7 @@ from rotorid.commands.quantities import (
     rising_speeds,
     sensors,
 )
-from rotorid.report.options import file_of, rotor_source
+from rotorid.report.options import file_of
 from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -32,8 +32,11 @@ if TYPE_CHECKING:
 
     from fem import Peak, Peaks, Response, Rotor, SensorLike, Unbalance
     from rotorid.base.arrays import AnyArray, FloatArray
+    from rotorid.reduction import SmallModel
 
 STANDARD_GRAVITY = 9.80665  # m/s²
+_AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
+"""Relative distances from a critical speed of a small model at which its response is computed."""
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
 _KEYS = (
@@ -103,8 +106,10 @@ class Vibration:
             **errors,
             "orbits": self._orbits(),
             "largest": [
-                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
-                for name, (size, speed) in zip(self.labels, readings, strict=True)
+                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed} | std
+                for name, (size, speed), std in zip(
+                    self.labels, readings, self._std_of(readings), strict=True
+                )
             ],
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
@@ -159,13 +164,25 @@ class Vibration:
         """The largest reading of each sensor."""
         where = self._largest(self.finer.readings(self.sensors))
         sizes = [None if size is None else 1e6 * size for size, _ in where]
+        key = "amplitude_std_m"
+        stds = [1e6 * std[key] for std in self._std_of(where) if std]
         columns = (
             Column("sensor", self.labels),
             Column("largest reading, µm peak", sizes, figures, "largest.*.amplitude_m", 1e6),
+            *([Column("±", stds, error_figures, f"largest.*.{key}", 1e6)] if stds else []),
             Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), "largest.*.amplitude_m", 2e6),
             Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
         )
         return Table("largest readings", columns)
+
+    def _std_of(self, largest: Sequence[tuple[float | None, float | None]]) -> list[dict[str, float]]:
+        """Deviation of the largest amplitude of each sensor by its key in the document; empty if unknown."""
+        if self.std is None:
+            return [{}] * len(largest)
+        rows = [None if speed is None else self.finer.speeds.searchsorted(speed) for _, speed in largest]
+        return [
+            {} if row is None else {"amplitude_std_m": float(self.std[row, k])} for k, row in enumerate(rows)
+        ]
 
     def forces(self) -> tuple[Table, ...]:
         """The largest force on each support."""
@@ -312,7 +329,7 @@ def _peak_table(name: str, named: Sequence[tuple[str, Peak]], place: str = "") -
         return ()
     sensors, peaks = zip(*named, strict=True)
     columns = (
-        dataclasses.replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
+        replace(column, key=place and key and f"{place}.*.{key}", scale=scale)
         for column, key, scale in zip(
             fem.peak_columns(peaks, "µm", 1e6), _KEYS, (1, 1, 1e6, 1, 1, 1, 1), strict=True
         )
@@ -363,7 +380,9 @@ def _mid_span(rotor: Rotor) -> int:
 
 @command
 def response(
-    rotor: Rotor | Path | str, unbalance: Unbalance | Path | str, options: ResponseOptions
+    rotor: Rotor | SmallModel | Path | str,
+    unbalance: Unbalance | Path | str,
+    options: ResponseOptions,
 ) -> Outcome:
     """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
 
@@ -373,12 +392,13 @@ def response(
 
     Parameters
     ----------
-    rotor : ROTOR
-        Rotor table (.csv, .xlsx) or rotor file (.toml).
-    unbalance : FILE|api
+    rotor : MODEL
+        Rotor table (.csv, .xlsx), rotor file (.toml) or small model (.toml).
+    unbalance : FILE|api|own
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg. Or api: 4 W/N of API 617 (7th
         edition, 2002), 6350 g·mm·rpm/kg, at the mid span, W the load of the journals, N the highest operating
-        speed (or speed); api:2 doubles it; api@8,-16 puts it at planes, - at 180°, W of the next journal.
+        speed (or speed); api:2 doubles it; api@8,-16 puts it at planes, - at 180°, W of the next journal. Or
+        own: that in the file of a small model.
     options
         The speeds, and what differs from the defaults.
 
@@ -387,42 +407,39 @@ def response(
     ValueError
         For a rotor, an unbalance or an option that cannot be.
     """
-    import numpy as np
-
     import fem
-    from fem import as_sensor
-    from fem.parameters import band as error_band
     from rotorid.commands.operating_range import critical_peaks
     from rotorid.tables import read_unbalance
 
-    model, files = rotor_source(rotor)
-    operating = band(options.operating)
-    places = _places(model, options.sensors)
-    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
-    kept |= dict.fromkeys(support.node for support in model.supports)
+    source = moving(rotor)
+    model, files, operating = source.model, source.files, band(options.operating)
     speeds = rising_speeds(options.speeds)
     highest, asked, standard = operating[1] if operating else speeds[-1], {}, ""
     if isinstance(unbalance, str) and re.match("api(:|@|$)", unbalance):
+        if not isinstance(model, fem.Rotor):
+            raise ValueError(f"--unbalance {unbalance} follows from the journals of a rotor: give a table")
         asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
         unbalance = _api_unbalance(model, unbalance, speeds, highest)
         each = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
         standard += f"{listing(each, 'and')}, N = {rpm_text(highest)}."
+    elif unbalance == "own":
+        asked, unbalance = {"unbalance": unbalance}, getattr(model, "unbalance", {})
     elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
         table = file_of(unbalance, "unbalance by node or station,")
         files = (*files, table)
         unbalance = read_unbalance(table, model)
-    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
-
-    def amplitudes(other: Rotor) -> FloatArray:
-        new = other is not model
-        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
-        return np.abs(again.readings(places))
-
-    std, doubts = error_band(model, "the amplitudes", amplitudes)
-    finer = dataclasses.replace(finer, warnings=(*finer.warnings, *doubts))
+    if not unbalance:
+        raise ValueError(
+            "no unbalance is given: a table with --unbalance, or own of a small model that has it"
+        )
+    places = _places(model, options.sensors)
+    if isinstance(model, fem.Rotor):
+        coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
+    else:
+        by_node = {model.node(node): amount for node, amount in unbalance.items()}
+        coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
     result = Vibration(
-        response=dataclasses.replace(coarse, windows=finer.windows, warnings=finer.warnings),
+        response=replace(coarse, windows=finer.windows, warnings=finer.warnings),
         finer=finer,
         std=std,
         sensors=places,
@@ -453,24 +470,99 @@ def response(
     )
 
 
-def _mounted(rotor: Rotor, unbalance: Mapping[int, complex]) -> Table:
+_Answers = tuple["Response", "Response", "Sequence[Peaks]", "FloatArray | None"]
+"""At the speeds asked for; with speeds between them; peaks of each sensor; deviations of the amplitudes."""
+
+
+def _of_rotor(
+    model: Rotor,
+    unbalance: Unbalance,
+    speeds: Sequence[float],
+    places: Sequence[SensorLike],
+    operating: tuple[float, float] | None,
+) -> _Answers:
+    import numpy as np
+
+    import fem
+    from fem import as_sensor
+    from fem.parameters import band as error_band
+
+    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
+    kept |= dict.fromkeys(support.node for support in model.supports)
+    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
+    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+
+    def amplitudes(other: Rotor) -> FloatArray:
+        new = other is not model
+        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
+        return np.abs(again.readings(places))
+
+    std, doubts = error_band(model, "the amplitudes", amplitudes)
+    return coarse, replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
+
+
+def _of_small_model(
+    model: SmallModel,
+    unbalance: Mapping[int, complex],
+    speeds: Sequence[float],
+    places: Sequence[SensorLike],
+    operating: tuple[float, float] | None,
+) -> _Answers:
+    """The same: its critical speeds say where between the speeds asked for peaks may be."""
+    import numpy as np
+
+    import fem
+
+    coarse = model.response(speeds, unbalance)
+    near = np.multiply.outer(model.critical_speeds(speeds[0], speeds[-1]), 1 + np.array(_AROUND))
+    added = near[(near > speeds[0]) & (near < speeds[-1])]
+    finer, peaks = coarse, []
+    if np.count_nonzero(speeds) > 2:
+        finer = model.response(np.union1d(speeds, added), unbalance)
+        for place in places:
+            found = fem.response_peaks(finer, place, operating=operating).peaks
+            # of an undamped peak the half-power band is rounding
+            each = (replace(one, below=None, above=None) if one.undamped else one for one in found)
+            peaks.append(fem.Peaks(tuple(each), operating))
+        every = [peak for each in peaks for peak in each.peaks]
+        added = np.append(added, [peak.speed for peak in every])
+        # beside undamped peaks the amplitude has no limit and no meaning
+        undamped = np.array([peak.speed for peak in every if peak.undamped])
+        near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
+        finer = model.response(np.union1d(speeds, added[~near]), unbalance)
+        if undamped.size:
+            words = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
+            finer = replace(finer, warnings=(*finer.warnings, words))
+    return coarse, finer, peaks, None
+
+
+def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
+    from fem import Rotor
     from rotorid.base.rpm import phase_deg
 
-    each = sorted(unbalance.items())
-    names = [", ".join(name for name, at in rotor.stations.items() if at == node) for node, _ in each]
+    each, along = sorted(unbalance.items()), list[Column]()
+    names = [str(node) for node, _ in each]
+    if isinstance(rotor, Rotor):
+        stations = [[name for name, at in rotor.stations.items() if at == node] for node, _ in each]
+        names = [f"{node} {', '.join(known)}".strip() for node, known in zip(names, stations, strict=True)]
+        along = [Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format)]
     columns = (
-        Column("node", [f"{node} {name}".strip() for (node, _), name in zip(each, names, strict=True)]),
-        Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format),
+        Column("node", names),
+        *along,
         Column("unbalance, g·mm", [1e6 * abs(u) for _, u in each], "{:.6g}".format),
         Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in each], "{:.6g}".format),
     )
     return Table("what is mounted", columns)
 
 
-def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
+def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
     """Where to read the vibration."""
     if given is not None:
         return sensors(given)
+    from fem import Rotor
+
+    if not isinstance(rotor, Rotor):
+        return rotor.nodes
     held = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]

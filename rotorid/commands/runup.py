@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import ComplexArray, FloatArray
-    from rotorid.identify.modes_readings import Readings
-    from rotorid.identify.modes_result import FittedModes
-    from rotorid.identify.run_up import SweepModes
+    from rotorid.identify.modes_result import FittedModes, Readings
 
 TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]
@@ -104,7 +102,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     ValueError
         For a table or an option that cannot be.
     """
-    from rotorid.identify.run_up import fit_sweep
+    from rotorid.identify.modes import fit_sweep
 
     options = options or RunUpOptions()
     files: list[Path] = []
@@ -126,7 +124,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     except ValueError as error:
         why = str(error)
     turned = () if modes is None else _turned(sweeps[0], modes)
-    fit = None if modes is None or modes.fit.undetermined or turned else modes.fit
+    fit = None if modes is None or modes.undetermined or turned else modes
     roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
     passed = None
     if options.speeds is not None:
@@ -136,10 +134,10 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
         acceleration = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
     slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.covariances)
     steady = None if modes is None else modes.steady
-    why = why or next(iter(turned or (() if modes is None else modes.fit.undetermined)), "")
-    warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.fit.warnings)
+    why = why or next(iter(turned or (() if modes is None else modes.undetermined)), "")
+    warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.warnings)
     warnings = (*warnings, *roll.warnings)
-    estimate = None if modes is None else modes.fit.fit.estimate
+    estimate = None if modes is None else modes.fit.estimate
     document = {
         "run": sweeps[0].run,
         "phase": sweeps[0].labels.phase,
@@ -178,7 +176,7 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
-    from rotorid.tables.reader.problems import Problems
+    from rotorid.files.problems import Problems
     from rotorid.tables.runs.vectors_table import read_vectors
     from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
     from rotorid.tables.waveforms.waveforms import WaveformWishes
@@ -240,27 +238,27 @@ def _timed(sweep: Readings, rate: float | None) -> Readings:
     return replace(sweep.take(order), time=passed[order] - passed[order[0]])
 
 
-def _turned(sweep: Readings, modes: SweepModes) -> tuple[str, ...]:
+def _turned(sweep: Readings, modes: FittedModes) -> tuple[str, ...]:
     """That modes explain phases of the other sign: as they are, the damping is negative."""
-    _, zeta, _, error = (modes.steady or modes.fit).values
-    if modes.fit.explains or not (zeta + 2 * error < 0).all():
+    _, zeta, _, error = (modes.steady or modes).values
+    if modes.explains or not (zeta + 2 * error < 0).all():
         return ()
     sign = "lag" if sweep.labels.phase == "lead" else "lead"
     return (f"phases are read as {sweep.labels.phase}s; modes explain them as {sign}s (--phase {sign})",)
 
 
 def _slow_roll(
-    sweep: Readings, modes: SweepModes | None, given: str | float | Path, files: list[Path]
+    sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
 ) -> SlowRoll:
     """Run-out: of the fit, the mean at slow speeds, or of a file."""
-    from rotorid.identify.run_up import constant_vectors, slow_vectors
+    from rotorid.identify.modes import constant_vectors, slow_vectors
     from rotorid.tables.runs.vectors_table import read_slow_roll
 
     if isinstance(given, str) and given == "fit":
-        if modes is None or modes.fit.undetermined:
+        if modes is None or modes.undetermined:
             return SlowRoll(None, None, "unknown: there is no fit to tell it (--slow-roll SPEED does)")
         words = "of the fit: what no speed changes, modes far below the sweep included"
-        return SlowRoll(*constant_vectors(modes.fit), words)
+        return SlowRoll(*constant_vectors(modes), words)
     if isinstance(given, Path) or (isinstance(given, str) and Path(given).suffix.lower() in TABLES):
         file = file_of(given, "a runs table of one run at slow speed")
         files.append(file)
@@ -283,7 +281,7 @@ def _passed(
 
     import numpy as np
 
-    from rotorid.identify.run_up import fit_sweep, vectors_when_passing
+    from rotorid.identify.modes import fit_sweep, vectors_when_passing
     from rotorid.tables.runs.vectors_table import runs_columns
 
     speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))
@@ -292,7 +290,7 @@ def _passed(
         modes = None if k else fit
         if k:
             with suppress(ValueError):
-                other = fit_sweep(sweep, steady=steady).fit
+                other = fit_sweep(sweep, steady=steady)
                 modes = None if other.undetermined else other
         parts.append((sweep, speeds, *vectors_when_passing(sweep, speeds, modes)))
     columns = (Column(column.name, list(column.values)) for column in runs_columns(parts))
@@ -391,7 +389,7 @@ def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll)
     """Amplitude and phase over speed, less the slow roll."""
     import numpy as np
 
-    from rotorid.identify.plots_modes import bode_plot
+    from rotorid.identify.plots import bode_plot
 
     vectors = np.zeros(len(sweeps[0].sensors), dtype=complex) if roll.vectors is None else roll.vectors
     return bode_plot(sweeps, vectors, fit)

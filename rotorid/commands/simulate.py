@@ -39,7 +39,7 @@ BESIDE = 7
 _NOISE = {"amplitude_error", "phase_error", "sigma"}
 _WAYS = {
     "frequencies": {"inputs", "amplitude_error", "phase_error"},
-    "modes": {"inputs"},
+    "modes": {"inputs", "round"},
     "times": {"sigma"},
     "input_record": {"sigma"},
 }
@@ -61,6 +61,9 @@ class SimulateOptions:
         0; and what the equations multiply by, Omega=100.
     modes
         All natural frequencies and shapes, without damping.
+    round : z:N
+        Round z = ω² to so many significant digits first, as lessons 7 and 8 do: z:2; shapes follow from it by
+        all equations but the first.
     times : TIMES
         A record at FIRST:LAST:STEP or a list, seconds.
     input_record : RECORD
@@ -82,6 +85,7 @@ class SimulateOptions:
     frequencies: Speeds | None = None
     inputs: str | Mapping[str, complex] | None = None
     modes: bool = False
+    round: str | None = None
     times: Times | None = None
     input_record: Path | str | None = None
     digits: int | None = None
@@ -127,7 +131,7 @@ def simulate(
     way, *more = [name for name in _WAYS if getattr(options, name)] or [""]
     if more or not way:
         raise ValueError(f"one of {listing(map(option_name, _WAYS))} is needed: what to simulate")
-    refuse(options, {"inputs", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
+    refuse(options, {"inputs", "round", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
     noisy = any(getattr(options, name) is not None for name in _NOISE)
     if not noisy:
         refuse(options, {"seed"}, "belongs to --amplitude-error, --phase-error and --sigma")
@@ -177,7 +181,7 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     check_names(given, "--inputs", [*excited, *equations.varying], "input", needed=equations.varying)
     errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error) if noisy else None
     if options.modes:
-        exact = free_vibration(equations, theta, given)
+        exact, polynomial = free_vibration(equations, theta, given, _digits_of_z(options.round))
     else:
         frequencies = speeds(options.frequencies or "", what="--frequencies")
         exact = forced_vibration(equations, theta, frequencies, given)
@@ -187,7 +191,22 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     about = f"natural modes, {where}" if options.modes else f"amplitudes {listing(read, 'and')} at {where}"
     unused = "the errors that the model states are not drawn: --amplitude-error or --phase-error does"
     notes = (unused,) if file.errors and not noisy and not options.modes else ()
+    if options.modes:
+        powers = [f"z**{k}" if k > 1 else "z" * k for k in reversed(range(len(polynomial)))]
+        terms = (f"{x:+.6g}*{z}".removesuffix("*") for x, z in zip(polynomial, powers, strict=True))
+        written = " ".join(terms).removeprefix("+1*").replace(" -", " - ").replace(" +", " + ")
+        notes = (f"frequency polynomial of z = ω²: {written} = 0",)
     return values, measurement_columns(table, [*filter(given.get, excited), *read]), about, notes
+
+
+def _digits_of_z(given: str | None) -> int | None:
+    """Read "z:2"."""
+    if given is None:
+        return None
+    what, _, digits = given.partition(":")
+    if what != "z" or not digits.isdecimal() or not 1 <= int(digits) <= 15:
+        raise ValueError(f"--round takes z and a number of digits from 1 to 15, z:2, not {given!r}")
+    return int(digits)
 
 
 def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:

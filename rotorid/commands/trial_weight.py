@@ -14,9 +14,9 @@ from rotorid.base.words import Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import mass, quantity, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
+from rotorid.files.units import FORCE
 from rotorid.report.options import job_source, refuse
 from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance, table_of
-from rotorid.tables.reader.units import FORCE
 
 if TYPE_CHECKING:
     from balancing import Lag, TrialWeight

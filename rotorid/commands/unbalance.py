@@ -13,6 +13,10 @@ from rotorid.report.options import job_source
 from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing import Unbalance
+    from fem import Rotor
     from rotorid.tables import Job
 
 
@@ -28,6 +32,43 @@ class UnbalanceOptions:
 
     stations: Nodes
     to: ClassVar[Sequence[str]] = USUAL
+
+
+def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
+    """The vectors of all stations with their regions, and below them the rotor with the stations.
+
+    Parameters
+    ----------
+    unbalance
+        At stations that are named as nodes or stations of the rotor.
+    rotor
+        The rotor.
+    """
+    from matplotlib.patches import ConnectionPatch
+
+    from balancing.plots import draw_unbalance
+    from fem import draw_rotor
+    from rotorid.base.plot_style import DARK, legend_below, new_figure
+
+    many = len(unbalance.stations)
+    tall = min(7.0 / many, 3.0) + (1.4 if many > 8 else 0.0)  # of many the names stand upright
+    figure = new_figure(tall + 4.0)
+    above, below = figure.subplots(2, height_ratios=(tall + 1.0, 2.6))
+    draw_unbalance(unbalance, above)
+    draw_rotor(rotor, below)
+    if legend := below.get_legend():
+        legend.remove()
+        legend_below(figure, (below,), 3)
+    above.xaxis.tick_top()
+    above.xaxis.set_label_position("top")
+    bottom, top = above.get_ylim()[0], below.get_ylim()[1]
+    for place, name in zip(above.get_xticks(), unbalance.stations, strict=True):
+        at = rotor.positions[rotor.node(name) - 1]
+        line = ConnectionPatch((place, bottom), (at, top), "data", "data", axesA=above, axesB=below)
+        line.set(color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+        figure.add_artist(line)
+        below.vlines(at, below.get_ylim()[0] / 2, top, color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+    return figure
 
 
 @command
@@ -51,17 +92,16 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Outcome:
         For a job without a rotor, and an option that cannot be.
     """
     from balancing import unbalance_of_run
-    from rotorid.base.plot_style import on_figure
-    from rotorid.plots import plot
 
     read = job_source(job)
-    if read.rotor is None:
+    rotor = read.rotor
+    if rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
     asked = nodes(options.stations, "--stations")
-    places = {str(node): read.rotor.node(node) for node in asked}
+    places = {str(node): rotor.node(node) for node in asked}
     if len(set(places.values())) < len(asked):
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
     influence = computed(read, 0.0, places)
     result = unbalance_of_run(influence, read.trials)
-    pictures = {"Unbalance along the rotor.": lambda: on_figure(lambda ax: plot(result, ax))}
+    pictures = {"Unbalance along the rotor.": lambda: unbalance_figure(result, rotor)}
     return outcome_of(result, provenance(read.files, options), pictures=pictures, title="Unbalance")

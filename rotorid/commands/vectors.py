@@ -85,7 +85,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     """
     from rotorid.tables.waveforms.vectors_of_records import find_each, vectors_columns
     from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
-    from rotorid.waveforms.plots import figure_of
+    from rotorid.waveforms.plots import figure_tacho
 
     options = options or VectorsOptions()
     given = WaveformWishes(
@@ -102,7 +102,9 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     each = find_each(waveforms)
     columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
-    many = len(each) > 1
+    many, first = len(each) > 1, waveforms.records[0]
+    signal = first.tacho
+    assert signal is not None  # find_each refuses records without one
     words = [f"run {one.run!r}: {word}" if many else word for one in each for word in one.warnings]
     if waveforms.unstated:
         words.append("nothing states whether phases lead or lag: lead is written (--phase)")
@@ -140,7 +142,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         tables=(_table(columns, printed=True),),
         file=_table(columns),
         keys=dict(plain(document)),
-        pictures={"The first record.": lambda: figure_of("tacho", waveforms.records[0], each[0])},
+        pictures={"The tacho of the first record.": lambda: figure_tacho(signal, first.rate, tachos[0])},
         warnings=tuple(words),
         title="Vectors",
         provenance=provenance(waveforms.files, options),
@@ -173,6 +175,6 @@ def _course(one: Vectors) -> str:
     """How the speed of a record runs, and over how many turns its vectors are means."""
     low, high = one.range * RPM
     if one.steady:
-        return f"{one.run}: {(low + high) / 2:.1f} rpm, {one.turns[0]:.0f} turns"
+        return f"{one.run}: {one.speeds[0] * RPM:.1f} rpm, {one.turns[0]:.0f} turns"
     turns = f"{one.turns.min():.0f} to {one.turns.max():.0f} turns"
     return f"{one.run}: {low:.0f} to {high:.0f} rpm, {counted(len(one.times), 'instant')} of {turns}"

@@ -84,7 +84,7 @@ class FleetAdded(Answered):
     @property
     def answer(self) -> Answer:
         """The numbers, then each file that cannot be read."""
-        from rotorid.tables.reader.problems import printable
+        from rotorid.files.problems import printable
 
         new = f"{counted(self.jobs, 'job')} with {counted(self.vectors, 'vector')}"
         head = f"Added {new} to {self.store.folder}; {counted(self.known, 'job')} known already."
@@ -182,9 +182,9 @@ def read_jobs(found: Sequence[FoundJob], workers: int) -> Iterator[JobRows | str
 
 
 def _read(found: FoundJob) -> JobRows | str:
+    from rotorid.files.input_file import each_file_once
     from rotorid.tables import read_job
     from rotorid.tables.fleet.job_search import reason_of
-    from rotorid.tables.reader.input_file import each_file_once
 
     try:
         with each_file_once(), warnings.catch_warnings(record=True) as caught:
@@ -197,10 +197,10 @@ def _read(found: FoundJob) -> JobRows | str:
 def _rows(found: FoundJob, job: Job, caught: Sequence[warnings.WarningMessage]) -> JobRows:
     """Rows of a job with its coefficients, and what `correct` proposes where that was mounted."""
     from balancing import estimate_influence
+    from rotorid.files.input_file import sha256
     from rotorid.fleet.job_records import job_rows, kind_of
     from rotorid.fleet.proposals import pieces_mounted, proposed
     from rotorid.tables.fleet.job_search import job_id
-    from rotorid.tables.reader.input_file import sha256
 
     influence, trials, check, labels = job.influence, job.trials, job.check, job.trials.labels
     before = mounted = None

@@ -46,7 +46,7 @@ def pieces_mounted(
     """
     from balancing import mount
 
-    if job.check_mounted or not set(correction.planes) & set(job.holes):
+    if job.check_mounted or job.check_of_weights or not set(correction.planes) & set(job.holes):
         return None
     with suppress(ValueError):  # no pieces can be proposed: the weights were
         return mount(correction, influence, runs, job.holes)

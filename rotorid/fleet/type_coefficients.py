@@ -11,10 +11,10 @@ import numpy as np
 
 from balancing import Influence, Trials, with_check_runs
 from rotorid.base.text import counted
+from rotorid.files.input_file import sha256
 from rotorid.fleet.machine_type import MachineRecord
 from rotorid.fleet.posterior import update
 from rotorid.fleet.type_records import Grid, KnownType, known_type
-from rotorid.tables.reader.input_file import sha256
 
 if TYPE_CHECKING:
     from balancing import Correction

@@ -12,9 +12,9 @@ import numpy as np
 from balancing import Labels, UndeterminedError
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
+from rotorid.files.conventions import DEFAULT_TOLERANCE
+from rotorid.files.units import vibration, weight
 from rotorid.fleet.machine_type import MachineRecord, MachineType, fit_type
-from rotorid.tables.reader.units import vibration, weight
-from rotorid.tables.runs.stated_conventions import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,16 +1,18 @@
 """Integration with error control, in a bounded number of steps: scipy's, and Taylor series by heyoka.
 
 Absolute tolerances follow the size that each state and sensitivity has had so far. heyoka belongs to the
-extra `rotorid[fast]`; a model is compiled once, which takes a second or two. Source: Biscani and Izzo,
+extra `rotorid[fast]`; a model is compiled once, which takes up to a second. Source: Biscani and Izzo,
 "Revisiting high-order Taylor methods for astrodynamics and celestial mechanics", MNRAS 504 (2021) 2614.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import lru_cache
 from importlib.util import find_spec
+from itertools import pairwise
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -20,20 +22,14 @@ from rotorid.identify.ode import OdeModel, SimulationError
 
 LARGEST = 1e100
 """States beyond this size (in the units of the model) have diverged."""
-MAX_STEPS = {"dop853": 10_000, "lsoda": 30_000}
-"""Steps between the first and the last time (more samples than a tenth of this allow ten each)."""
-TRIAL_STEPS = 3_000
-"""Steps of dop853 after which "auto" takes a model for stiff (more samples allow four each)."""
-SMALL = 0.1
-"""Absolute tolerance of a state, as a share of rtol times its size."""
-LEVEL = {"dop853": 1e-5, "lsoda": 1e-3}
-"""Smallest size that counts, relative to the largest; lsoda cannot change its tolerances on the way."""
-TAYLOR_TOLERANCE, TAYLOR_STEPS = 1e-12, 20_000
-_COMPILED: WeakKeyDictionary[OdeModel, _Taylor] = WeakKeyDictionary()
-
-
-class TooManySteps(SimulationError):
-    """The steps that are allowed do not reach the last time."""
+STEPS = {
+    "auto": (("dop853", 3_000, 4), ("lsoda", 30_000, 10)),
+    "dop853": (("dop853", 10_000, 10),),
+    "lsoda": (("lsoda", 30_000, 10),),
+}
+"""What is tried, with so many steps at most, or so many for each sample; then a model is stiff for dop853."""
+LEVEL = 1e-4
+"""Smallest size that counts, relative to the largest."""
 
 
 def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, str]:
@@ -55,18 +51,20 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
     """
     if not 1e-14 < rtol < 1:
         raise ValueError(f"rtol must be between 1e-14 and 1, not {rtol:g}")
-    samples = len(system.t)
     if integrator == "taylor":
-        table = _compiled(system.model)(system)
+        table = taylor(system.model)(system)
         if table is not None:
             return table, "taylor"
         integrator = "dop853"  # says why
-    if integrator == "auto":
-        try:
-            return _solve(system, "dop853", rtol, max(TRIAL_STEPS, 4 * samples)), "dop853"
-        except TooManySteps:
-            integrator = "lsoda"
-    return _solve(system, integrator, rtol, max(MAX_STEPS[integrator], 10 * samples)), integrator
+    t, name, reached = system.t, "", 0.0
+    for name, most, each in STEPS[integrator]:
+        table, reached = _solve(system, name, rtol, max(most, each * len(t)))
+        if reached == t[-1]:
+            return table, name
+    raise SimulationError(
+        f"{name} needs too many steps: it has come to t = {reached:.6g} only, of {t[-1]:.6g} s. Are the "
+        "times in seconds, and not in ms? Choose other parameters or bounds, or lsoda (stiff models)"
+    )
 
 
 def worth_compiling(model: OdeModel, steps: int) -> bool:
@@ -78,15 +76,10 @@ def worth_compiling(model: OdeModel, steps: int) -> bool:
     if not 0 < size**2 <= steps or find_spec("heyoka") is None:
         return False
     try:
-        return _compiled(model) is not None
+        taylor(model)
     except ValueError:
         return False
-
-
-def _compiled(model: OdeModel) -> _Taylor:
-    if model not in _COMPILED:
-        _COMPILED[model] = _Taylor(model)
-    return _COMPILED[model]
+    return True
 
 
 def diverged(model: OdeModel, time: float, state: int, value: str) -> SimulationError:
@@ -97,58 +90,43 @@ def diverged(model: OdeModel, time: float, state: int, value: str) -> Simulation
     )
 
 
-def _solve(system: System, name: str, rtol: float, budget: int) -> FloatArray:
+def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArray, float]:
+    """By scipy's "dop853" or "lsoda", and the time that it comes to in so many steps at most."""
     from scipy.integrate import DOP853, LSODA
 
-    t, z = system.t, system.first
-    table = np.empty((len(t), len(z)))
-    table[0] = z
+    t, sizes, last = system.t, first_sizes(system), 0.0
+    table = np.full((len(t), len(sizes)), np.nan)
+    table[0] = system.first
+    options: dict[str, Any] = {"rtol": rtol, "max_step": _longest_step(system)}
+    solver_type: Any = LSODA if name == "lsoda" else DOP853
     # inputs have corners at the samples: no step may cross one
-    ends = range(1, len(t)) if system.model.driven else range(len(t) - 1, len(t)) if len(t) > 1 else ()
-    longest, begin, last = _longest_step(system), 0, None
-    scale = first_sizes(system)
+    corners = range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
-        for end in ends:
-            span = float(t[end] - t[begin])
-            first = None if last is None else min(last, span)
-            limits: dict[str, Any] = {"rtol": rtol, "first_step": first, "max_step": longest}
-            limits["atol"] = _tolerances(system, scale, rtol, name)
-            problem, row, last = (float(t[begin]), table[begin], float(t[end])), begin + 1, 0.0
-            solver: Any
-            if name == "lsoda":
-                solver = LSODA(system, *problem, **limits, jac=system.jacobian)
-            else:
-                solver = DOP853(system, *problem, **limits)
-                if not np.isfinite(solver.h_abs):  # of rates that are not finite; it would be tried for ever
-                    solver.h_abs = 1e-6 * span
+        for begin, end in pairwise(corners):
+            first = min(last, float(t[end] - t[begin])) or None
+            limits, row, last = _tolerances(system, sizes, rtol), begin + 1, 0.0
+            solver = solver_type(
+                system, float(t[begin]), table[begin], float(t[end]), first_step=first, atol=limits, **options
+            )
+            if not np.isfinite(getattr(solver, "h_abs", 0.0)):  # of rates that are not finite
+                solver.h_abs = 1e-6 * (t[end] - t[begin])
             while row <= end:
-                if (budget := budget - 1) < 0:
-                    raise TooManySteps(_too_many(name, float(solver.t), float(t[-1])))
+                if not most:
+                    return table, solver.t
+                most, system.steps = most - 1, system.steps + 1
                 solver.step()
-                system.steps += 1
                 _check(system, solver)
-                last = max(last, float(solver.step_size))
-                running = solver.status == "running"
-                upto = min(int(np.searchsorted(t, solver.t, side="right")), end + 1) if running else end + 1
-                if upto > row + 1 or (upto > row and t[row] != solver.t):
+                last = max(last, solver.step_size)
+                done = solver.status == "finished"
+                upto = end + 1 if done else int(np.searchsorted(t[: end + 1], solver.t, side="right"))
+                if upto > row:
                     table[row:upto] = solver.dense_output()(t[row:upto]).T
-                if upto > row and (not running or t[upto - 1] == solver.t):
-                    table[upto - 1] = solver.y
-                row = upto
-                np.maximum(scale, np.abs(solver.y), out=scale)
-                if name == "dop853":
-                    solver.atol = _tolerances(system, scale, rtol, name)
-            begin = end
-    return table
-
-
-def _too_many(name: str, reached: float, last: float) -> str:
-    stiff = ", or lsoda (stiff models)" if name == "dop853" else ""
-    return (
-        f"{name} needs too many steps: it has come to t = {reached:.6g} only, of {last:.6g} s. Are the times "
-        f"in seconds, and not in ms? Choose other parameters or bounds{stiff}"
-    )
+                row, now = upto, np.abs(solver.y)
+                if (now > sizes).any():
+                    sizes = np.maximum(now, sizes)
+                    solver.atol = _tolerances(system, sizes, rtol)
+    return table, float(t[-1])
 
 
 def _longest_step(system: System) -> float:
@@ -170,100 +148,90 @@ def first_sizes(system: System) -> FloatArray:
     return np.asarray(np.abs(z) + step * np.where(np.isfinite(rates), rates, 0.0))
 
 
-def _tolerances(system: System, scale: FloatArray, rtol: float, name: str) -> FloatArray:
-    """Absolute tolerances (size,), after the sizes of states and sensitivities."""
-    n, level = system.nx, LEVEL[name]
-    x, s = scale[:n], scale[n:].reshape(n, system.np)
+def _tolerances(system: System, sizes: FloatArray, rtol: float) -> FloatArray:
+    """Absolute tolerances (size,): a tenth of rtol times the sizes of states and sensitivities."""
+    x, s = sizes[: system.nx], sizes[system.nx :].reshape(system.nx, system.np)
     most = float(x.max()) or 1.0  # all zero: at rest
     theta = np.abs(system.theta[: system.np])
-    least = np.maximum(level * s.max(axis=0, initial=0.0), 1e-6 * most / np.where(theta > 0, theta, 1.0))
-    sizes = np.concatenate([np.maximum(x, level * most), np.maximum(s, least).reshape(-1)])
-    return np.asarray(np.maximum(SMALL * rtol * sizes, 1e-300))
+    least = np.maximum(LEVEL * s.max(axis=0, initial=0.0), 1e-6 * most / np.where(theta > 0, theta, 1.0))
+    floors = np.concatenate([np.full(len(x), LEVEL * most), np.tile(least, len(x))])
+    return np.asarray(np.maximum(0.1 * rtol * np.maximum(sizes, floors), 1e-300))
 
 
 def _check(system: System, solver: Any) -> None:  # noqa: ANN401  scipy has no types
     """Refuse a step that failed or left all bounds."""
-    y, n = np.asarray(solver.y), system.nx
+    y, n, more = np.asarray(solver.y), system.nx, ""
     size = np.abs(y[:n])
     lost = ~(size < LARGEST)
-    if not lost.any() and solver.status != "failed" and np.isfinite(y).all():
-        return
-    time, state, more = float(solver.t), int(np.argmax(lost)), ""
-    if not lost.any():  # steps have become too small: the state that changes fastest for its size
-        rates = np.abs(system(time, y)[:n]) / np.maximum(size, 1e-300)
-        state, more = int(np.argmax(np.where(np.isfinite(rates), rates, np.inf))), " and no step leads on"
-    raise diverged(system.model, time, state, f"{y[state]:.3g}{more}")
+    if not lost.any():
+        if solver.status != "failed" and np.isfinite(y).all():
+            return
+        # steps have become too small: the state that changes fastest for its size
+        rates = np.abs(system(solver.t, y)[:n]) / np.maximum(size, 1e-300)
+        lost, more = np.where(np.isfinite(rates), rates, np.inf), " and no step leads on"
+    state = int(np.argmax(lost))
+    raise diverged(system.model, solver.t, state, f"{y[state]:.3g}{more}")
 
 
-class _Taylor:
-    """A compiled model: states over their sizes, derivatives by parameters over theirs.
+@lru_cache(maxsize=8)
+def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
+    """A compiled model: it gives states and sensitivities (n, size), or None without a finite solution.
 
-    Sizes are parameters of the code, so that it does not depend on what was solved before.
+    States are divided by their sizes, derivatives by parameters by theirs. Sizes are parameters of the code,
+    so that it does not depend on what was solved before.
     """
+    try:
+        import heyoka as hy
+    except ImportError as error:
+        raise ValueError("the integrator taylor needs the extra: pip install rotorid[fast]") from error
+    import sympy
 
-    def __init__(self, model: OdeModel) -> None:
-        try:
-            import heyoka as hy
-        except ImportError as error:
-            raise ValueError("the integrator taylor needs the extra: pip install rotorid[fast]") from error
-        import sympy
+    n, k, nu = len(model.states), len(model.parameters), len(model.inputs)
+    par = [hy.par[i] for i in range(2 * k + 2 * nu + n)]
+    sizes, states = par[2 * k + 2 * nu :], [hy.expression(f"z{i}") for i in range(n)]
+    quantities = [hy.time, *(size * z for size, z in zip(sizes, states, strict=True))]
+    quantities += [par[k + i] * par[i] for i in range(k)]
+    quantities += [par[2 * k + i] + par[2 * k + nu + i] * hy.time for i in range(nu)]  # straight lines
+    put = dict(zip(model.symbols, quantities, strict=True))
+    try:
+        if model.inertia:
+            raise ValueError("a mass matrix is solved numerically")
+        rates = []
+        for z, size, rate in zip(states, sizes, model.rates, strict=True):
+            numbers = {r: sympy.Float(float(r)) for r in rate.atoms(sympy.Rational) if not r.is_Integer}
+            rates.append((z, hy.from_sympy(rate.xreplace(numbers), put) / size))
+        # parameters may stand in initial values and outputs only; heyoka counts up to the last it sees
+        rates[0] = (rates[0][0], rates[0][1] + 1e-300 * par[-1])
+        solver = hy.taylor_adaptive(
+            hy.var_ode_sys(rates, par[:k], order=1),
+            [0.0] * n,
+            pars=[0.0] * len(par),
+            tol=1e-12,
+            compact_mode=n * (1 + k) > 40,  # smaller code, quicker to compile
+            opt_level=1,
+        )
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ValueError(f"the integrator taylor cannot compile this model ({error}); use auto") from error
 
-        n, k, nu = len(model.states), len(model.parameters), len(model.inputs)
-        self.n, self.done = n, hy.taylor_outcome.time_limit
-        par = [hy.par[i] for i in range(2 * k + 2 * nu + n)]
-        sizes = par[2 * k + 2 * nu :]
-        put: dict[Any, Any] = {sympy.Symbol("t"): hy.time}
-        for i, name in enumerate(model.states):
-            put[sympy.Symbol(name)] = sizes[i] * hy.expression(f"z{i}")
-        for i, name in enumerate(model.parameters):
-            put[sympy.Symbol(name)] = par[k + i] * par[i]
-        for i, name in enumerate(model.inputs):  # straight lines
-            put[sympy.Symbol(name)] = par[2 * k + i] + par[2 * k + nu + i] * hy.time
-        try:
-            if model.inertia:
-                raise ValueError("a mass matrix is solved numerically")
-            rates = []
-            for i, rate in enumerate(model.rates):
-                numbers = {r: sympy.Float(float(r)) for r in rate.atoms(sympy.Rational) if not r.is_Integer}
-                whole = hy.from_sympy(rate.xreplace(numbers), put)
-                rates.append((hy.expression(f"z{i}"), whole / sizes[i]))
-            # parameters may stand in initial values and outputs only; heyoka counts up to the last it sees
-            rates[0] = (rates[0][0], rates[0][1] + 1e-300 * par[-1])
-            self.solver = hy.taylor_adaptive(
-                hy.var_ode_sys(rates, par[:k], order=1),
-                [0.0] * n,
-                pars=[0.0] * len(par),
-                tol=TAYLOR_TOLERANCE,
-                compact_mode=n * (1 + k) > 40,  # smaller code, quicker to compile
-                opt_level=1,
-            )
-        except (TypeError, ValueError, RuntimeError) as error:
-            raise ValueError(
-                f"the integrator taylor cannot compile this model ({error}); use auto"
-            ) from error
-
-    def __call__(self, system: System) -> FloatArray | None:
-        """States and sensitivities (n, size); None without a finite solution."""
-        solver, t, n, theta = self.solver, system.t, self.n, system.theta
-        whole = system if system.np else System(system.model, theta, t, system.u, True)
-        x = first_sizes(whole)[:n]
-        x, p = np.where(x > 0, x, 1.0), np.where(theta == 0, 1.0, np.abs(theta))
+    def solve(system: System) -> FloatArray | None:
+        t, u, theta = system.t, system.u, system.theta
+        whole = system if system.np else System(model, theta, t, u, True)
+        x, p = first_sizes(whole)[:n], np.abs(theta)
+        x, p = np.where(x > 0, x, 1.0), np.where(p > 0, p, 1.0)
         scale = np.concatenate([x, (x[:, None] / p).ravel()])
-        k, nu = len(p), system.u.shape[1]
-        solver.time = t[0]
-        solver.state[:] = whole.first / scale
+        table = np.full((len(t), len(scale)), np.nan)
+        solver.time, solver.state[:] = t[0], whole.first / scale
         solver.pars[:] = np.concatenate([theta / p, p, np.zeros(2 * nu), x])
-        options = {"max_steps": TAYLOR_STEPS, "max_delta_t": _longest_step(system)}
-        if not system.model.driven:
-            outcome, *_, table = solver.propagate_grid(t, **options)
+        options = {"max_steps": 20_000, "max_delta_t": _longest_step(system)}
+        if not model.driven:
+            table = solver.propagate_grid(t, **options)[-1]
         else:
-            table, outcome = np.full((len(t), len(scale)), np.nan), self.done
             table[0] = solver.state
-            for i, slope in enumerate(np.diff(system.u, axis=0) / np.diff(t)[:, None]):
-                solver.pars[2 * k : 2 * (k + nu)] = np.concatenate([system.u[i] - slope * t[i], slope])
-                outcome = solver.propagate_until(t[i + 1], **options)[0]
-                if outcome != self.done:
-                    break
-                table[i + 1] = solver.state
-        usable = outcome == self.done and np.isfinite(table).all()
+            for i, slope in enumerate(np.diff(u, axis=0) / np.diff(t)[:, None]):
+                solver.pars[2 * k : 2 * (k + nu)] = np.concatenate([u[i] - slope * t[i], slope])
+                solver.propagate_until(t[i + 1], **options)
+                table[i + 1] = solver.state if solver.time == t[i + 1] else np.nan
+        usable = len(table) == len(t) and np.isfinite(table).all()
         return np.asarray(table * scale)[:, : len(system.first)] if usable else None
+
+    return solve

@@ -1,21 +1,39 @@
-"""Measured amplitudes: what was excited, what was read, and how well."""
+"""Measured amplitudes, what was excited, what was read, and how well; what a model leaves of them.
+
+Residuals are the stretched differences of amplitudes, along and across each amplitude, over their errors:
+stated, or relative to the amplitude. Of a free vibration the predicted mode most like the measured shape is
+compared: its frequency, and its amplitudes relative to the first measured one. The frequency counts with its
+error, or else with that of this amplitude.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import Shown
-
-if TYPE_CHECKING:
-    from rotorid.identify.operator_model import HarmonicModel
+from rotorid.identify.operator_model import (
+    HarmonicModel,
+    mode_slopes,
+    natural_modes,
+    nearest_mode,
+    reference_amplitude,
+)
 
 RAD_PER_S = Shown("frequency, rad/s")
+THIN = 0.01
+"""An error ellipse is at least this share as thin as long: no direction of a reading is exact."""
+SMALL = 1e-3
+"""An amplitude counts as at least this share of its signal's median when errors are relative to it."""
+ROUNDING = 1e-9
+"""Share of an amplitude below which its imaginary part is rounding."""
+TRUSTED = 3.0
+"""A predicted amplitude farther than this factor from the measured one does not set the weight."""
 
 
 @dataclass(frozen=True)
@@ -44,28 +62,66 @@ class AmplitudeErrors:
             raise ValueError("state at least one error of the amplitudes greater than zero, or none at all")
 
     def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
-        """Covariance of real and imaginary part, shape (n, 2, 2), for amplitudes (n,).
+        """Covariance of real and imaginary part, shape (…, 2, 2), for amplitudes (…).
 
         The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
         Where `real` (free vibration) there is no imaginary part and its variance is zero.
         """
-        *variances, turn = self._axes(amplitudes)
-        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
-        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack(variances, -1), e)
-        covariance[np.broadcast_to(real, turn.shape)] *= np.diag([1.0, 0.0])
+        turn = real_matrices(np.exp(1j * np.angle(amplitudes)))
+        shares = np.multiply.outer(np.abs(amplitudes) ** 2, (self.relative**2, self.phase**2))
+        covariance = turn * (shares + self.floor**2)[..., None, :] @ np.swapaxes(turn, -1, -2)
+        covariance[np.broadcast_to(real, np.shape(amplitudes))] *= np.diag([1.0, 0.0])
         return np.asarray(covariance)
 
     def drawn(self, amplitudes: ComplexArray, rng: np.random.Generator) -> ComplexArray:
         """Readings (n,) of amplitudes (n,): normal errors along and across each, of that covariance."""
-        *variances, turn = self._axes(amplitudes)
-        along, across = rng.standard_normal((2, len(turn))) * np.sqrt(variances)
-        return np.asarray(amplitudes + turn * (along + 1j * across))
+        size = np.abs(amplitudes)
+        along, across = np.hypot(np.outer((self.relative, self.phase), size), self.floor)
+        along, across = rng.standard_normal((2, len(size))) * (along, across)
+        return np.asarray(amplitudes + np.exp(1j * np.angle(amplitudes)) * (along + 1j * across))
 
-    def _axes(self, amplitudes: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
-        """Variances along and across each amplitude, and its direction, (n,) each."""
-        z = np.asarray(amplitudes, dtype=complex)
-        along, across = ((share * np.abs(z)) ** 2 + self.floor**2 for share in (self.relative, self.phase))
-        return along, across, np.exp(1j * np.angle(z))
+
+def real_matrices(z: ComplexArray) -> FloatArray:
+    """How complex factors (…) act on real and imaginary parts, (…, 2, 2)."""
+    return np.stack((np.stack((z.real, -z.imag), -1), np.stack((z.imag, z.real), -1)), -2)
+
+
+def inverse_roots(
+    amplitudes: ComplexArray, errors: AmplitudeErrors | None, covariances: FloatArray | None = None
+) -> FloatArray:
+    """Inverse roots of covariances of amplitudes (n, C), shape (n, C, 2, 2), rows along and across each.
+
+    The covariances are given or those of errors, which are None where only relative sizes count.
+
+    Raises
+    ------
+    ValueError
+        For an error of zero.
+    """
+    size = np.abs(amplitudes)
+    floor = SMALL * np.array(
+        [np.median(one[~np.isnan(one)]) if np.nansum(one) else 1 / SMALL for one in size.T]
+    )
+    z = np.asarray(np.where(size >= floor, amplitudes, floor), dtype=complex)
+    if covariances is None:
+        covariances = (errors or AmplitudeErrors(1.0, 1.0)).covariance(z)
+    turn = real_matrices(z.conj() / np.abs(z))
+    turned = turn @ np.nan_to_num(covariances, nan=1.0) @ np.swapaxes(turn, -1, -2)
+    low, high = np.moveaxis(np.linalg.eigvalsh(turned), -1, 0)
+    if (high <= 0).any():
+        raise ValueError(
+            "an error of zero is stated for a measured amplitude: repeat the reading or state one"
+        )
+    thin = THIN**2 * (np.sqrt(low.clip(0) / high) < THIN) * (low + high)
+    turned = turned + thin[..., None, None] * np.eye(2)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(turned)) @ turn)
+
+
+def trusted(predicted: ComplexArray, measured: ComplexArray) -> ComplexArray:
+    """Predicted amplitudes (n, C), where these are near the measured ones, else those: errors are of them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.abs(np.log(np.abs(predicted) / np.abs(measured)))
+    return np.where(far < np.log(TRUSTED), predicted, measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,23 +166,17 @@ class Experiments:
     rounding: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n, w = len(self.names), np.asarray(self.frequencies)
+        n = len(self.names)
         if not n:
             raise ValueError("there are no experiments")
-        if w.shape != (n,) or np.shape(self.free) != (n,):
-            raise ValueError(f"{n} experiments need {n} frequencies and marks of free vibration")
-        if not np.isfinite(w).all() or (w < 0).any():
-            raise ValueError(f"frequencies must be finite and not negative; got {w.tolist()}")
-        for name, values in self.signals.items():
-            if np.shape(values) != (n,):
-                raise ValueError(f"{n} experiments need {n} amplitudes {name}; got shape {np.shape(values)}")
-            if np.isinf(values).any():
-                raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured)")
-        for name, covariance in self.covariances.items():
-            if np.shape(covariance) != (n, 2, 2):
-                raise ValueError(f"the covariance of {name} must have shape ({n}, 2, 2)")
-            if name not in self.signals:
-                raise ValueError(f"a covariance is given for {name}, but no amplitudes")
+        tables: dict[str, AnyArray] = {"frequencies": self.frequencies, "marks of free vibration": self.free}
+        tables |= {f"amplitudes {name}": values for name, values in self.signals.items()}
+        tables |= {f"covariances of {name}": values for name, values in self.covariances.items()}
+        for what, values in tables.items():
+            if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
+                raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
+        if not (np.asarray(self.frequencies) >= 0).all():
+            raise ValueError(f"frequencies must be finite and not negative; got {self.frequencies.tolist()}")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -147,22 +197,20 @@ class Experiments:
     def take(self, index: ArrayLike) -> Experiments:
         """Some of the experiments, by index or by a mask (n,)."""
         chosen = np.arange(len(self))[np.asarray(index)]
-        tables = ("signals", "covariances", "varying", "rounding")
-        parts: Any = {key: {name: x[chosen] for name, x in getattr(self, key).items()} for key in tables}
-        return replace(
-            self,
-            names=tuple(self.names[i] for i in chosen),
-            frequencies=self.frequencies[chosen],
-            frequency_std=None if self.frequency_std is None else self.frequency_std[chosen],
-            free=self.free[chosen],
-            **parts,
-        )
+        parts: dict[str, Any] = {"names": tuple(self.names[i] for i in chosen)}
+        for key in ("frequencies", "free", "frequency_std"):
+            values = getattr(self, key)
+            parts[key] = None if values is None else values[chosen]
+        for key in ("signals", "covariances", "varying", "rounding"):
+            parts[key] = {name: values[chosen] for name, values in getattr(self, key).items()}
+        return replace(self, **parts)
 
     def table(self, names: Sequence[str]) -> ComplexArray:
         """Amplitudes of some signals, (n, signals), NaN where not measured."""
-        nothing = np.full(len(self), np.nan, dtype=complex)
-        columns = [self.signals.get(name, nothing) for name in names]
-        return np.array(columns, dtype=complex).reshape(-1, len(self)).T
+        whole = np.full((len(self), len(names)), np.nan, dtype=complex)
+        for j, name in enumerate(names):
+            whole[:, j] = self.signals.get(name, np.nan)
+        return whole
 
     def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
         """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
@@ -175,7 +223,7 @@ class Experiments:
             for i, j in enumerate(same)
             if i != j
         )
-        return (self.take(list(first.values())) if words else self), words
+        return self.take(sorted({*same})), words
 
 
 def experiments(
@@ -213,24 +261,158 @@ def experiments(
         For shapes that do not fit and frequencies that are not finite.
     """
     w = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if w.ndim != 1:
-        raise ValueError(f"frequencies must have one dimension; got shape {w.shape}")
-    table: dict[str, ComplexArray] = {}
-    for name, values in signals.items():
-        z = np.asarray(values, dtype=complex)
-        if z.shape not in ((), w.shape):
-            raise ValueError(f"{len(w)} experiments need {len(w)} amplitudes {name}; got shape {z.shape}")
-        table[name] = np.broadcast_to(z, w.shape).copy()
-    if free is None:
-        marks = np.full(w.shape, not model.has_constant_terms)
-        for name, z in table.items():
-            if name in model.signals:
-                marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
-    else:
-        marks = np.broadcast_to(np.asarray(free, dtype=bool), w.shape).copy()
+    table = {name: np.array(np.broadcast_to(z, w.shape), dtype=complex) for name, z in signals.items()}
+    marks = np.full(w.shape, not model.has_constant_terms if free is None else free)
+    for name in set(table) & set(model.signals) if free is None else ():
+        z = table[name]
+        marks &= np.isnan(z) | ((z == 0) if name in model.inputs else (z.imag == 0))
     for name in model.inputs:
         if name in table or marks.any():
-            table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
+            table[name] = np.where(marks, 0, table.get(name, np.nan))
     rows = {name: np.asarray(table.pop(name).real) for name in model.varying if name in table}
-    labels = tuple(names) if names is not None else tuple(str(i + 1) for i in range(len(w)))
+    labels = tuple(names or map(str, range(1, len(w) + 1)))
     return Experiments(labels, w, table, marks, errors, dict(covariances or {}), rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Residuals of one set of experiments against one model.
+
+    Attributes
+    ----------
+    model, experiments
+        Model and data.
+    measured
+        Outputs (n, e), NaN where not measured.
+    forced, free
+        Indices of the forced experiments that can be predicted, and of the free vibrations.
+    rows
+        Which parts of the readings count, along and across each amplitude, (n, e, 2). Parts that no
+        parameter moves, the imaginary ones of a model without damping, do not: they say nothing of errors.
+    whiten
+        Inverse root of each reading's covariance, (n, e, 2, 2).
+    left_out
+        In words.
+    """
+
+    model: HarmonicModel
+    experiments: Experiments
+    measured: ComplexArray
+    forced: IntArray
+    free: IntArray
+    rows: BoolArray
+    whiten: FloatArray
+    left_out: tuple[str, ...]
+
+    def reweighted(self, theta: FloatArray) -> Comparison:
+        """The same with errors at the amplitudes predicted by θ, where these are near the measured ones."""
+        size = trusted(self.predict(theta)[0], self.measured)
+        return replace(self, whiten=whitening(self.experiments, self.model.outputs, size))
+
+    def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Amplitudes (n, e) and natural frequencies (n,), NaN where there are none."""
+        amplitudes, frequencies = self._answers(theta)
+        return amplitudes[..., 0], frequencies[:, 0]
+
+    def _answers(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Amplitudes and natural frequencies, behind each its derivatives by θ, (n, e, 1 + n), (n, 1 + n)."""
+        data, varying, forced = self.experiments, self.experiments.varying, self.forced
+        amplitudes = np.full((*self.measured.shape, 1 + len(theta)), np.nan, dtype=complex)
+        frequencies = np.full(amplitudes[:, 0].shape, np.nan)
+        if len(forced):
+            inputs, rows = data.table(self.model.inputs)[forced], {n: v[forced] for n, v in varying.items()}
+            Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs, varying=rows)
+            amplitudes[forced] = np.concatenate((Z[..., None], dZ), axis=-1)
+        for k, i in enumerate(self.free):
+            if not k or varying:
+                A, dA = self.model.dynamic_stiffness(theta, {n: v[[i]] for n, v in varying.items()})
+                modes = natural_modes(A)
+            shape = self.measured[i].real
+            mode = nearest_mode(*modes, float(data.frequencies[i]), shape)
+            reference = reference_amplitude(shape)
+            if mode is not None and mode[1][reference]:
+                omega, v = np.sqrt(mode[0]), mode[1] / mode[1][reference] * shape[reference]
+                dz, dv = mode_slopes(A, dA, mode[0], v, reference)
+                amplitudes[i] = np.column_stack((v, dv))
+                frequencies[i] = (omega, *dz / (2 * omega))
+        return amplitudes, frequencies
+
+    def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(Predicted − measured) over the errors, and derivatives (rows, parameters).
+
+        NaN where the model has no answer (resonance, no mode).
+        """
+        try:
+            with np.errstate(all="ignore"):
+                gap, frequency = self._answers(theta)
+        except np.linalg.LinAlgError:
+            nothing = np.full((np.count_nonzero(self.rows) + len(self.free), 1 + len(theta)), np.nan)
+            return nothing[:, 0], nothing[:, 1:]
+        gap[..., 0] -= self.measured
+        frequency[:, 0] -= self.experiments.frequencies
+        both = self.whiten @ np.stack((gap.real, gap.imag), axis=-2)
+        for i in self.free:
+            over, shape, rows = self.whiten[i, :, 0, 0], self.measured[i].real, self.rows[i, :, 0]
+            reference, std = reference_amplitude(shape), self.experiments.frequency_std
+            # without an error of its own the frequency has the relative one of the reference amplitude
+            size = over[reference] * abs(shape[reference])
+            frequency[i] *= size / self.experiments.frequencies[i] if std is None else 1 / std[i]
+            if std is not None:  # then the error of the reference is one of all that is given relative to it
+                common = (over * shape)[rows] / size
+                square = common @ common
+                share = (1 - 1 / np.sqrt(1 + square)) / square if square else 0.0
+                both[i, rows, 0] -= share * np.outer(common, common @ both[i, rows, 0])
+        every = np.concatenate((both[self.rows], frequency[self.free]))
+        return every[:, 0], every[:, 1:]
+
+
+def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
+    """Set up a comparison, with errors at the measured amplitudes.
+
+    Raises
+    ------
+    ValueError
+        If equations and outputs differ in number, no reading can be compared, or errors are stated for some
+        outputs only.
+    """
+    model.check_square()
+    measured, inputs = experiments.table(model.outputs), experiments.table(model.inputs)
+    given = np.asarray(~np.isnan(measured))
+    factors = model.multipliers(experiments.frequencies, experiments.varying)
+    known = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1) | experiments.free
+    usable = known & given.any(axis=1)
+    hidden = ~given.any(axis=0)
+    left_out = [f"{model.outputs[j]} is measured nowhere" for j in np.flatnonzero(hidden)]
+    what = "input or varying quantity" if model.varying else "input"
+    for i, name in enumerate(experiments.names):
+        lost = [o for o, g in zip(model.outputs, given[i] | hidden, strict=True) if not g]
+        if not known[i]:
+            left_out.append(f"experiment {name}: left out, for not every {what} is known")
+        elif lost or not usable[i]:
+            left_out.append(f"experiment {name}: {', '.join(lost) or 'everything'} not measured")
+    if not usable.any():
+        raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
+    forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
+    rows = np.repeat((given & known[:, None])[:, :, None], 2, axis=2)
+    rows[free, :, 1] = False
+    rows[free, [reference_amplitude(shape.real) for shape in measured[free]], 0] = False
+    if not (model.power % 2).any():
+        real = (inputs.imag == 0).all(axis=1)[:, None]
+        rows[..., 1] &= ~(real & (np.abs(measured.imag) <= ROUNDING * np.abs(measured)))
+    whiten = whitening(experiments, model.outputs, measured)
+    return Comparison(model, experiments, measured, forced, free, rows, whiten, tuple(left_out))
+
+
+def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: ComplexArray) -> FloatArray:
+    """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across."""
+    whiten = np.zeros((len(experiments), len(outputs), 2, 2))
+    for j, name in enumerate(outputs):
+        known, errors = experiments.covariances, experiments.errors
+        if known and errors is None and name not in known:
+            raise ValueError(
+                f"errors are known for some outputs but not for {name}: state them with [errors]"
+            )
+        whiten[:, j] = inverse_roots(
+            amplitudes[:, [j]], errors, known[name][:, None] if name in known else None
+        )[:, 0]
+    return whiten

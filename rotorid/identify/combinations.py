@@ -30,8 +30,6 @@ P = "p"
 ONE: Monomial = ()
 CONSTANT = ""
 """Signal name of a term without a signal: amplitude 1."""
-LONG = 50
-"""Terms of a sum that is written as it comes."""
 NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -125,8 +123,8 @@ def insert(polynomial: Polynomial, known: Mapping[str, Fraction]) -> Fraction:
 def monomials_of(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Monomial, ...]:
     """Monomials of the parameters in all features: single parameters first, in their order."""
     order = {name: i for i, name in enumerate(parameters)}
-    found = {m for feature in features for m in feature.exact if m != ONE}
-    return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
+    every = {m for feature in features for m in feature.exact if m != ONE}
+    return tuple(sorted(every, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
 
 
 def merge(
@@ -136,15 +134,14 @@ def merge(
     from sympy import QQ
     from sympy.polys.matrices import DomainMatrix
 
-    exact = [[f.exact.get(m, Fraction(0)) for m in monomials] for f in features]
-    table = [[QQ(x.numerator, x.denominator) for x in row] for row in exact]
+    table = [[f.exact.get(m, Fraction(0)) for m in monomials] for f in features]
+    table = [[QQ(x.numerator, x.denominator) for x in row] for row in table]
     reduced, pivots = DomainMatrix(table, (len(table), len(monomials)), QQ).to_sparse().rref()
     rows, symbolic = np.zeros((len(pivots), len(monomials))), []
     for i, row in enumerate(reduced.to_Matrix().tolist()[: len(pivots)]):
         wanted = {m: Fraction(int(x.p), int(x.q)) for m, x in zip(monomials, row, strict=True) if x}
         symbolic.append(_as_an_equation_has_them(wanted, features))
-        for m, part in symbolic[-1].items():
-            rows[i, monomials.index(m)] = float(insert(part, known))
+        rows[i] = [float(insert(symbolic[-1].get(m, {}), known)) for m in monomials]
     words = tuple(sum_words({times(m, k): x for m, p in s.items() for k, x in p.items()}) for s in symbolic)
     scales = rows[np.arange(len(pivots)), pivots]
     return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(symbolic), words)
@@ -159,20 +156,20 @@ def _as_an_equation_has_them(
     """
     first = next(iter(wanted))
     for f in features if len(wanted) > 1 else ():
-        if not all(m in f.exact and len(f.symbolic[m]) == 1 for m in wanted):
+        if any(len(f.symbolic.get(m, ())) != 1 for m in wanted):
             continue
         scale = f.exact[first] / wanted[first]
         if any(f.exact[m] != scale * x for m, x in wanted.items()):
             continue
         terms = {m: next(iter(f.symbolic[m].items())) for m in wanted}
-        names = [dict(names) for names, _ in terms.values()]
+        names = [dict(powers) for powers, _ in terms.values()]
         shared = tuple((n, -min(one.get(n, 0) for one in names)) for n in set().union(*names))
-        sizes = [abs(x) for _, x in terms.values()]
-        least = min(sizes)
-        unit = least if all((x / least).denominator == 1 for x in sizes) else Fraction(1)
+        unit = min((abs(x) for _, x in terms.values()))
+        if any((x / unit).denominator > 1 for _, x in terms.values()):
+            unit = Fraction(1)
         if sum(x < 0 for _, x in terms.values()) > len(terms) / 2:
             unit = -unit
-        return {m: {times(numbers, shared): x / unit} for m, (numbers, x) in terms.items()}
+        return {m: {times(powers, shared): x / unit} for m, (powers, x) in terms.items()}
     return {m: {ONE: x} for m, x in wanted.items()}
 
 
@@ -186,12 +183,6 @@ def sum_words(polynomial: Polynomial) -> str:
     """
     from sympy import factor_terms
 
-    if len(polynomial) > LONG:  # which sympy takes seconds to write
-        products = (
-            (f"{float(x):.6g}", *(n if e == 1 else f"{n}**({e})" for n, e in m))
-            for m, x in polynomial.items()
-        )
-        return " + ".join("*".join(part for part in product if part != "1") for product in products)
     return _written(factor_terms(expression(polynomial)))
 
 
@@ -214,14 +205,14 @@ def _written(words: Expression) -> str:
     from sympy import Float, Pow, Rational
     from sympy.printing.str import StrPrinter
 
-    class Words(StrPrinter):  # type: ignore[misc]  # sympy has no types
-        def _as_ordered_terms(self, expr: Expression, order: str | None = None) -> list[Expression]:
-            terms = super()._as_ordered_terms(expr, order)
-            return sorted(terms, key=lambda term: term.could_extract_minus_sign())
-
     fixed = {e.exp for e in words.atoms(Pow)}
     decimals = {q: Float(q, 6) for q in words.atoms(Rational) if q.q != 1 and q not in fixed}
-    return str(Words({"full_prec": False}).doprint(words.xreplace(decimals)))
+    printer = StrPrinter({"full_prec": False})
+    ordered = printer._as_ordered_terms
+    printer._as_ordered_terms = lambda sum_, order=None: sorted(
+        ordered(sum_, order), key=lambda term: term.could_extract_minus_sign()
+    )
+    return str(printer.doprint(words.xreplace(decimals)))
 
 
 def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.text import ROUNDING, listing
 from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiments
-from rotorid.identify.operator_model import HarmonicModel, natural_modes, reference_amplitude
+from rotorid.identify.operator_model import HarmonicModel, eigenvalues, natural_modes, reference_amplitude
 
-SINGULAR = 1e9
-"""Terms that cancel to a determinant so many times smaller leave no amplitude that is sure to six digits."""
+DUST, CHANGE = 1e-13, 1e-4
+"""Where so small a relative change of parameters and frequency changes amplitudes so much, there are none."""
 
 
 def forced_vibration(
@@ -29,31 +29,39 @@ def forced_vibration(
         Where nothing excites the model, and at a resonance without damping.
     """
     model.check_square()
-    w, e = np.asarray(frequencies, dtype=np.float64), len(model.outputs)
-    inputs = np.array([[given.get(name, 0) for name in model.inputs]] * len(w), dtype=np.complex128)
-    varying = {name: np.full(len(w), given[name].real) for name in model.varying}
+    inputs = np.array([[given.get(name, 0) for name in model.inputs]], dtype=np.complex128)
+    varying = {name: np.array([given[name].real]) for name in model.varying}
     if not inputs.any() and not model.has_constant_terms:
         raise ValueError(
             f"nothing excites the model: give the amplitude of {listing(model.inputs) or 'an input'}"
         )
-    with np.errstate(all="ignore"):
-        A = model.matrices(theta, w, varying)[:, :, :e]
-        sizes = model.sizes(theta, w, varying)[:, :, :e]
-    # a bound, in any units, of the relative change of the determinant with that of its terms
-    for one, matrix, size in zip(w, A, sizes, strict=True):
-        sure = np.isfinite(size).all() and np.linalg.matrix_rank(matrix, 0.0) == e
-        if not sure or (np.abs(np.linalg.inv(matrix)).T * size).sum() >= SINGULAR:
-            why = "a resonance without damping" if one else "nothing holds it at rest"
-            raise ValueError(f"at {one:.6g} rad/s the model has no amplitude: {why}")
-    Z = model.forced(theta, w, inputs, False, varying)[0]
-    for part in (Z.real, Z.imag):
-        part[np.abs(part) < ROUNDING * np.abs(Z)] = 0.0
-    signals = dict(zip((*model.inputs, *model.outputs), np.hstack((inputs, Z)).T, strict=True))
-    return experiments(model, w, {**signals, **varying}, free=False)
+    other, amplitudes = theta * (1 + DUST * np.random.default_rng(0).choice((-1, 1), len(theta))), []
+    for w in np.array(frequencies, dtype=float):
+        try:
+            with np.errstate(all="ignore"):
+                Z = model.forced(theta, np.array([w]), inputs, varying=varying)[0][0]
+                off = model.forced(other, np.array([w * (1 + DUST)]), inputs, varying=varying)[0][0] - Z
+        except np.linalg.LinAlgError:
+            off = Z = np.full(len(model.outputs), np.nan)
+        if not np.abs(off).max() <= CHANGE * np.abs(Z).max():
+            why = "a resonance without damping" if w else "nothing holds it at rest"
+            raise ValueError(f"at {w:.6g} rad/s the model has no amplitude: {why}")
+        for part in (Z.real, Z.imag):
+            part[np.abs(part) < ROUNDING * np.abs(Z)] = 0.0
+        amplitudes.append(Z)
+    signals = dict(zip((*model.inputs, *model.outputs), (*inputs[0], *np.transpose(amplitudes)), strict=True))
+    rows = {name: np.repeat(values, len(amplitudes)) for name, values in varying.items()}
+    return experiments(model, frequencies, {**signals, **rows}, free=False)
 
 
-def free_vibration(model: HarmonicModel, theta: FloatArray, given: Mapping[str, complex]) -> Experiments:
+def free_vibration(
+    model: HarmonicModel, theta: FloatArray, given: Mapping[str, complex], digits: int | None = None
+) -> tuple[Experiments, FloatArray]:
     """All natural frequencies and shapes, whose first amplitude that is no node is 1; without damping.
+
+    With `digits` z = ω² is rounded to so many significant ones first, as [S] lessons 7 and 8 do, and the
+    shapes follow from all equations but the first. Beside: coefficients of the frequency polynomial in z,
+    the highest first, which is 1.
 
     Raises
     ------
@@ -62,12 +70,20 @@ def free_vibration(model: HarmonicModel, theta: FloatArray, given: Mapping[str, 
     """
     model.check_square()
     varying = {name: np.array([given[name].real]) for name in model.varying}
-    z, shapes = natural_modes(model.dynamic_stiffness(theta, varying)[0])
+    A = model.dynamic_stiffness(theta, varying)[0]
+    z, shapes = natural_modes(A)
     if model.has_constant_terms or not len(z):
         raise ValueError("the model has no natural frequency, or an excitation of its own")
+    if digits is not None:
+        z = significant(z, digits)
+        at = [np.tensordot(one ** np.arange(len(A)), A, axes=1) for one in z]
+        shapes = np.transpose([[1.0, *np.linalg.solve(S[1:, 1:], -S[1:, 0])] for S in at])
     signals = dict(zip(model.outputs, shapes / [v[reference_amplitude(v)] for v in shapes.T], strict=True))
     signals |= {name: np.repeat(values, len(z)) for name, values in varying.items()}
-    return experiments(model, np.sqrt(z), signals, free=True)
+    every = eigenvalues(A)[0]
+    return experiments(model, np.sqrt(z), signals, free=True), np.real(
+        np.poly(every[np.isfinite(every)])
+    ).astype(float)
 
 
 def as_read(

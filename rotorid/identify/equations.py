@@ -2,16 +2,16 @@
 
 Left minus right over the common denominator is a polynomial with exact coefficients. A denominator of one
 term stays, as negative exponents, so that 1/p**2 or 1/k needs no multiplying out; one of several terms is
-multiplied out, scaled so that its lowest term has the coefficient 1. A fractional power of a parameter, such
-as sqrt(k), has a fraction as its exponent: one more unknown of the regression, and k ≥ 0.
+multiplied out but for powers that all of them share, scaled so that its lowest term has the coefficient 1.
+A fractional power of a parameter, such as sqrt(k), has a fraction as its exponent: one more unknown of the
+regression, and k ≥ 0. Any other function of parameters, such as exp(-a), is a parameter of that name.
 """
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence, Set
 from fractions import Fraction
 
 import numpy as np
@@ -19,7 +19,6 @@ import numpy as np
 from rotorid.identify.combinations import (
     CONSTANT,
     NAME,
-    ONE,
     Expression,
     Feature,
     Monomial,
@@ -32,7 +31,7 @@ from rotorid.identify.combinations import (
 )
 from rotorid.identify.operator_model import HarmonicModel
 
-MAX_TERMS, MAX_EXPONENT = 20_000, 50
+MAX_TERMS = 20_000
 
 
 def harmonic_model(
@@ -55,7 +54,9 @@ def harmonic_model(
     known
         Numbers by name.
     estimate
-        Names of the parameters to be estimated; they may have fractional powers, such as sqrt(k).
+        Names of the parameters to be estimated; they may have fractional powers, such as sqrt(k). Another
+        function of them, such as exp(-a), is estimated as a parameter of that name, and what stands in it
+        is not solved for.
     inputs
         Signals that excite. Default: those that stand only on right sides.
     varying
@@ -83,64 +84,48 @@ def harmonic_model(
     sides = [parse_equation(text, where=f"equation {i + 1}") for i, text in enumerate(texts)]
     left, right = ({n for side in sides for n in names(side[i])} for i in (0, 1))
     others = sorted((left | right) - {P, *numbers, *estimate})
-    for name in estimate:
-        if name not in left | right:
-            near = difflib.get_close_matches(name, others, 1, 0.5)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
-
-    features, changing = _features(texts, sides, numbers, estimate, others, inputs or (), varying)
+    exact, outer = {name: exact_number(value) for name, value in numbers.items()}, {*others}
+    polynomials, features, i = list[tuple[Polynomial, frozenset[str]]](), list[Feature](), 0
+    try:
+        for i in range(len(sides)):
+            polynomials.append(multiplied_out(sides[i][0] - sides[i][1], exact, estimate))
+        changing = _row_by_row([terms for terms, _ in polynomials], others, inputs or (), varying)
+        for i, (terms, below) in enumerate(polynomials):
+            if lost := sorted(below & outer - changing):
+                raise ValueError(f"it is not linear in the signals: {lost[0]} stands in a denominator")
+            features += _split(i, terms, exact, outer - changing, changing)
+            if not any(f.signal for f in features if f.equation == i):
+                raise ValueError(
+                    "it contains no signal; names that are neither known nor estimated are signals"
+                )
+    except ValueError as problem:
+        raise ValueError(f"equation {i + 1}, '{texts[i]}': {problem}") from None
     used = {f.signal for f in features}
     signals = tuple(dict.fromkeys(n for text in texts for n in NAME.findall(text) if n in used))
     occurs = {name for f in features for m in f.exact for name, _ in m}
-    for name in estimate:
-        if name not in occurs:
+    functions = sorted(occurs - {*estimate})
+    inside = {name for words in functions for name in NAME.findall(words)}
+    for name in (name for name in estimate if name not in occurs | inside):
+        if name in left | right:
             raise ValueError(
                 f"the parameter {name} cancels out of the equations: nothing can be said about it"
             )
+        near = difflib.get_close_matches(name, others, 1, 0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+    parameters = (*(name for name in estimate if name in occurs), *functions)
     chosen = tuple(inputs) if inputs is not None else tuple(n for n in signals if n not in left)
-    for name in chosen:
-        if name not in signals:
-            raise ValueError(
-                f"the input {name} is no signal of the equations; signals are {', '.join(signals)}"
-            )
+    if strange := [name for name in chosen if name not in signals]:
+        raise ValueError(
+            f"the input {strange[0]} is no signal of the equations; signals are {', '.join(signals)}"
+        )
     outputs = tuple(name for name in signals if name not in chosen)
     if not outputs:
         raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
     ordered = tuple(name for name in others if name in changing)
-    model = HarmonicModel(texts, tuple(estimate), numbers, signals, chosen, outputs, tuple(features), ordered)
+    model = HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
     _check_independent(model)
     return model
-
-
-def _features(
-    texts: Sequence[str],
-    sides: Sequence[tuple[Expression, Expression]],
-    numbers: Mapping[str, float],
-    estimate: Sequence[str],
-    others: Sequence[str],
-    inputs: Sequence[str],
-    varying: Sequence[str],
-) -> tuple[list[Feature], frozenset[str]]:
-    """Features of all equations, and the names of quantities that change from row to row."""
-    exact = {name: exact_number(value) for name, value in numbers.items()}
-    polynomials = []
-    for i, (text, side) in enumerate(zip(texts, sides, strict=True)):
-        with _named(i, text):
-            polynomials.append(multiplied_out(side[0] - side[1], exact, estimate))
-    changing = _row_by_row([terms for terms, _ in polynomials], others, inputs, varying)
-    features: list[Feature] = []
-    for i, (text, (terms, below)) in enumerate(zip(texts, polynomials, strict=True)):
-        with _named(i, text):
-            if lost := sorted(below & set(others) - changing):
-                raise ValueError(f"it is not linear in the signals: {lost[0]} stands in a denominator")
-            of_equation = _split(i, terms, exact, frozenset(others), changing)
-            if not any(f.signal for f in of_equation):
-                raise ValueError(
-                    "it contains no signal; names that are neither known nor estimated are signals"
-                )
-            features += of_equation
-    return features, changing
 
 
 def multiplied_out(
@@ -154,7 +139,7 @@ def multiplied_out(
         With the reason, for whatever is not rational in other names than those to estimate, and for
         expansions that are too long.
     """
-    from sympy import QQ, Dummy, Symbol, fraction, nan, oo, ring, together, zoo
+    from sympy import QQ, Add, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
 
     def of_known(part: Expression) -> bool:
         plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
@@ -162,45 +147,61 @@ def multiplied_out(
         return plain and not alone and all(s.name in known for s in part.free_symbols)
 
     whole = expression.replace(of_known, lambda part: _number(part, known))
-    roots = {s: _root(whole, s) for s in whole.free_symbols if s.name in estimate}
-    inner = {s: Dummy(s.name, positive=True) if n > 1 else s for s, n in roots.items()}
-    whole = whole.subs({s: inner[s] ** n for s, n in roots.items() if n > 1})
+    whole = _functions_as_unknowns(whole, {*known, *estimate})
+    powers, roots = [e for e in whole.atoms(Pow) if e.exp.is_Rational], dict[str, int]()
+    for name in estimate:
+        x = Symbol(name)
+        if (root := math.lcm(1, *(int(e.exp.q) for e in powers if e.base.has(x)))) > 1:
+            inner = Dummy(name, positive=True)
+            roots[name], whole = root, whole.subs(x, inner**root)
+    if odd := [e for e in whole.atoms(Function, Pow) if not (e.is_Pow and e.exp.is_Integer)]:
+        raise ValueError(
+            f"'{min(odd, key=str)}' is neither a polynomial nor a fraction of polynomials in p and the "
+            "signals, nor a function of parameters"
+        )
     top, bottom = fraction(together(whole))
-    if top.has(oo, nan, zoo) or bottom == 0:
-        raise ValueError("it divides by zero")
+    factors = bottom.as_powers_dict().items()
+    if math.prod(len(Add.make_args(base)) ** int(n) for base, n in factors) > MAX_TERMS:
+        raise ValueError("it expands to too many terms")
     symbols = sorted(top.free_symbols | bottom.free_symbols, key=str)
     R = ring(symbols, QQ)[0]
-    factors = [part.as_base_exp() for part in bottom.as_ordered_factors()]
-    size = math.prod(len(base.as_ordered_terms()) ** abs(int(n)) for base, n in factors if n.is_Integer)
-    if size > MAX_TERMS:
-        raise ValueError("it expands to too many terms")
-    _check_rational(whole)
-    place = [(s.name, roots.get(Symbol(s.name), 1)) for s in symbols]
 
     def terms(part: Expression) -> Polynomial:
-        found: Polynomial = {}
+        polynomial: Polynomial = {}
         for exponents, value in R.from_expr(part).terms():
-            powers = ((n, Fraction(e, root)) for (n, root), e in zip(place, exponents, strict=True) if e)
-            monomial = tuple(sorted((n, int(e) if e.denominator == 1 else e) for n, e in powers))
-            found[monomial] = Fraction(int(value.numerator), int(value.denominator))
-        return found
+            each = zip(symbols, exponents, strict=True)
+            monomial = tuple((s.name, Fraction(e, roots.get(s.name, 1))) for s, e in each if e)
+            polynomial[tuple(sorted(monomial))] = Fraction(int(value.numerator), int(value.denominator))
+        return polynomial
 
-    polynomial, scale, below = terms(top), Fraction(1), set[str]()
-    shift: Monomial = ONE
-    for base, exponent in factors:
-        pieces = terms(base)
-        lowest = min(pieces, key=lambda m: (degree(m), m))
-        if not pieces[lowest]:
-            raise ValueError("it divides by zero")
-        scale *= pieces[lowest] ** int(exponent)
-        if len(pieces) == 1:
-            shift = times(shift, tuple((n, -e * int(exponent)) for n, e in lowest))
-        else:
-            below |= {name for m in pieces for name, _ in m}
-    for name, e in shift:
-        if e < 0 and name in known and not known[name]:
+    if top.has(oo, nan, zoo) or not (below := terms(bottom)):
+        raise ValueError("it divides by zero")
+    shared = {n: min(dict(m).get(n, 0) for m in below) for m in below for n, _ in m}
+    shift = tuple((n, -e) for n, e in shared.items() if e)
+    for name, _ in shift:
+        if name in known and not known[name]:
             raise ValueError(f"it divides by {name}, which is 0")
-    return {times(m, shift): x / scale for m, x in polynomial.items() if x}, frozenset(below)
+    scale = below[min(below, key=lambda m: (degree(m), m))]
+    left = frozenset(n for m in below for n, _ in times(m, shift))
+    return {times(m, shift): x / scale for m, x in terms(top).items()}, left
+
+
+def _functions_as_unknowns(whole: Expression, names: set[str]) -> Expression:
+    """Functions of these names as symbols of their text, but for fractional powers of products."""
+    from sympy import Symbol
+
+    inside = set(names)
+
+    def function(part: Expression) -> bool:
+        power = part.is_Pow and not part.exp.is_Integer
+        plain = power and part.exp.is_Rational and not part.base.is_Add
+        return (part.is_Function or (power and not plain)) and {s.name for s in part.free_symbols} <= inside
+
+    def as_unknown(part: Expression) -> Expression:
+        inside.add(str(part))  # which may stand in another
+        return Symbol(str(part))
+
+    return whole.replace(function, as_unknown)
 
 
 def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:
@@ -216,52 +217,26 @@ def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:
     return Rational(exact.numerator, exact.denominator)
 
 
-def _root(whole: Expression, symbol: Expression) -> int:
-    """Common denominator of the exponents that stand above a symbol."""
-    from sympy import Pow
-
-    powers = [e.exp for e in whole.atoms(Pow) if e.exp.is_Rational and e.base.has(symbol)]
-    return math.lcm(1, *(int(e.q) for e in powers))
-
-
-def _check_rational(whole: Expression) -> None:
-    """Raise ValueError for the first part that is neither a sum, a product nor a whole power."""
-    if whole.is_Symbol or whole.is_Rational:
-        return
-    power = whole.is_Pow and whole.exp.is_Integer
-    if not (whole.is_Add or whole.is_Mul or power):
-        raise ValueError(
-            f"'{whole}' is neither a polynomial nor a fraction of polynomials in p and the parameters; give "
-            "such a term a name and estimate that"
-        )
-    if power and abs(whole.exp) > MAX_EXPONENT:
-        raise ValueError(f"the exponent {whole.exp} is too large (at most {MAX_EXPONENT})")
-    for part in whole.args[:1] if power else whole.args:
-        _check_rational(part)
-
-
 def _split(
     equation: int,
     polynomial: Polynomial,
     known: Mapping[str, Fraction],
-    signals: frozenset[str],
-    varying: frozenset[str],
+    signals: Set[str],
+    varying: Set[str],
 ) -> list[Feature]:
     """Sort an equation's terms by p^k · signal; ValueError where it is not linear in the signals."""
     symbolic: dict[tuple[int, str, Monomial], dict[Monomial, Polynomial]] = {}
     for monomial, value in polynomial.items():
-        shown = [(n, e) for n, e in monomial if n in signals - varying]
+        shown = [(n, e) for n, e in monomial if n in signals]
         if len(shown) > 1 or any(e != 1 for _, e in shown):
-            term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
+            term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals | varying)
             raise ValueError(
                 f"it is not linear in the signals: it contains {term} (name a quantity that is known "
                 f"in each row under varying)"
             )
-        power = int(dict(monomial).get(P, 0))
-        factors = tuple((n, e) for n, e in monomial if n in varying)
-        numbers = tuple((n, e) for n, e in monomial if n in known)
-        rest = tuple((n, e) for n, e in monomial if n not in signals | varying | {P, *known})
-        place = power, shown[0][0] if shown else CONSTANT, factors
+        factors, numbers = (tuple(x for x in monomial if x[0] in group) for group in (varying, known))
+        rest = tuple(x for x in monomial if x not in (*shown, *factors, *numbers) and x[0] != P)
+        place = int(dict(monomial).get(P, 0)), shown[0][0] if shown else CONSTANT, factors
         symbolic.setdefault(place, {}).setdefault(rest, {})[numbers] = value
     features = []
     for (k, signal, factors), parts in sorted(symbolic.items()):
@@ -269,15 +244,6 @@ def _split(
         if exact:
             features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}, factors))
     return features
-
-
-@contextmanager
-def _named(index: int, text: str) -> Iterator[None]:
-    """Say in which equation a problem lies."""
-    try:
-        yield
-    except ValueError as problem:
-        raise ValueError(f"equation {index + 1}, '{text}': {problem}") from None
 
 
 def _row_by_row(

@@ -58,7 +58,7 @@ def signs(expr: Expression) -> set[Expression]:
 
 def jacobian(exprs: Sequence[Expression], by: Sequence[Expression]) -> list[Expression]:
     """Each expression, and behind it its derivatives by these symbols."""
-    return [part for e in exprs for part in (e, *(e.diff(symbol) for symbol in by))]
+    return [part for e in exprs for part in (e, *(e.diff(s) if e.has(s) else 0 for s in by))]
 
 
 class Compiled:

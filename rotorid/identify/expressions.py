@@ -11,19 +11,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 FUNCTIONS = (
     "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "tanh", "sinh", "cosh", "asin", "acos", "atan", "sign"
 )  # fmt: skip
 """Functions of one argument that expressions may use; their names are no names of a model."""
 
-MAX_LENGTH = 10_000
-MAX_DEPTH = 100
-MAX_EXPONENT = 50
-MAX_DEGREE = 1000
+MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT = 10_000, 100, 50
 MAX_TERMS = 20_000
 """Of an expression multiplied out."""
 MAX_BITS = 60_000
@@ -32,22 +28,19 @@ LARGEST = 1e300
 
 _NAME = r"[A-Za-z\u0370-\u03ff][A-Za-z0-9_\u0370-\u03ff]*"
 _TOKEN = re.compile(
-    rf"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>{_NAME})|(?P<sign>\*\*|[-+*/()=])"
+    r"(?P<blank>[ \t\r\n]+)|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    rf"|(?P<name>{_NAME})|(?P<sign>\*\*|[-+*/()=])|(?P<other>.)",
+    re.DOTALL,
 )
-_BLANK = re.compile(r"[ \t\r\n]+")
 _HINTS = {
     "^": "powers are written **",
     ",": "functions take one argument, and numbers have a decimal point",
-    "×": "a product is written *",
-    "·": "a product is written *",
-    "−": "a minus is written -",
-    "–": "a minus is written -",
+    **dict.fromkeys("×·", "a product is written *"),
+    **dict.fromkeys("−–", "a minus is written -"),
     ":": "a quotient is written /",
-    "[": "parentheses are ( and )",
-    "{": "parentheses are ( and )",
+    **dict.fromkeys("[{", "parentheses are ( and )"),
     "_": "a name begins with a letter",
 }
-_ALLOWED = f"numbers, names, + - * / **, parentheses and the functions {', '.join(FUNCTIONS)}"
 
 
 class ExpressionError(ValueError):
@@ -154,25 +147,18 @@ def names(expr: Any) -> frozenset[str]:  # noqa: ANN401  sympy has no types
     return frozenset(symbol.name for symbol in expr.free_symbols)
 
 
-@dataclass(frozen=True)
-class _Token:
+class _Token(NamedTuple):
     kind: str
     text: str
     at: int
 
 
-@dataclass(frozen=True)
-class _Node:
-    """A part of an expression, and how large it may become.
-
-    `bits` bounds the size of its numbers, `terms` and `degree` those of the sum that it is when multiplied
-    out.
-    """
+class _Node(NamedTuple):
+    """A part of an expression: bounds of the size of its numbers, and of its terms when multiplied out."""
 
     expr: Any
     bits: int = 1
     terms: int = 1
-    degree: int = 0
 
     @property
     def number(self) -> Fraction | None:
@@ -181,255 +167,205 @@ class _Node:
 
 
 class _Parser:
-    """Precedence climbing; sums and products are collected before sympy sees them, which keeps them quick."""
+    """Recursive descent; sums and products are collected before sympy sees them, which keeps them quick."""
 
     def __init__(self, text: str, where: str) -> None:
-        self.text = text
-        self.where = where
-        self.depth = 0
-        self.place = 0
+        self.text, self.where, self.depth, self.place = text, where, 0, 0
         if not isinstance(text, str):
             raise ExpressionError(repr(text), 0, "an expression is a text in quotes", where)
         if len(text) > MAX_LENGTH:
             raise self.error(
                 MAX_LENGTH, f"an expression has at most {MAX_LENGTH} characters, not {len(text)}"
             )
-        self.tokens = self.split()
+        every = [_Token(str(match.lastgroup), match[0], match.start()) for match in _TOKEN.finditer(text)]
+        for kind, sign, at in every:
+            if kind == "other":
+                allowed = f"numbers, names, + - * / **, parentheses and the functions {', '.join(FUNCTIONS)}"
+                shown = sign if sign.isprintable() else repr(sign)[1:-1]
+                hint = _HINTS.get(sign, f"expressions have {allowed}")
+                raise self.error(at, f"{shown} cannot stand here: {hint}")
+        self.tokens = [token for token in every if token.kind != "blank"]
+        self.tokens += [_Token("end", "", len(text))] * 2  # one to take, and one behind it
 
     def error(self, at: int, hint: str) -> ExpressionError:
         return ExpressionError(self.text, at, hint, self.where)
-
-    def split(self) -> list[_Token]:
-        tokens: list[_Token] = []
-        at = 0
-        while at < len(self.text):
-            blank = _BLANK.match(self.text, at)
-            if blank:
-                at = blank.end()
-                continue
-            found = _TOKEN.match(self.text, at)
-            if not found:
-                sign = self.text[at]
-                shown = sign if sign.isprintable() else repr(sign)[1:-1]
-                hint = _HINTS.get(sign, f"expressions have {_ALLOWED}")
-                raise self.error(at, f"{shown} cannot stand here: {hint}")
-            tokens.append(_Token(str(found.lastgroup), found[0], at))
-            at = found.end()
-        return [*tokens, _Token("end", "", len(self.text))]
 
     @property
     def next(self) -> _Token:
         return self.tokens[self.place]
 
     def take(self) -> _Token:
-        token = self.next
         self.place += 1
-        return token
+        return self.tokens[self.place - 1]
 
     def sides(self) -> list[Any]:
         """The expressions between the signs =."""
-        nodes = [self.sum()]
+        sides = [self.sum().expr]
         while self.next.text == "=":
             self.take()
-            nodes.append(self.sum())
-        token = self.next
-        if token.kind != "end":
-            raise self.error(token.at, self.unexpected(token))
-        return [node.expr for node in nodes]
+            sides.append(self.sum().expr)
+        if self.next.kind != "end":
+            raise self.unexpected()
+        return sides
 
-    def unexpected(self, token: _Token) -> str:
+    def unexpected(self) -> ExpressionError:
+        token = self.next
         if token.text == ")":
-            return "this parenthesis closes nothing"
-        return f"an operator such as * is missing before {token.text}"
+            return self.error(token.at, "this parenthesis closes nothing")
+        return self.error(token.at, f"an operator such as * is missing before {token.text}")
 
     def sum(self) -> _Node:
         import sympy
 
-        signs, nodes, at = [1], [self.product()], self.next.at
-        while self.next.text in ("+", "-"):
-            signs.append(1 if self.take().text == "+" else -1)
-            nodes.append(self.product())
-        if len(nodes) == 1:
-            return nodes[0]
-        return self.node(
-            at,
-            lambda: sympy.Add(*(sign * node.expr for sign, node in zip(signs, nodes, strict=True))),
-            sum(node.bits for node in nodes),
-            sum(node.terms for node in nodes),
-            max(node.degree for node in nodes),
-        )
+        return self.chain(self.product, ("+", "-"), sympy.Add, sum)
 
     def product(self) -> _Node:
         import sympy
 
-        up, nodes, at = [True], [self.unary()], self.next.at
-        while self.next.text in ("*", "/"):
-            sign = self.take()
-            up.append(sign.text == "*")
-            nodes.append(self.unary())
-            if sign.text == "/" and nodes[-1].number == 0:  # such as x/(y - y)
+        return self.chain(self.unary, ("*", "/"), sympy.Mul, math.prod)
+
+    def chain(
+        self,
+        operand: Callable[[], _Node],
+        signs: tuple[str, str],
+        join: Callable[..., Any],
+        count: Callable[..., int],
+    ) -> _Node:
+        nodes, at = [operand()], self.next.at
+        while self.next.text in signs:
+            sign, node = self.take(), operand()
+            if sign.text == "/" and node.number == 0:  # such as x/(y - y)
                 raise self.error(sign.at, "division by zero")
+            if sign.text == "-":
+                node = node._replace(expr=-node.expr)
+            if sign.text == "/":  # a denominator is never multiplied out
+                node = node._replace(expr=1 / node.expr, terms=1)
+            nodes.append(node)
         if len(nodes) == 1:
             return nodes[0]
-        return self.node(
-            at,
-            lambda: sympy.Mul(*(n.expr if above else 1 / n.expr for above, n in zip(up, nodes, strict=True))),
-            sum(node.bits for node in nodes),
-            # what stands in a denominator counts once: it is never multiplied out as a sum
-            math.prod(node.terms if above else 1 for above, node in zip(up, nodes, strict=True)),
-            sum(node.degree for node in nodes),
-        )
+        exprs, bits, terms = zip(*nodes, strict=True)
+        return self.node(at, lambda: join(*exprs), sum(bits), count(terms))
 
     def unary(self) -> _Node:
-        sign = self.next
-        if sign.text not in ("+", "-"):
+        if self.next.text not in ("+", "-"):
             return self.power()
-        self.take()
+        sign = self.take()
         node = self.deeper(sign, self.unary)
-        return node if sign.text == "+" else replace(node, expr=-node.expr)
+        return node if sign.text == "+" else node._replace(expr=-node.expr)
 
     def power(self) -> _Node:
         import sympy
 
         base = self.atom()
-        sign = self.next
-        if sign.text != "**":
+        if self.next.text != "**":
             return base
-        self.take()
+        sign = self.take()
         exponent = self.deeper(sign, self.unary)
         x, n, whole, terms = base.number, exponent.number, 1, 1
         if n is not None:
             if abs(n) > MAX_EXPONENT:
                 raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
-            if x is not None:
-                return self.constant(self.numeric_power(x, n, sign.at), sign.at)
             whole = max(1, math.ceil(abs(n)))
-            if n > 0 and n.denominator == 1:
-                terms = math.comb(base.terms + whole - 1, whole)
-        return self.node(
-            sign.at,
-            lambda: sympy.Pow(base.expr, exponent.expr),
-            base.bits * whole + exponent.bits,
-            terms,
-            max(1, base.degree * whole),
-        )
-
-    def numeric_power(self, base: Fraction, n: Fraction, at: int) -> Fraction:
-        if base == 0 and n < 0:
-            raise self.error(at, "division by zero")
-        if n.denominator == 1:
-            self.limit(at, _bits(base) * (abs(int(n)) or 1), 1, 0)
-            return Fraction(base**n)
-        if base < 0:
-            raise self.error(at, "a fractional power of a negative number is no real number")
-        return self.real(lambda: math.pow(base, n), at, "this power")
+            if x == 0 and n < 0:
+                raise self.error(sign.at, "division by zero")
+            if n.denominator == 1:
+                terms = math.comb(base.terms + whole - 1, whole) if n > 0 else 1
+            elif x is not None:
+                if x < 0:
+                    raise self.error(sign.at, "a fractional power of a negative number is no real number")
+                return self.real(lambda: math.pow(x, n), sign.at, "this power")
+        bits = base.bits * whole + exponent.bits
+        return self.node(sign.at, lambda: sympy.Pow(base.expr, exponent.expr), bits, terms)
 
     def atom(self) -> _Node:
-        token = self.take()
-        if token.kind == "number":
-            return self.number(token)
-        if token.kind == "name":
-            return self.named(token)
+        import sympy
+
+        token, after = self.take(), self.next
         if token.text == "(":
-            return self.deeper(token, lambda: self.enclosed(token))
+            return self.enclosed(token)
         if token.kind == "end":
             raise self.error(token.at, "the expression ends here, but a name, a number or ( must follow")
-        raise self.error(token.at, f"a name, a number or ( is expected before {token.text}")
+        if token.kind == "sign":
+            raise self.error(token.at, f"a name, a number or ( is expected before {token.text}")
+        if token.kind == "number":
+            if after.kind in ("name", "number") and after.at == token.at + len(token.text):
+                raise self.error(after.at, f"a product is written with *: {token.text}*{after.text}")
+            return self.number(token)
+        called = after.text == "("
+        if token.text in FUNCTIONS:
+            if not called:
+                raise self.error(
+                    token.at,
+                    f"{token.text} is a function: {token.text}(…); choose another name for a quantity",
+                )
+            return self.function(token.text, self.enclosed(self.take()), token.at)
+        if called:
+            near = [f for f in FUNCTIONS if f.startswith(token.text.casefold()[:3])]
+            meant = f"did you mean {near[0]}? " if near else ""
+            raise self.error(
+                token.at,
+                f"{token.text} is no function ({meant}functions are {', '.join(FUNCTIONS)}); a product is "
+                "written *",
+            )
+        return _Node(sympy.Symbol(token.text))
 
     def enclosed(self, opened: _Token) -> _Node:
-        node = self.sum()
+        node = self.deeper(opened, self.sum)
+        if self.next.kind == "end":
+            raise self.error(opened.at, "this parenthesis is never closed")
         if self.next.text != ")":
-            if self.next.kind == "end":
-                raise self.error(opened.at, "this parenthesis is never closed")
-            raise self.error(self.next.at, self.unexpected(self.next))
+            raise self.unexpected()
         self.take()
         return node
 
     def number(self, token: _Token) -> _Node:
-        after = self.next
-        if after.kind in ("name", "number") and after.at == token.at + len(token.text):
-            hint = f"a product is written with *: {token.text}*{after.text}"
-            raise self.error(after.at, hint)
-        if len(token.text) > 400 or float(token.text) > LARGEST:
-            raise self.error(token.at, f"a number is at most {LARGEST:g}")
-        if re.search(r"[eE]-[0-9]{4,}", token.text):
-            raise self.error(token.at, f"a number above 0 is at least {1 / LARGEST:g}")
+        size, above = float(token.text), re.search("[1-9]", re.split("[eE]", token.text)[0])
+        if len(token.text) > 400 or size > LARGEST or (above and size < 1 / LARGEST):
+            raise self.unsized(token.at)
         return self.constant(Fraction(token.text), token.at)
 
-    def named(self, token: _Token) -> _Node:
-        name, called = token.text, self.next
-        if name in FUNCTIONS:
-            if called.text != "(":
-                raise self.error(
-                    token.at, f"{name} is a function: {name}(…); choose another name for a quantity"
-                )
-            self.take()
-            argument = self.deeper(called, lambda: self.enclosed(called))
-            return self.function(name, argument, token.at)
-        if called.text == "(":
-            near = next((f for f in FUNCTIONS if f.startswith(name.casefold()[:3])), None)
-            meant = f"did you mean {near}? " if near else ""
-            hint = (
-                f"{name} is no function ({meant}functions are {', '.join(FUNCTIONS)}); a product is written *"
-            )
-            raise self.error(token.at, hint)
-
-        import sympy
-
-        return _Node(sympy.Symbol(name), degree=1)
+    def unsized(self, at: int) -> ExpressionError:
+        least = f"{1 / LARGEST:g} or 0"
+        return self.error(at, f"a number is at most {LARGEST:g} in size, and at least {least}")
 
     def function(self, name: str, argument: _Node, at: int) -> _Node:
         import sympy
 
         x = argument.number
+        if x is not None and name in ("abs", "sign"):
+            return self.constant(abs(x) if name == "abs" else Fraction((x > 0) - (x < 0)), at)
         if x is not None:
-            return self.constant(self.value(name, x, at), at)
-        if name == "sqrt":
-            return self.node(at, lambda: sympy.sqrt(argument.expr), argument.bits, 1, 1)
-        # unevaluated: sympy's simplifications may search for long
+            return self.real(lambda: getattr(math, name)(x), at, f"{name}({float(x):g})")
         called = getattr(sympy, "Abs" if name == "abs" else name)
-        return self.node(at, lambda: called(argument.expr, evaluate=False), argument.bits, 1, 1)
+        # unevaluated: sympy's simplifications may search for long
+        options = {} if name == "sqrt" else {"evaluate": False}
+        return self.node(at, lambda: called(argument.expr, **options), argument.bits, 1)
 
-    def value(self, name: str, x: Fraction, at: int) -> Fraction:
-        """A function of a number."""
-        if name == "abs":
-            return abs(x)
-        if name == "sign":
-            return Fraction((x > 0) - (x < 0))
-        return self.real(lambda: getattr(math, name)(x), at, f"{name}({float(x):g})")
-
-    def real(self, compute: Callable[[], float], at: int, what: str) -> Fraction:
+    def real(self, compute: Callable[[], float], at: int, what: str) -> _Node:
         try:
             value = compute()
         except (ValueError, OverflowError):
             value = math.nan
         if not math.isfinite(value):
             raise self.error(at, f"{what} is no finite real number")
-        return Fraction(repr(value))  # the shortest decimal: 0.01**0.5 is 1/10
+        return self.constant(Fraction(repr(value)), at)  # the shortest decimal: 0.01**0.5 is 1/10
 
     def constant(self, number: Fraction, at: int) -> _Node:
         import sympy
 
-        bits = _bits(number)
-        self.limit(at, bits, 1, 0)
         if number and not 1 / Fraction(LARGEST) <= abs(number) <= Fraction(LARGEST):
-            raise self.error(
-                at, f"a number is at most {LARGEST:g} in size, and at least {1 / LARGEST:g} or 0"
-            )
+            raise self.unsized(at)
+        bits = number.numerator.bit_length() + number.denominator.bit_length()
         return _Node(sympy.Rational(number.numerator, number.denominator), bits)
 
-    def node(self, at: int, build: Callable[[], Any], bits: int, terms: int, degree: int) -> _Node:
+    def node(self, at: int, build: Callable[[], Any], bits: int, terms: int) -> _Node:
         """What is built once its size is known to be allowed."""
-        self.limit(at, bits, terms, degree)
-        node = _Node(build(), bits, terms, degree)
-        number = node.number
-        return node if number is None else self.constant(number, at)
-
-    def limit(self, at: int, bits: int, terms: int, degree: int) -> None:
         if terms > MAX_TERMS:
             raise self.error(at, f"multiplied out, this has more than {MAX_TERMS} terms; write it in parts")
-        if degree > MAX_DEGREE or bits > MAX_BITS:
+        if bits > MAX_BITS:
             raise self.error(at, "this expression is too large; write it in parts or with smaller powers")
+        node = _Node(build(), bits, terms)
+        return node if node.number is None else self.constant(node.number, at)
 
     def deeper(self, token: _Token, inner: Callable[[], _Node]) -> _Node:
         self.depth += 1
@@ -438,7 +374,3 @@ class _Parser:
         node = inner()
         self.depth -= 1
         return node
-
-
-def _bits(number: Fraction) -> int:
-    return number.numerator.bit_length() + number.denominator.bit_length()

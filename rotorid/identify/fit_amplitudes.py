@@ -15,20 +15,18 @@ readings are written are taken as errors, if what the model leaves is no larger 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
-from rotorid.identify.amplitude_residuals import Comparison, compare
-from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.checks_amplitudes import negative, unexplained, what_more_can_tell
+from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import LinearFit, build_rows, linear_fit, reasons
+from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, passive_elements, several
 from rotorid.identify.operator_model import HarmonicModel
-from rotorid.identify.recovery import SAME, several
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
@@ -36,36 +34,20 @@ from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_le
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 from rotorid.regression.robust import LOSSES
+from rotorid.regression.search import together
 from rotorid.regression.undetermined_combinations import FoundCombination
 
-REWEIGHTINGS = 2
-"""Rounds with weights from predicted amplitudes after the first with measured ones."""
-ROUNDING = 1e-9
-"""Relative errors that are smaller are rounding."""
+REWEIGHTINGS, MOVED = 2, 0.01
+"""Rounds at most with weights from predicted amplitudes, after the first with measured ones; standard
+deviations by which a round moves the parameters that ends them."""
 MOST_STARTS = 8
-_SEARCHED = "the parameters were found by a search; there may be more solutions than shown"
 WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """What `identify` takes beside model and data."""
-
-    bounds: Bounds
-    loss: str
-    start: Mapping[str, float]
-    prior: Known
-    ridge: float
-
-
-@dataclass(frozen=True, eq=False)
-class OutputError:
-    """A fit, the comparison with the last weights, and what a prior did."""
-
-    fit: NonlinearEstimate
-    comparison: Comparison
-    prior: PriorEffect | None
+LARGE = 0.12
+"""Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
+KINDS = ("spring", "damper", "mass")
+OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
+"""A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
 
 def identify(
@@ -101,34 +83,42 @@ def identify(
     ValueError
         For signals that were not measured at all, options that do not go together, unknown names.
     """
-    options = Options(bounds or {}, loss, start or {}, prior or {}, ridge)
-    _check(model, experiments, options)
+    how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
+    _check(model, experiments, start or {}, **how)
     data, copies = experiments.without_copies()
-    found = _identified(model, data, options)
-    if data.rounding and not data.stated and found.method == "output-error" and len(found.solutions) == 1:
-        found = _by_digits(found, options)
-    return replace(found, left_out=(*copies, *found.left_out))
+    answer = _identified(model, data, start or {}, how)
+    if data.rounding and not data.stated and answer.predicted and len(answer.solutions) == 1:
+        answer = _by_digits(answer, how)
+    return replace(_finished(answer, how["bounds"]), left_out=(*copies, *answer.left_out))
 
 
-def _check(model: HarmonicModel, experiments: Experiments, options: Options) -> None:
+def _check(
+    model: HarmonicModel,
+    experiments: Experiments,
+    start: Mapping[str, float],
+    *,
+    bounds: Bounds,
+    loss: str,
+    prior: Known,
+    ridge: float,
+) -> None:
     """Refuse names that are not the model's, or that stand for two things."""
-    find(LOSSES, options.loss, "loss")
-    for what in ("bounds", "start", "prior"):
-        for name in getattr(options, what):
-            if name not in model.parameters:
-                raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
-    for name, (low, high) in options.bounds.items():
+    find(LOSSES, loss, "loss")
+    for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
+        if wrong := [name for name in names if name not in model.parameters]:
+            raise ValueError(f"{what}: {wrong[0]} is no parameter; those are {', '.join(model.parameters)}")
+    for name, (low, high) in bounds.items():
         if low is not None and high is not None and not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
-    if options.prior and not experiments.stated:
+    if prior and not experiments.stated:
         raise ValueError(
             "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
             "--phase-error, or [errors] in the model file)"
         )
-    for name in experiments.signals:
-        if name in model.known or name in model.parameters:
-            what = "known in" if name in model.known else "a parameter of"
-            raise ValueError(f"{name} is {what} the model and also measured; remove one of the two")
+    if (prior or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
+        raise ValueError(
+            "[prior], --ridge and --loss belong to models that have as many outputs as equations"
+        )
     words = NAME.findall(" ".join(model.equations))
     for name in model.signals:
         alike = [w for w in words if w != name and w.casefold() == name.casefold()]
@@ -139,271 +129,217 @@ def _check(model: HarmonicModel, experiments: Experiments, options: Options) -> 
             )
 
 
-def _identified(model: HarmonicModel, experiments: Experiments, options: Options) -> Identification:
+def _identified(
+    model: HarmonicModel, data: Experiments, start: Mapping[str, float], how: Mapping[str, Any]
+) -> Identification:
     """By output error, or linear regression alone where the model cannot predict."""
-    rows, problem = None, ValueError()
+    linear, problem, fits = None, ValueError(), list[OutputError]()
     try:
-        rows = build_rows(model, experiments)
+        linear = linear_fit(model, data)
     except ValueError as error:  # an amplitude that it needs is missing
         problem = error
-    linear = None if rows is None else linear_fit(model, experiments, rows)
-    square = len(model.outputs) == len(model.equations)
-    hidden = np.isnan(experiments.table(model.outputs)).all(axis=0)
-    if linear is None and (not square or hidden.all() or "input" in str(problem)):
+    nowhere = {name: np.isnan(data.table([name])).all() for name in model.signals}
+    predicts = len(model.outputs) == len(model.equations)
+    without = all(nowhere[name] for name in model.outputs) or any(nowhere[name] for name in model.inputs)
+    if linear is None and (not predicts or without):
         raise problem
-    if square:
-        compare(model, experiments)  # which refuses readings that cannot be compared
-        starts = _starts(model, experiments, linear, options, hidden=bool(hidden.any()))
-        fits, problem = [], ValueError()
-        for begin in starts:
+    solutions = linear.recovery.solutions if linear else ()
+    if predicts:
+        comparison = compare(model, data)
+        given = np.array([start.get(name, np.nan) for name in model.parameters])
+        whole = bool(np.isfinite(given).all())
+        ends = solutions[: 0 if whole and how["ridge"] else MOST_STARTS]
+        begins = [given] * whole + [end if whole else np.where(np.isnan(given), end, given) for end in ends]
+        for begin in begins or starting_values(model, data, start):
             try:
-                fits.append(output_error(model, experiments, begin, options))
+                fits.append(output_error(comparison, begin, **how))
             except ValueError as error:  # one of several starts may have no answer
                 problem = error
-        good = any(one.fit.converged and one.fit.estimate.full_rank for one in fits)
-        lost = linear and not linear.recovery.solutions and not good
-        if fits and not lost:
-            return _by_output_error(fits, linear, options)
-        if linear is None or not (fits or linear.recovery.solutions) or options.prior or options.ridge:
+        good = any(fit.converged and fit.estimate.full_rank for fit, *_ in fits)
+        if fits and (good or solutions or linear is None):
+            return _by_output_error(fits, linear, whole=whole)
+        if how["prior"] or how["ridge"] or not (fits or solutions):
             raise problem
-    elif options.prior or options.ridge or options.loss != "linear":
-        raise ValueError(
-            "[prior], --ridge and --loss belong to models that have as many outputs as equations"
-        )
     assert linear is not None
-    return _by_regression(experiments, linear, options)
-
-
-def _starts(
-    model: HarmonicModel,
-    experiments: Experiments,
-    linear: LinearFit | None,
-    options: Options,
-    *,
-    hidden: bool,
-) -> list[FloatArray]:
-    """Where to begin: at the given values if these are all, and at the linear solutions."""
-    given = np.array([options.start.get(name, np.nan) for name in model.parameters])
-    whole = bool(np.isfinite(given).all())
-    if whole and options.ridge:  # which pulls towards it
-        return [given]
-    solutions = linear.recovery.solutions[:MOST_STARTS] if linear else ()
-    ends = [given] * whole + [end if whole else np.where(np.isnan(given), end, given) for end in solutions]
-    return ends or starting_values(model, experiments, options.start)
+    return _by_regression(model, data, linear)
 
 
 def output_error(
-    model: HarmonicModel, experiments: Experiments, begin: FloatArray, options: Options
+    comparison: Comparison,
+    begin: FloatArray,
+    *,
+    bounds: Bounds | None = None,
+    loss: str = "linear",
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> OutputError:
-    """Fit predicted to measured amplitudes from a start (n,); ValueError as of `compare`."""
-    comparison = compare(model, experiments)
-    stated, point = experiments.stated, begin
-    known = prior_rows(model.parameters, options.prior, options.ridge, begin, comparison.jacobian)
-    rounds: list[NonlinearEstimate] = []
-    while True:
+    """Fit predicted to measured amplitudes from a start (n,)."""
+    names, data, point = comparison.model.parameters, comparison.experiments, begin
+    residual, jacobian = together(comparison.residuals)
+    known = prior_rows(names, prior or {}, ridge, begin, jacobian)
+    iterations, moved = 0, np.inf
+    for left in reversed(range(REWEIGHTINGS + 1)):
         fit = nonlinear_least_squares(
-            comparison.residual,
-            comparison.jacobian,
+            residual,
+            jacobian,
             point,
-            names=model.parameters,
-            sigma_stated=stated,
-            bounds=options.bounds or None,
-            loss=options.loss,
-            near=bool(rounds),
+            names=names,
+            sigma_stated=data.stated,
+            bounds=bounds or None,
+            loss=loss,
+            near=left < REWEIGHTINGS,
             prior=known,
         )
-        rounds.append(fit)
-        if len(rounds) > REWEIGHTINGS or not fit.converged or not comparison.depends_on_prediction:
-            break
-        if len(rounds) > 1 and _moved(rounds[-2], fit) < 0.01:
-            break
+        iterations += fit.iterations
+        std = np.zeros(len(begin)) if fit.std is None else fit.std
+        if left < REWEIGHTINGS and (std > 0).any():
+            moved = float((np.abs(fit.estimate.solution - point)[std > 0] / std[std > 0]).max())
         point = fit.estimate.solution
+        same = {*comparison.model.outputs} <= {*data.covariances}  # errors that no prediction changes
+        if not left or not fit.converged or moved < MOVED or same:
+            break
         comparison = comparison.reweighted(point)
-    estimate, J = fit.estimate, comparison.jacobian(fit.estimate.solution)
-    did = effect(known, J, estimate.residuals, estimate.solution, stated=stated, at_bounds=fit.at_bounds)
-    if did:
-        estimate = did.apart(estimate, stated=stated)
-    iterations = sum(one.iterations for one in rounds)
+        residual, jacobian = together(comparison.residuals)
+    J = jacobian(point)
+    did = effect(known, J, fit.estimate.residuals, point, stated=data.stated, at_bounds=fit.at_bounds)
+    estimate = did.apart(fit.estimate, stated=data.stated) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
-    return OutputError(replace(fit, estimate=_spare(estimate, J), message=message), comparison, did)
+    return replace(fit, estimate=estimate, message=message), comparison, did, J
 
 
-def _moved(before: NonlinearEstimate, after: NonlinearEstimate) -> float:
-    """Largest change from one round to the next, in standard deviations; infinite where these are unknown."""
-    known = after.std > 0 if after.std is not None else np.zeros(0, dtype=bool)
-    if after.std is None or not known.any():
-        return np.inf
-    change = np.abs(after.estimate.solution - before.estimate.solution)
-    return float((change[known] / after.std[known]).max())
-
-
-def _spare(estimate: Estimate, jacobian: FloatArray) -> Estimate:
-    """Without the degrees of freedom of rows that no parameter moves and that hold but for rounding.
-
-    Such are the phases of a model without damping: they are met by any values, and say nothing of errors.
-    """
-    still = np.abs(jacobian * estimate.solution).max(axis=1, initial=0.0) <= ROUNDING
-    dof = estimate.dof - int(np.count_nonzero(still & (np.abs(estimate.residuals) <= ROUNDING)))
-    factor = 1.0 if estimate.errors_stated else estimate.dof / dof if dof > 0 else np.nan
-
-    def scaled(covariance: FloatArray | None) -> FloatArray | None:
-        return None if covariance is None or np.isnan(factor) else covariance * factor
-
-    covariances = scaled(estimate.covariance), scaled(estimate.solution_covariance)
-    return replace(estimate, dof=dof, covariance=covariances[0], solution_covariance=covariances[1])
-
-
-def _by_output_error(
-    fits: Sequence[OutputError], linear: LinearFit | None, options: Options
-) -> Identification:
-    """The best of the fits, or all that are as good."""
-    chosen = _best(fits, options)
-    fit, comparison, prior = chosen[0].fit, chosen[0].comparison, chosen[0].prior
-    estimate, theta, converged = fit.estimate, fit.estimate.solution, fit.converged
-    model, data = comparison.model, comparison.experiments
-    points = [one.fit.values for one in chosen]
+def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, whole: bool) -> Identification:
+    """The best of the fits, or all that are as good; `whole`: the first began at values that were given."""
+    lowest = min(fit.costs[-1] for fit, *_ in fits)
+    slack = 1e-6 * lowest + 1e-16 * len(fits[0][0].estimate.residuals)
+    equal = [one for one in fits if one[0].costs[-1] <= lowest + slack]
+    equal = [one for one in equal if one[0].converged] or equal
+    chosen = equal[:1]
+    for one in equal if not (whole and equal[0] is fits[0]) else ():
+        here = one[0].estimate.solution
+        near = any(np.allclose(here, other[0].estimate.solution, rtol=SAME, atol=0) for other in chosen)
+        if one[0].estimate.full_rank and not near:
+            chosen.append(one)
+    fit, comparison, prior, J = chosen[0]
+    model, data, converged = comparison.model, comparison.experiments, fit.converged
+    estimate, theta, points = fit.estimate, fit.estimate.solution, [one.values for one, *_ in chosen]
     apart = several(points) & ~np.isnan(points).any(axis=0)
     values = np.where(apart, np.nan, estimate.values) if converged else theta
     combinations = _combinations(estimate, linear) if converged else ()
-    lost, more = np.isnan(values).any(), ""
-    if (lost and not estimate.full_rank) or (linear and not linear.estimate.full_rank):
-        more = what_more_can_tell(model, data, estimate.rank)
-    why = reasons(linear, more) if linear and linear.recovery.solutions else ()
+    why = linear.reasons if linear and linear.recovery.solutions else ()
     if prior and prior.alone and why:
         prior = replace(prior, alone=why[0])
     if not why and estimate.full_rank:
         why = tuple(why_several(points, model.parameters, np.flatnonzero(apart).tolist()))
     elif not why:
         words = [c.words for c in combinations]
-        why = only_determined(model.parameters, estimate.undetermined, words), more
-    warnings = [*(linear.rows.warnings if linear else ()), *comparison.warnings]
-    warnings += [w for w in fit.end_warnings if w != estimate.describe_rank()]
-    warnings += [_SEARCHED] if linear and not linear.recovery.complete else []
+        why = (only_determined(model.parameters, estimate.undetermined, words),)
+    covariance = estimate.covariance
+    if covariance is not None:
+        covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
-    def refit(others: Experiments) -> Sequence[FloatArray]:
-        return linear_fit(model, others).recovery.solutions
-
-    warnings += unexplained(comparison, theta, estimate, refit, converged=converged)
-    found = Identification(
+    warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
+    warnings += unexplained(estimate, stated=data.stated) if converged else []
+    return Identification(
         model=model,
         experiments=data,
         method="output-error",
         values=values,
-        covariance=_without(estimate.covariance, apart),
+        covariance=covariance,
         estimate=estimate,
         linear=linear,
         combinations=combinations,
         solutions=tuple(_named(model, point) for point in points),
         theta=theta,
-        unidentifiable=why if lost else (),
+        unidentifiable=why if np.isnan(values).any() else (),
         predicted=dict(zip(model.outputs, comparison.predict(theta)[0].T, strict=True)),
         left_out=comparison.left_out,
         converged=converged,
         warnings=tuple(warnings),
         notes=(fit.message,),
-        normal_matrix=normal_matrix(model.parameters, comparison.jacobian(theta)),
+        normal_matrix=normal_matrix(model.parameters, J),
         prior=prior,
     )
-    signs = _negative(found, options) if converged else ()
-    return replace(found, warnings=(*found.warnings, *signs, *(prior.warnings if prior else ())))
 
 
-def _best(fits: Sequence[OutputError], options: Options) -> list[OutputError]:
-    """Fits with the lowest cost, one for each set of parameters; that from a start which gives all alone."""
-    lowest = min(one.fit.costs[-1] for one in fits)
-    slack = 1e-6 * lowest + 1e-16 * max(1.0, float(len(fits[0].comparison.experiment)))
-    equal = [one for one in fits if one.fit.costs[-1] <= lowest + slack]
-    equal = [one for one in equal if one.fit.converged] or equal
-    if equal[0] is fits[0] and set(options.start) == set(fits[0].comparison.model.parameters):
-        return equal[:1]
-    kept: list[OutputError] = []
-    for one in equal:
-        full, here = one.fit.estimate.full_rank, one.fit.estimate.solution
-        near = (k.fit.estimate.solution for k in kept)
-        if not kept or (full and not any(np.allclose(here, there, rtol=SAME, atol=0) for there in near)):
-            kept.append(one)
-    return kept
-
-
-def _by_regression(experiments: Experiments, linear: LinearFit, options: Options) -> Identification:
+def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -> Identification:
     """The answer of linear regression alone."""
-    model, recovery, estimate, system = linear.model, linear.recovery, linear.estimate, linear.system
-    values, covariance = linear.values, system.covariance
-    spread: list[float | None] = [None] * len(system.values)
+    recovery, covariance, each = linear.recovery, linear.system.covariance, linear.system.values
+    values, spread = recovery.values, np.full(len(each), np.nan)
     if covariance is not None:
-        spread = np.sqrt(np.diag(covariance).clip(0)).tolist()
-    warnings = [*linear.rows.warnings, *([] if recovery.complete else [_SEARCHED])]
+        spread = np.sqrt(np.diag(covariance).clip(0))
+        covariance = recovery.gain @ covariance @ recovery.gain.T
+        covariance[np.isnan(values)[:, None] | np.isnan(values)] = np.nan
     notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
-    more = "" if estimate.full_rank else what_more_can_tell(model, experiments, recovery.rank)
-    solutions = [np.where(recovery.undetermined, np.nan, theta) for theta in recovery.solutions]
-    found = Identification(
+    return Identification(
         model=model,
-        experiments=experiments,
+        experiments=data,
         method="equation-error",
         values=values,
-        covariance=_without(
-            None if covariance is None else linear.gain @ covariance @ linear.gain.T, np.isnan(values)
-        ),
-        estimate=estimate,
+        covariance=covariance,
+        estimate=linear.estimate,
         linear=linear,
-        combinations=tuple(
-            FoundCombination(words, float(value), std)
-            for words, value, std in zip(linear.words, system.values, spread, strict=True)
-            if words not in model.parameters
+        combinations=_listed(linear, each, spread, np.ones(len(each), dtype=bool)),
+        solutions=tuple(
+            _named(model, np.where(recovery.undetermined, np.nan, theta)) for theta in recovery.solutions
         ),
-        solutions=tuple(_named(model, theta) for theta in solutions),
-        theta=recovery.solutions[0] if solutions else values,
-        unidentifiable=reasons(linear, more) if np.isnan(values).any() else (),
-        predicted={},
-        left_out=linear.rows.left_out,
-        converged=True,
-        warnings=tuple(warnings),
+        theta=recovery.solutions[0] if recovery.solutions else values,
+        unidentifiable=linear.reasons if np.isnan(values).any() else (),
+        left_out=linear.left_out,
         notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
-        normal_matrix=normal_matrix(estimate.names, linear.K),
+        normal_matrix=normal_matrix(linear.estimate.names, linear.K),
     )
-    return replace(found, warnings=(*found.warnings, *_negative(found, options)))
 
 
-def _without(covariance: FloatArray | None, lost: BoolArray) -> FloatArray | None:
-    """A covariance, NaN where a parameter has no one value."""
-    if covariance is None:
-        return None
-    return np.where(lost[:, None] | lost, np.nan, covariance)
-
-
-def _by_digits(found: Identification, options: Options) -> Identification:
+def _by_digits(answer: Identification, how: Mapping[str, Any]) -> Identification:
     """With the digits of the readings as their errors, where these explain what is left with 5 % chance.
 
     What is left widens the intervals, if it is more than the digits make on average.
     """
     from scipy.special import chdtrc
 
-    data = found.experiments
+    data, without = answer.experiments, answer
     spread = {name: each for name, each in data.rounding.items() if name}
     std = np.sqrt(data.rounding[""]) if data.free.any() else None
     stated = replace(data, covariances=spread, frequency_std=std)
     try:
-        other = _identified(found.model, stated, replace(options, start=_named(found.model, found.theta)))
+        answer = _identified(answer.model, stated, _named(answer.model, answer.theta), how)
     except (ValueError, np.linalg.LinAlgError):
-        return found
-    chi_square, dof = other.estimate.chi_square or 0.0, other.dof
-    explained = dof < 1 or chdtrc(dof, chi_square) > 0.05
-    if other.method != found.method or not (other.converged and explained) or other.covariance is None:
-        return found
+        return without
+    chi_square, dof = answer.estimate.chi_square or 0.0, answer.dof
+    explained = answer.predicted and answer.converged and (dof < 1 or chdtrc(dof, chi_square) > 0.05)
+    if not explained or answer.covariance is None:
+        return without
     more = max(1.0, chi_square / max(dof, 1))
-    combinations = tuple(replace(c, std=c.std and c.std * more**0.5) for c in other.combinations)
     note = "no errors are stated: those of the digits in which readings are written are taken"
-    wide = replace(other, covariance=other.covariance * more, combinations=combinations)
     return replace(
-        wide, experiments=data, linear=found.linear, notes=(note, *other.notes), warnings=found.warnings
+        answer,
+        covariance=answer.covariance * more,
+        combinations=tuple(replace(c, std=c.std and c.std * more**0.5) for c in answer.combinations),
+        experiments=data,
+        warnings=without.warnings,
+        notes=(note, *answer.notes),
     )
 
 
-def _negative(found: Identification, options: Options) -> tuple[str, ...]:
-    interval = found.ci95
-    high = found.values if interval is None else np.fmax(found.values, interval[:, 1])
-    highest = float(found.experiments.frequencies.max())
-    return negative(found.model, highest, found.values, high, options.bounds)
+def _finished(answer: Identification, bounds: Bounds) -> Identification:
+    """With what any answer says: terms left out, that it was searched for, signs."""
+    model, data, words = answer.model, answer.experiments, []
+    if data.free.any() and (model.power % 2 == 1).any():
+        words.append(
+            "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
+        )
+    words += [
+        f"{name} is estimated as one unknown: what stands in it is not solved for from it"
+        for name in model.parameters
+        if not name.isidentifier()
+    ]
+    if answer.linear and answer.solutions and not answer.linear.recovery.solutions:
+        words.append("the parameters were found by a search; there may be more solutions than shown")
+    words += answer.warnings
+    if answer.converged:
+        high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])
+        words += negative(model, float(data.frequencies.max()), answer.values, high, bounds)
+    return replace(answer, warnings=(*words, *(answer.prior.warnings if answer.prior else ())))
 
 
 def _named(model: HarmonicModel, theta: FloatArray) -> dict[str, float]:
@@ -422,13 +358,65 @@ def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCo
         return tuple(FoundCombination(f"(near these values) {c.words}", c.value, None) for c in tangents)
     values, slopes = linear.system.combinations(theta)
     scale = np.where(theta == 0, 1.0, theta)
-    rows = np.linalg.qr((estimate.row_space * scale).T)[0]
-    found = []
-    for words, value, slope in zip(linear.words, values, slopes, strict=True):
-        relative = slope * scale
-        beside = np.linalg.norm(relative - rows @ (rows.T @ relative))
-        if words not in linear.model.parameters and beside <= WITHIN * np.linalg.norm(relative):
-            variance = np.nan if spread is None else float(slope @ spread @ slope)
-            std = float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else None
-            found.append(FoundCombination(words, float(value), std))
-    return tuple(found)
+    rows, relative = np.linalg.qr((estimate.row_space * scale).T)[0], slopes * scale
+    beside = np.linalg.norm(relative - relative @ rows @ rows.T, axis=1)
+    seen = beside <= WITHIN * np.linalg.norm(relative, axis=1)
+    std = np.full(len(values), np.nan)
+    if spread is not None:
+        std = np.sqrt(np.einsum("qi,ij,qj->q", slopes, spread, slopes).clip(0))
+    return _listed(linear, values, std, seen)
+
+
+def _listed(
+    linear: LinearFit, values: FloatArray, std: FloatArray, seen: BoolArray
+) -> tuple[FoundCombination, ...]:
+    """Combinations that the data see, but for single parameters; NaN: no standard deviation is known."""
+    each = zip(linear.words, values.tolist(), std.tolist(), seen, strict=True)
+    return tuple(
+        FoundCombination(words, value, None if np.isnan(error) else error)
+        for words, value, error, shown in each
+        if shown and words not in linear.system.names
+    )
+
+
+def unexplained(estimate: Estimate, *, stated: bool) -> list[str]:
+    """What the model leaves of the readings, if it is much: more than stated errors, or a large share."""
+    if why := estimate.misfit():
+        return [
+            f"{why}: the model, a reading, or the errors stated are wrong, or a better minimum lies "
+            "elsewhere (try another start)"
+        ]
+    left = np.sqrt(2 * np.mean(estimate.residuals**2))  # of both parts of an amplitude, relative to it
+    if stated or not left > LARGE:
+        return []
+    return [
+        f"the model leaves {100 * left:.0f} % of the readings: unless they are as noisy as that, the model, "
+        "a reading, a unit or the sign of phases is wrong"
+    ]
+
+
+def negative(
+    model: HarmonicModel, highest: float, values: FloatArray, high: FloatArray, bounds: Bounds
+) -> list[str]:
+    """Masses, dampers and springs that are negative beyond the upper end of their interval (n,).
+
+    Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
+    """
+    kinds = passive_elements(model)
+    kind = np.array([kinds.get(name, -1) for name in model.parameters])
+    force = np.where(kind < 0, 0.0, np.abs(values) * highest**kind)
+    lowest = [bounds.get(name, (0.0, None))[0] for name in model.parameters]
+    allowed = np.array([low is None or low < 0 for low in lowest])
+    known = (kind >= 0) & np.isfinite(values)
+    wrong = known & (high < 0) & (force > 1e-9 * np.nan_to_num(force).max()) & ~allowed
+    if not wrong.any():
+        return []
+    why = "a sign, a unit or the model may be wrong"
+    if len({*kind[wrong]}) > 1 and (wrong == known).all():
+        why = "does a force or a reading have the other sign?"
+    elif (wrong == known & (kind == 1)).all():
+        why = "are the phases counted the other way (lag, not lead)?"
+    listed = ", ".join(f"{model.parameters[j]} = {values[j]:.6g}" for j in np.flatnonzero(wrong))
+    what = " or ".join(dict.fromkeys(KINDS[k] for k in kind[wrong]))
+    verb = "is" if np.count_nonzero(wrong) == 1 else "are"
+    return [f"{listed} {verb} negative, which no passive {what} is: {why}"]

@@ -1,13 +1,14 @@
 """Fit a model in time to records: the methods behind one function.
 
 Levenberg–Marquardt from the start, and from others where the model at the first minimum does not describe the
-record. The methods of [Q] and [F] stand
-beside it as they are printed.
+record. The methods of [Q] and [F] stand beside it as they are printed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,28 +17,23 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
-from rotorid.identify.integrators import HEUN
-from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.quasilinearization import FINER, quasilinearization
+from rotorid.identify.ode import OdeModel, SimulationError, check_known
+from rotorid.identify.quasilinearization import grid, quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
-from rotorid.identify.records import Record, for_copies, inputs_of, recorded_starts, refined
+from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit, Minimum
-from rotorid.identify.sensitivity_steps import sensitivity_steps
+from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
 from rotorid.identify.simulation import simulate
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
 
-WEIGHINGS = 20
-"""Fits at most with weights from the residuals of the last one."""
-OTHERS, LONG = 7, 20
-"""Starts besides, where the first minimum does not describe the record, or the end of a search so long."""
-BETTER = 1.5
-"""Ratio of the sums of squares from which on another minimum is the better one."""
 MOST_STARTS = 10_000
-SAME = 1e-3
-"""Relative difference of parameters below which two minima are one."""
-Trajectories = Mapping[str, ArrayLike]
+METHODS: tuple[Method[None], ...] = (
+    Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
+    Method("gauss-newton", "whole steps without safeguards, as [F]", None),
+    Method("quasilinearization", "linear fits about the last trajectory, as [Q]", None),
+)
 Searching = Callable[[Problem, FloatArray], Iterations]
 
 
@@ -51,7 +47,7 @@ def fit(  # noqa: PLR0913
     start: Mapping[str, float] | None = None,
     loss: str = "linear",
     starts: int | None = None,
-    trajectory: Trajectories | None = None,
+    trajectory: Mapping[str, ArrayLike] | None = None,
     max_iterations: int = 100,
     tolerance: float | None = None,
     rtol: float = RTOL,
@@ -111,95 +107,78 @@ def fit(  # noqa: PLR0913
     [1.003] True
     """
     several = (records,) if isinstance(records, Record) else tuple(records)
-    _check(model, several, method, integrator, loss, starts, trajectory, max_iterations, tolerance, weigh)
+    count = 1 if starts is None else starts
+    if min(max_iterations, count) < 1 or count > MOST_STARTS:
+        raise ValueError(f"starts and max_iterations must be at least 1, and starts at most {MOST_STARTS:,}")
+    if not 0 < (1.0 if tolerance is None else tolerance) < np.inf:
+        raise ValueError(f"the tolerance is a number above 0, not {tolerance:g}")
+    _check(model, several, method, integrator, loss, weigh)
     problem = Problem(model, several, integrator, rtol)
-    limits, names = problem.model.bounds, problem.model.parameters
-    given = recorded_starts(model, problem.records) | for_copies(model, len(several), start or {})
-    begin = inside(_start(problem.model, given), limits[:, 0], limits[:, 1])
+    (low, high), names = problem.model.bounds.T, problem.model.parameters
+    begin = inside(_start(problem, start or {}), low, high)
     prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
     if ridge or not weigh:
         problem.prior = prior
 
     def search(problem: Problem, theta: FloatArray) -> Iterations:
+        near = (1e-8, 1e-5) if tolerance is None else (1e-6, 0.1)
         if method == "gauss-newton":
-            return sensitivity_steps(problem, theta, max_iterations=max_iterations, epsilon=tolerance)
+            steps = sensitivity_steps(problem, theta, near)
+            return iterate(problem, "Gauss–Newton", steps, max_iterations, tolerance)
         if method == "quasilinearization":
-            first = [_trajectory(problem, theta, k, trajectory) for k in range(len(several))]
-            return quasilinearization(problem, theta, first, max_iterations=max_iterations, epsilon=tolerance)
-        return minimum(problem, theta, limits, loss, max_iterations)
+            first = _first_states(problem, theta, trajectory)
+            return quasilinearization(problem, theta, first, near, max_iterations, tolerance)
+        problem.evaluate(theta)  # says why, where the states diverge
+        reached = nonlinear_least_squares(
+            problem.residual,
+            problem.jacobian,
+            theta,
+            names=names,
+            sigma_stated=problem.scaled,
+            bounds={name: (a, b) for name, a, b in zip(names, low, high, strict=True)},
+            loss=loss,
+            max_iterations=max_iterations,
+            near=loss == "linear",
+            prior=problem.prior,
+        )
+        return Iterations(**vars(reached))
 
-    begins = spread_starts(begin, limits, starts or 1, seed)
-    paths, more, poor = _searched(search, problem, begins), "", None
-    if starts is None and method == "levenberg-marquardt":
-        first = paths[0]
-        poor = misfit(problem, first.estimate.dof, first.estimate.residuals, loss)
-        paths, more = _from_elsewhere(problem, begin, first, search, seed) if poor else (paths, "")
-    path = min(paths, key=lambda path: _cost(problem, path))
-    minima = _merged(problem, paths) if starts and starts > 1 else ()
+    begins = spread_starts(begin, problem.model.bounds, count, seed)
+    paths, more = _searched(search, problem, begins), ""
+    path = min(paths, key=_cost)
+    ended = path.converged or path.iterations > 20
+    if starts is None and method == "levenberg-marquardt" and ended:
+        others = spread_starts(begin, problem.model.bounds, 7, seed)[1:]
+        path, more = _from_elsewhere(search, problem, path, others, loss)
     if weigh:
         problem, path = _weighed(search, problem, path)
-        if len(prior):
-            if not (path.converged and problem.errors):
-                raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
-            problem.prior = prior
-            paths = _searched(search, problem, [path.estimate.solution, *begins[1:]])
-            minima = _merged(problem, paths) if len(begins) > 1 else ()
-            path = min(paths, key=lambda path: _cost(problem, path)).after(path.history)
-    judged = judge(problem, path, loss, None if weigh or more else poor)
-    outside = (path.estimate.solution < limits[:, 0]) | (path.estimate.solution > limits[:, 1])
-    warnings = [*judged.warnings, more]
+    if weigh and len(prior):
+        if not (path.converged and problem.errors):
+            raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
+        problem.prior = prior
+        paths = _searched(search, problem, [path.estimate.solution, *begins[1:]])
+        path = min(paths, key=_cost).after(path.history)
+    minima = _merged(paths) if len(begins) > 1 else ()
+    judged, theta = judge(problem, path, loss), path.estimate.solution
+    warnings = [*judged.pop("warnings"), more]
     if len(minima) > 1:
         warnings.append(f"{len(minima)} different minima were found; the best is given, see minima")
-    if outside.any():
-        warnings.append(f"{method} knows no bounds, and the result lies outside those of the model")
-    runs = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
+    outside = bool(((theta < low) | (theta > high)).any())
+    warnings += [f"{method} knows no bounds, and the result lies outside those of the model"] * outside
+    runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
     return Fit(
-        **(vars(path) | {"estimate": judged.estimate}),
+        **(vars(path) | judged),
         models=problem.models,
         records=problem.records,
         method=method,
         integrator=runs[0].integrator if runs else integrator,
         loss=loss,
-        reliable=judged.reliable,
         warnings=tuple(filter(None, warnings)),
         simulations=runs,
         minima=minima,
-        integration_change=judged.integration_change,
-        autocorrelation=judged.autocorrelation,
-        residual_rms=float(np.sqrt(np.mean(problem.plain(path.estimate.residuals) ** 2))),
+        residual_rms=float(np.sqrt(np.mean((path.estimate.residuals / problem.scale) ** 2))),
         errors=problem.errors or None,
-        prior=judged.prior,
-        normal_matrix=judged.normal_matrix,
     )
-
-
-METHODS: tuple[Method[None], ...] = (
-    Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
-    Method("gauss-newton", "whole steps without safeguards, as [F]", None),
-    Method("quasilinearization", "linear fits about the last trajectory, as [Q]", None),
-)
-OF_TEXTS = ("gauss-newton", "quasilinearization")
-
-
-def minimum(
-    problem: Problem, start: FloatArray, limits: FloatArray, loss: str, max_iterations: int
-) -> Iterations:
-    """Levenberg–Marquardt from a start (n,)."""
-    problem.evaluate(start)  # says why, where the states diverge
-    names = problem.model.parameters
-    reached = nonlinear_least_squares(
-        problem.residual,
-        problem.jacobian,
-        start,
-        names=names,
-        sigma_stated=problem.scaled,
-        bounds={name: (low, high) for name, (low, high) in zip(names, limits.tolist(), strict=True)},
-        loss=loss,
-        max_iterations=max_iterations,
-        near=loss == "linear",
-        prior=problem.prior,
-    )
-    return Iterations(**vars(reached))
 
 
 def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) -> list[FloatArray]:
@@ -231,114 +210,101 @@ def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) 
 
 
 def _searched(
-    search: Searching, problem: Problem, begins: Sequence[FloatArray], least: list[Iterations] | None = None
+    search: Searching, problem: Problem, begins: Sequence[FloatArray], paths: Sequence[Iterations] = ()
 ) -> list[Iterations]:
-    """A search from each start; one from which the states diverge is left out, if there is another."""
-    paths: list[Iterations] = []
-    failure: SimulationError | None = None
-    for begin in begins:
+    """Further searches; one from which the states diverge is left out, if there is another."""
+    done = [*paths]
+    for i, begin in enumerate(begins):
         try:
-            paths.append(search(problem, begin))
-        except SimulationError as error:
-            failure = failure or error
-    if not paths and least is None and failure is not None:
-        raise failure
-    return paths
+            done.append(search(problem, begin))
+        except SimulationError:
+            if not done and i == len(begins) - 1:
+                raise
+    return done
 
 
 def _from_elsewhere(
-    problem: Problem, begin: FloatArray, first: Iterations, search: Searching, seed: int
-) -> tuple[list[Iterations], str]:
-    """A better minimum than the first, from other starts, and words; or the first."""
-    if not (first.converged or first.iterations > LONG):
-        return [first], ""
-
-    others = spread_starts(begin, problem.model.bounds, OTHERS, seed)[1:]
-    paths = [first, *_searched(search, problem, others, [])]
-    best = min(paths, key=lambda path: _cost(problem, path))
-    if _cost(problem, first) <= BETTER * _cost(problem, best):
-        return [first], ""
-    return [best], (
+    search: Searching, problem: Problem, path: Iterations, begins: Sequence[FloatArray], loss: str
+) -> tuple[Iterations, str]:
+    """A better minimum from other starts and words, where the first does not describe the record."""
+    if not misfit(problem, path.estimate.dof, path.estimate.residuals, loss):
+        return path, ""
+    paths = _searched(search, problem, begins, [path])
+    best = min(paths, key=_cost)
+    if _cost(path) <= 1.5 * _cost(best):
+        return path, ""
+    return best, (
         "from the starting values the search ends where the model does not describe the record; this is from "
         f"another of {counted(len(paths), 'start')} (--start names better ones)"
     )
 
 
-def _trajectory(
-    problem: Problem, theta: FloatArray, number: int, given: Trajectories | None
-) -> tuple[FloatArray, FloatArray]:
-    """States to begin quasilinearization with, at the times of `refined`, and their slopes."""
-    model, record = problem.models[number], problem.records[number]
-    finer = refined(record, FINER if problem.integrator not in HEUN else 1)
-    if given is None:
-        x = simulate(model, theta, finer, integrator=problem.integrator, sensitivities=False).x
-        return x, model.f(finer.t, x, theta, inputs_of(model, finer))[..., 0]
-    states = [np.broadcast_to(np.asarray(given[x], dtype=float), record.t.shape) for x in model.states]
-    columns = [np.interp(finer.t, record.t, column) for column in states]
-    x = np.array(columns).reshape(-1, len(finer)).T
-    return x, np.asarray(np.gradient(x, finer.t, axis=0)) if len(finer) > 1 else np.zeros_like(x)
+def _first_states(
+    problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
+) -> list[FloatArray]:
+    """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
+    made, states = [], problem.model.states
+    if given is not None and {*given} != {*states}:
+        raise ValueError(
+            f"a starting trajectory needs every state ({', '.join(states)}); got {', '.join(given)}"
+        )
+    for model, (finer, at) in zip(problem.models, map(partial(grid, problem), problem.records), strict=True):
+        if given is None:
+            integrator = problem.integrator
+            made.append(simulate(model, theta, finer, integrator=integrator, sensitivities=False).x)
+        else:
+            columns = [np.broadcast_to(np.asarray(given[n], dtype=float), len(at)) for n in states]
+            made.append(np.transpose([np.interp(finer.t, finer.t[at], x) for x in columns]))
+    return made
 
 
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
-    """Weights from the residuals of the last fit, until they stay."""
-    for _ in range(WEIGHINGS if path.converged else 0):
+    """Weights from the residuals of the last fit, until they stay, or 20 times."""
+    for _ in range(20 if path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
-        if not errors or (
-            problem.errors
-            and all(abs(size - problem.errors[name]) <= 0.002 * size for name, size in errors.items())
-        ):
+        last = problem.errors
+        if all(abs(size - last.get(name, np.inf)) <= 0.002 * size for name, size in errors.items()):
             break
-        problem = problem.weighed(errors)
+        problem = problem.again(problem.integrator, problem.rtol, errors)
         path = search(problem, path.estimate.solution).after(path.history)
     return problem, path
 
 
-def _cost(problem: Problem, path: Iterations) -> float:
-    return problem.cost(path.estimate.residuals, path.estimate.solution)
+def _cost(path: Iterations) -> float:
+    return float(path.costs[-1])
 
 
-def _merged(problem: Problem, paths: Sequence[Iterations]) -> tuple[Minimum, ...]:
+def _merged(paths: Sequence[Iterations]) -> tuple[Minimum, ...]:
     """Different minima, the best first."""
-    kept: list[tuple[FloatArray, float, int]] = []
-    for path in sorted((p for p in paths if p.converged), key=lambda p: _cost(problem, p)):
-        reached, theta = _cost(problem, path), path.estimate.solution
-        for i, (other, least, count) in enumerate(kept):
+    kept: list[Minimum] = []
+    for path in sorted((p for p in paths if p.converged), key=_cost):
+        theta, cost = path.estimate.solution, _cost(path)
+        for i, one in enumerate(kept):
+            other = np.array([*one.values.values()])
             # parameters that are not determined may differ at the same cost
-            near = np.abs(theta - other) <= SAME * np.maximum(np.abs(theta), np.abs(other)) + 1e-12
-            if near.all() or (not path.estimate.full_rank and abs(reached - least) <= 1e-6 * least):
-                kept[i] = other, least, count + 1
+            alike = not path.estimate.full_rank and cost - one.cost <= 1e-6 * one.cost
+            if alike or np.allclose(theta, other, rtol=1e-3, atol=1e-12):
+                kept[i] = replace(one, starts=one.starts + 1)
                 break
         else:
-            kept.append((theta, reached, 1))
-    names = problem.model.parameters
-    return tuple(
-        Minimum(dict(zip(names, theta.tolist(), strict=True)), least, count) for theta, least, count in kept
-    )
+            kept.append(Minimum(dict(zip(path.names, theta.tolist(), strict=True)), cost, 1))
+    return tuple(kept)
 
 
-def _start(model: OdeModel, given: Mapping[str, float]) -> FloatArray:
-    values = dict(zip(model.parameters, model.start.tolist(), strict=True))
-    for name, value in given.items():
-        if name not in values:
-            raise ValueError(f"start: {name} is no parameter; parameters are {', '.join(values)}")
-        values[name] = float(value)
-    theta = np.array(list(values.values()))
+def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:
+    """Starting values (n,): those given, else what the records say, else the model's."""
+    model, values = problem.given, dict(zip(problem.model.parameters, problem.model.start, strict=True))
+    values |= recorded_starts(model, problem.records)
+    given = for_copies(model, len(problem.records), given)
+    check_known("start", given, "parameter", values)
+    theta = np.array([*(values | given).values()], dtype=float)
     if not np.isfinite(theta).all():
         raise ValueError("starting values must be finite numbers")
     return theta
 
 
-def _check(  # noqa: PLR0913
-    model: OdeModel,
-    records: Sequence[Record],
-    method: str,
-    integrator: str,
-    loss: str,
-    starts: int | None,
-    trajectory: Trajectories | None,
-    max_iterations: int,
-    tolerance: float | None,
-    weigh: bool,
+def _check(
+    model: OdeModel, records: Sequence[Record], method: str, integrator: str, loss: str, weigh: bool
 ) -> None:
     """Refuse what does not go together."""
     if not model.parameters:
@@ -346,20 +312,10 @@ def _check(  # noqa: PLR0913
             "the model has nothing to estimate: put NAME = STARTING VALUE into the table [estimate] of its "
             "file"
         )
-    find(METHODS, method, "method")
-    if trajectory is not None and set(trajectory) != set(model.states):
-        raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(model.states)}); got "
-            f"{', '.join(trajectory)}"
-        )
-    if method in OF_TEXTS and loss != "linear":
+    if find(METHODS, method, "method").name != "levenberg-marquardt" and loss != "linear":
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
         raise ValueError("quasilinearization integrates with heun, sequential-heun, or error control (auto)")
-    if max_iterations < 1 or not 1 <= (starts or 1) <= MOST_STARTS or starts == 0:
-        raise ValueError(f"starts and max_iterations must be at least 1, and starts at most {MOST_STARTS:,}")
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        raise ValueError(f"the tolerance is a number above 0, not {tolerance:g}")
     stated = any(record.sigma is not None for record in records)
     if weigh and stated:
         raise ValueError("standard deviations are stated: there is nothing to estimate them for")

@@ -1,26 +1,38 @@
-"""Equation error, K θ = Y of [S] (9): linear regression of the equations with the measured amplitudes.
+"""Where output error starts: equation error, K θ = Y of [S] (9), and the parameters from its combinations.
 
-Measured amplitudes stand in K, so that their errors bias the estimate: it is where output error starts, and
-the answer only where a model cannot predict. All rows count alike, as in the lessons. With stated errors a
-row's error is Σ A_s δZ_s with the coefficients A_s at the estimate, plus that of the frequency; inputs are
-exact.
+Measured amplitudes stand in K, so that their errors bias the estimate: it is the answer only where a model
+cannot predict. All rows count alike, as in the lessons, and what they leave tells their errors.
+
+The combinations are polynomials in the parameters. As many independent ones as there are unknowns, the
+simplest first, are solved: unknowns that they link by a Gröbner basis of rational numbers, one after the
+other by its roots. Where that would take long, the start is left to a search (`starting_values`). All
+combinations together then refine each solution, weighted by their errors, and refuse those that they
+contradict.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 from rotorid.base.text import listing
 from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.combinations import Polynomial, only_determined, ratio_words, sum_words
-from rotorid.identify.operator_model import HarmonicModel
-from rotorid.identify.recovery import Recovery, System, recover
-from rotorid.regression import gain, least_squares
+from rotorid.identify.combinations import (
+    Expression,
+    Polynomial,
+    only_determined,
+    ratio_words,
+    sum_words,
+    why_several,
+)
+from rotorid.identify.operator_model import HarmonicModel, products_of_powers
+from rotorid.regression import least_squares, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.undetermined_combinations import echelon
 
@@ -28,38 +40,69 @@ RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
 ROUNDING = 1e-13
 """A part of a row that is smaller than this share of its terms is what rounding leaves of zero."""
+GAUGE = 0.7318
+"""Value given to a parameter that nothing determines while the others are solved for."""
+SAME = 1e-6
+"""Relative difference below which two solutions are one; also of what is nearly real."""
+STEPS = 50
+"""Of the refinement, at most: it ends where nothing is gained."""
+MOST = 30
+"""Solutions, real or not, of linked unknowns that are still looked for, by the product of degrees."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Equations of all experiments, and which of their real rows are used.
+class System:
+    """Combinations `matrix @ monomials(θ) / below @ monomials(θ) = values`: sums, and ratios of sums.
 
     Attributes
     ----------
-    K, Y
-        (n, 2·equations, u) and (n, 2·equations), real and imaginary parts in turn; zero where left out.
-    used
-        (n, 2·equations).
-    constants, coefficients
-        (features,) and (features, u): a feature's coefficient is constants + coefficients @ u.
-    multipliers
-        (n, features), p^k with what varies from row to row.
-    left_out, warnings
-        In words.
+    names
+        Of the n parameters.
+    exponents
+        Of the monomials (m, n); a row of zeros is 1.
+    matrix, below
+        (q, m).
+    values, covariance
+        (q,), and (q, q) or None.
     """
 
-    K: FloatArray
-    Y: FloatArray
-    used: BoolArray
-    constants: FloatArray
-    coefficients: FloatArray
-    multipliers: ComplexArray
-    left_out: tuple[str, ...]
-    warnings: tuple[str, ...]
+    names: tuple[str, ...]
+    exponents: FloatArray
+    matrix: FloatArray
+    values: FloatArray
+    covariance: FloatArray | None
+    below: FloatArray
 
-    def real_rows(self) -> tuple[FloatArray, FloatArray]:
-        """Used rows K (m, u), Y (m,)."""
-        return self.K[self.used], self.Y[self.used]
+    def combinations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (q,) at the parameters (n,), and their derivatives (q, n)."""
+        monomials, slopes = products_of_powers(self.exponents, theta)
+        bottom = self.below @ monomials
+        values = self.matrix @ monomials / bottom
+        return values, ((self.matrix - values[:, None] * self.below) @ slopes) / bottom[:, None]
+
+
+class Recovery(NamedTuple):
+    """Parameters recovered from combinations.
+
+    Attributes
+    ----------
+    solutions
+        All real ones, (n,) each; complete, also where `undetermined` says that a value is arbitrary.
+    undetermined
+        (n,) mask: parameters that the combinations do not fix at all.
+    values
+        Parameters with one value in all solutions; NaN for the others.
+    gain
+        (n, q): change of the parameters per change of the combinations; NaN rows where nobody knows.
+    reasons
+        In words, why there are several solutions or none.
+    """
+
+    solutions: tuple[FloatArray, ...]
+    undetermined: BoolArray
+    values: FloatArray
+    gain: FloatArray
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,46 +111,32 @@ class LinearFit:
 
     Attributes
     ----------
-    model, rows
-        The equations, and their rows.
     estimate, K, Y
         The regression: its unknowns, rows (m, u) and (m,).
-    solution
-        Of all unknowns, those that the others are given relative to included (as 1).
+    used, left_out
+        Which real rows of the experiments these are, (n, 2·equations); the others in words.
     fixed
-        (u,): 1 for these, else 0.
-    picks
-        Combinations of its unknowns that the data determine, (q, u).
-    groups
-        Unknowns that may all be multiplied by one factor; of these only ratios are determined.
+        1 for each of all unknowns that others are given relative to, else 0.
     system, words, recovery
-        The combinations (q,) as functions of the parameters, in words, and the parameters from them.
-    values, gain
-        Parameters (n,), NaN where undetermined, and their change per change of the combinations (n, q); what
-        stands alone in the equations is known without a real solution, too.
+        The combinations (q,) that the data determine as functions of the parameters, in words, and the
+        parameters from them; what stands alone in the equations is known without a real solution, too.
+    reasons
+        Why parameters have no one value, in words.
     """
 
-    model: HarmonicModel
-    rows: Rows
     estimate: Estimate
     K: FloatArray
     Y: FloatArray
-    solution: FloatArray
+    used: BoolArray
+    left_out: tuple[str, ...]
     fixed: FloatArray
-    picks: FloatArray
-    groups: tuple[IntArray, ...]
     system: System
     words: tuple[str, ...]
     recovery: Recovery
-    values: FloatArray
-    gain: FloatArray
+    reasons: tuple[str, ...]
 
 
-def linear_fit(
-    model: HarmonicModel,
-    experiments: Experiments,
-    rows: Rows | None = None,
-) -> LinearFit:
+def linear_fit(model: HarmonicModel, experiments: Experiments) -> LinearFit:
     """Regression of the equations, and the parameters that follow.
 
     Raises
@@ -115,201 +144,302 @@ def linear_fit(
     ValueError
         If a signal of the model was measured nowhere or no complete row remains.
     """
-    rows = rows or build_rows(model, experiments)
-    groups = _groups(model, rows)
-    fixed = _as_one(rows, groups)
-    kept, every = np.flatnonzero(fixed == 0), np.arange(len(fixed))
-    estimate, solution = _regress(model, experiments, rows, fixed)
-    K, Y = rows.real_rows()
+    K, Y, used, left_out = build_rows(model, experiments)
+    combos = model.combinations
+    groups, fixed = _relative(model, K, Y, np.nonzero(used)[1] // 2)
+    kept, right = np.flatnonzero(fixed == 0), Y - K @ fixed
+    names = [combos.words[i] for i in kept]
+    alike = len({*names}) < len(names)  # in six digits
+    estimate = least_squares(K[:, kept], right, names=None if alike else names, rcond=RCOND)
     picks = np.eye(len(kept)) if estimate.full_rank else np.array(echelon(estimate.row_space))
-    picks = picks.reshape(-1, len(kept))[: 0 if len(groups) and not fixed.any() else None]
-    whole = np.zeros((len(picks), len(fixed)))
+    picks = picks.reshape(-1, len(kept))[: 0 if groups and not fixed.any() else None]
+    whole, below = np.zeros((2, len(picks), len(fixed)))
     whole[:, kept] = picks
-    below = np.zeros_like(whole)
     for group in groups:
-        below[whole[:, group].any(axis=1)] = np.where(np.isin(every, group), fixed, 0.0)
-    spread = estimate.solution_covariance
-    covariance = None if spread is None else picks @ spread @ picks.T
-    to_monomials = model.combinations.rows
-    above, under, values = whole @ to_monomials, below @ to_monomials, whole @ solution
-    system = System(model.parameters, model.exponents[1:], above, values, covariance, under)
-    words = tuple(
-        model.combinations.words[int(np.argmax(pick != 0))]
-        if not bottom.any() and np.count_nonzero(pick) == 1
-        else ratio_words(_polynomial(model, top), _polynomial(model, bottom))
-        if bottom.any()
-        else sum_words(_polynomial(model, top))
-        for pick, top, bottom in zip(whole, above, under, strict=True)
+        below[np.ix_(whole[:, group].any(axis=1), group)] = fixed[group]
+    spread, to_monomials = estimate.solution_covariance, np.pad(combos.rows, ((0, 0), (1, 0)))
+    under = below @ to_monomials
+    under[~below.any(axis=1), 0] = 1.0
+    system = System(
+        names=model.parameters,
+        exponents=model.exponents,
+        matrix=whole @ to_monomials,
+        values=picks @ estimate.solution,
+        covariance=None if spread is None else picks @ spread @ picks.T,
+        below=under,
     )
+    words = []
+    for pick, top, bottom in zip(whole, system.matrix, under, strict=True):
+        plain, alone = bottom[0] == 1.0, np.flatnonzero(pick)
+        if plain and len(alone) == 1:
+            words.append(combos.words[alone[0]])
+        else:
+            above, beneath = (_polynomial(model, row) for row in (top, bottom))
+            words.append(sum_words(above) if plain else ratio_words(above, beneath))
     recovery = recover(system)
-    found, change = recovery.values, recovery.gain
     for i, name in enumerate(words if not recovery.solutions else ()):
         if name in model.parameters:
             j = model.parameters.index(name)
-            found[j], change[j] = values[i], np.eye(len(words))[i]
-    return LinearFit(
-        model=model,
-        rows=rows,
-        estimate=estimate,
-        K=K[:, kept],
-        Y=Y - K @ fixed,
-        solution=solution,
-        fixed=fixed,
-        picks=picks,
-        groups=groups,
-        system=system,
-        words=words,
-        recovery=recovery,
-        values=found,
-        gain=change,
-    )
-
-
-def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
-    """Evaluate the model's equations at the measured amplitudes; ValueError as in `linear_fit`."""
-    measured = (*model.outputs, *model.inputs)
-    for name in measured:
-        if np.isnan(experiments.table([name])).all():
-            given = ", ".join(experiments.signals) or "none"
-            kind = "input" if name in model.inputs else "signal"
-            raise ValueError(
-                f"the {kind} {name} of the model is not among the measurements (they have {given}); "
-                "measure it, or make it known or a parameter"
-            )
-    combos, n, equations = model.combinations, len(experiments), len(model.equations)
-    factors = model.multipliers(experiments.frequencies, experiments.varying)
-    odd = model.power % 2 == 1
-    warnings: tuple[str, ...] = ()
-    if experiments.free.any() and odd.any():
-        factors[np.ix_(experiments.free, odd)] = 0
-        warnings = (
-            "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there",
-        )
-    constants, C = model.coefficients[:, 0], model.coefficients[:, 1:][:, combos.pivots] / combos.scales
-    amplitudes = np.column_stack((experiments.table(measured), np.ones(n)))
-    phi = factors * amplitudes[:, model.column]
-    of_equation = np.eye(equations)[model.equation]
-    lost = np.isnan(phi) @ of_equation > 0
-    phi = np.where(np.isnan(phi), 0, phi)
-    both = np.column_stack((C, -constants))
-    # (n, equations, u + 1): K and Y side by side, and the sizes of what they are sums of
-    whole = np.einsum("nf,fe,fu->neu", phi, of_equation, both)
-    sizes = ROUNDING * np.einsum("nf,fe,fu->neu", np.abs(phi), of_equation, np.abs(both)).sum(axis=2)
-    parts = np.stack((whole.real, whole.imag), axis=2)
-    parts[lost] = 0
-    # rows of zeros say nothing and are no degrees of freedom (undamped models)
-    used = ~lost[:, :, None] & (np.abs(parts) > sizes[:, :, None, None]).any(axis=3)
-    used[experiments.free, :, 1] = False
-    if not used.any():
-        raise ValueError(
-            "no equation can be used: in every experiment an amplitude that it needs was not measured or is 0"
-        )
-    table = dict(zip(measured, amplitudes.T, strict=False)) | dict(experiments.varying)
-    left_out = []
-    for i, e in np.argwhere(lost):
-        own = (f for f in model.features if f.equation == e)
-        needed = dict.fromkeys(name for f in own for name in (f.signal, *dict(f.varying)) if name)
-        names = ", ".join(name for name in needed if np.isnan(table[name][i]))
-        left_out.append(f"experiment {experiments.names[i]}, equation {e + 1} ({names} not measured)")
-    flat = parts.reshape(n, 2 * equations, -1)
-    used = used.reshape(n, -1)
-    return Rows(flat[:, :, :-1], flat[:, :, -1], used, constants, C, factors, tuple(left_out), warnings)
-
-
-def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u: FloatArray) -> FloatArray:
-    """Covariance of each experiment's real rows, (n, 2·equations, 2·equations), at unknowns (u,)."""
-    n, equations = len(experiments), len(model.equations)
-    terms = rows.multipliers * (rows.constants + rows.coefficients @ u)
-    of_equation = np.eye(equations)[model.equation]
-    total = np.zeros((n, 2 * equations, 2 * equations))
-    slope = np.zeros((n, equations), dtype=complex)  # by the logarithm of the frequency
-    for s, name in enumerate(model.outputs):
-        a = (terms * (model.column == s)) @ of_equation
-        moved = (terms * (model.column == s) * model.power) @ of_equation
-        slope += moved * np.nan_to_num(experiments.table([name]))
-        tall = np.stack((np.stack((a.real, -a.imag), -1), np.stack((a.imag, a.real), -1)), 2)
-        tall = tall.reshape(n, 2 * equations, 2)
-        total += tall @ experiments.covariance(name) @ np.swapaxes(tall, 1, 2)
-    if experiments.frequency_std is not None:
-        relative = experiments.frequency_std / experiments.frequencies
-        own = np.stack((slope.real, slope.imag), axis=2).reshape(n, -1) * relative[:, None]
-        total += own[:, :, None] * own[:, None, :]
-    return total
-
-
-def _regress(
-    model: HarmonicModel, experiments: Experiments, rows: Rows, fixed: FloatArray
-) -> tuple[Estimate, FloatArray]:
-    """The estimate of the unknowns that are not fixed, and the solution of all of them."""
-    kept, words = np.flatnonzero(fixed == 0), model.combinations.words
-    names = [words[i] if words.count(words[i]) == 1 else f"{words[i]} [{i + 1}]" for i in kept]
-    K, Y = rows.real_rows()
-    estimate = least_squares(K[:, kept], Y - K @ fixed, names=names, rcond=RCOND)
-    solution = fixed.copy()
-    solution[kept] = estimate.solution
-    if experiments.stated:
-        G, place = gain(K[:, kept], rcond=RCOND), np.nonzero(rows.used)
-        errors = row_covariance(model, experiments, rows, solution)
-        same = place[0][:, None] == place[0]
-        spread = G @ np.where(same, errors[place[0][:, None], place[1][:, None], place[1]], 0.0) @ G.T
-        estimate = replace(estimate, solution_covariance=spread, errors_stated=True)
-    return estimate, solution
-
-
-def _groups(model: HarmonicModel, rows: Rows) -> tuple[IntArray, ...]:
-    """Groups of regression unknowns that may all be multiplied by one factor: right sides are 0.
-
-    Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    holds: BoolArray = np.zeros((len(model.equations), rows.coefficients.shape[1]), dtype=bool)
-    np.logical_or.at(holds, model.equation, rows.coefficients != 0)
-    count, part = connected_components(holds @ holds.T)
-    known: BoolArray = np.asarray(rows.Y.reshape(len(rows.Y), -1, 2).any(axis=(0, 2)))
-    groups = (
-        np.flatnonzero(holds[part == k].any(axis=0)) for k in range(count) if not known[part == k].any()
-    )
-    return tuple(group for group in groups if len(group))
-
-
-def _as_one(rows: Rows, groups: Sequence[IntArray]) -> FloatArray:
-    """1 for each unknown that others are given relative to, else 0, (u,).
-
-    It is the first of its group that is surely not zero.
-    """
-    fixed = np.zeros(rows.coefficients.shape[1])
-    for group in groups:
-        K = rows.real_rows()[0][:, group]
-        scale = np.linalg.norm(K, axis=0)
-        share = np.abs(np.linalg.svd(K / np.where(scale == 0, 1.0, scale))[2][-1])
-        fixed[group[np.argmax(share > 0.1 * share.max())]] = 1.0
-    # where each unknown is alone with its factor, nothing is given relative to another
-    return np.zeros_like(fixed) if fixed.all() else fixed
-
-
-def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
-    return {model.monomials[j]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
-
-
-def reasons(fit: LinearFit, more: str) -> tuple[str, ...]:
-    """Why parameters have no one value, in words; `more` says whether other experiments can tell more."""
-    model, recovery, estimate = fit.model, fit.recovery, fit.estimate
-    words = []
+            recovery.values[j], recovery.gain[j] = system.values[i], np.eye(len(words))[i]
+    reasons = []
     if recovery.undetermined.any():
-        lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
-        words.append(only_determined(model.parameters, lost, fit.words))
-    for group in fit.groups:
-        loose = [model.combinations.words[i] for i in group]
-        if set(loose) <= set(model.parameters):
-            words.append(
+        lost = np.array(model.parameters)[recovery.undetermined].tolist()
+        reasons.append(only_determined(model.parameters, lost, words))
+    for group in groups:
+        loose = [combos.words[i] for i in group]
+        if {*loose} <= {*model.parameters}:
+            reasons.append(
                 f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
                 "in their equations: no experiment of this kind tells more than ratios; make one of them "
                 "known"
             )
     if not estimate.full_rank:
-        words.append(
-            f"these experiments determine {estimate.rank} of the {len(estimate.names)} combinations that the "
-            f"model could show; {more}"
+        reasons.append(
+            f"these experiments determine {estimate.rank} of the {len(kept)} combinations that the model "
+            "could show"
         )
-    return (*words, *recovery.reasons)
+    reasons += recovery.reasons
+    parts = K[:, kept], right, used, left_out, fixed, system, tuple(words), recovery, tuple(reasons)
+    return LinearFit(estimate, *parts)
+
+
+def build_rows(
+    model: HarmonicModel, experiments: Experiments
+) -> tuple[FloatArray, FloatArray, BoolArray, tuple[str, ...]]:
+    """Real rows K (m, u), Y (m,) at the measured amplitudes; which these are; what was left out, in words.
+
+    They are the marked ones of each experiment's (n, 2·equations), real and imaginary parts in turn. Raises
+    as `linear_fit`.
+    """
+    names, n, equations = (*model.outputs, *model.inputs), len(experiments), len(model.equations)
+    measured = experiments.table(names)
+    for name, values in zip(names, measured.T, strict=True):
+        if np.isnan(values).all():
+            raise ValueError(
+                f"the {'input' if name in model.inputs else 'signal'} {name} of the model is not among the "
+                f"measurements (they have {', '.join(experiments.signals) or 'none'}); measure it, or make "
+                "it known or a parameter"
+            )
+    factors = model.multipliers(experiments.frequencies, experiments.varying)
+    factors[np.ix_(experiments.free, model.power % 2 == 1)] = 0  # in free vibration p² = −ω²
+    phi = factors * np.column_stack((measured, np.ones(n)))[:, model.column]
+    of_equation = np.eye(equations)[model.equation]
+    lost = np.isnan(phi) @ of_equation > 0
+    phi[np.isnan(phi)] = 0
+    # (n, equations, u + 1): K and Y side by side, and the sizes of what they are sums of
+    both = np.column_stack((model.of_unknowns, -model.coefficients[:, 0]))
+    whole = np.einsum("nf,fe,fu->neu", phi, of_equation, both)
+    size = ROUNDING * np.einsum("nf,fe,fu->neu", np.abs(phi), of_equation, np.abs(both)).sum(axis=2)
+    parts = np.stack((whole.real, whole.imag), axis=2)
+    # rows of zeros say nothing and are no degrees of freedom (undamped models)
+    used = ~lost[:, :, None] & (np.abs(parts) > size[:, :, None, None]).any(axis=3)
+    used[experiments.free, :, 1] = False
+    if not used.any():
+        raise ValueError(
+            "no equation can be used: in every experiment an amplitude that it needs was not measured or is 0"
+        )
+    table, left_out = dict(zip(names, measured.T, strict=True)) | dict(experiments.varying), []
+    for i, e in np.argwhere(lost):
+        parts_of = (f for f in model.features if f.equation == e)
+        needed = dict.fromkeys(name for f in parts_of for name in (f.signal, *dict(f.varying)) if name)
+        missing = ", ".join(name for name in needed if np.isnan(table[name][i]))
+        left_out.append(f"experiment {experiments.names[i]}, equation {e + 1} ({missing} not measured)")
+    return parts[used][:, :-1], parts[used][:, -1], used.reshape(n, -1), tuple(left_out)
+
+
+def _relative(
+    model: HarmonicModel, K: FloatArray, Y: FloatArray, equation: IntArray
+) -> tuple[tuple[IntArray, ...], FloatArray]:
+    """Groups of unknowns that may all be multiplied by one factor, for the right sides of their rows are 0.
+
+    Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
+    Beside: 1 for the first unknown of each group that is surely not zero, to which others are relative.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    holds = np.zeros((len(model.equations), K.shape[1]), dtype=bool)
+    np.logical_or.at(holds, model.equation, model.of_unknowns != 0)
+    known = np.bincount(equation, Y != 0, len(holds)) > 0
+    groups, fixed = [], np.zeros(K.shape[1])
+    count, part = connected_components(holds @ holds.T)
+    for k in range(count):
+        group = np.flatnonzero(holds[part == k].any(axis=0))
+        if known[part == k].any() or not len(group):
+            continue
+        scale = np.linalg.norm(K[:, group], axis=0)
+        share = np.abs(np.linalg.svd(K[:, group] / np.where(scale == 0, 1.0, scale))[2][-1])
+        fixed[group[np.argmax(share > 0.1 * share.max())]] = 1.0
+        groups.append(group)
+    # where each unknown is alone with its factor, nothing is given relative to another
+    return tuple(groups), np.zeros_like(fixed) if fixed.all() else fixed
+
+
+def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
+    return {model.monomials[j - 1]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
+
+
+def several(solutions: Sequence[FloatArray]) -> BoolArray:
+    """Which parameters (n,) differ between solutions."""
+    table = np.array(solutions)
+    return np.asarray(np.ptp(table, axis=0) > SAME * np.abs(table).max(axis=0))
+
+
+def recover(system: System) -> Recovery:
+    """Solve for the parameters."""
+    n, q = len(system.names), len(system.values)
+    gain, values = np.full((n, q), np.nan), np.full(n, np.nan)
+    if not q:
+        return Recovery((), np.ones(n, dtype=bool), values, gain)
+    J = system.combinations(np.random.default_rng(5).uniform(0.6, 1.7, n))[1]  # at a general point
+    size = np.linalg.norm(J, axis=1, keepdims=True)
+    seen = least_squares(J / np.where(size > 0, size, 1.0), np.zeros(q), rcond=1e-9)
+    # of those that are open the last are fixed, one per dimension of the null space
+    free = sorted({int(np.flatnonzero(row)[0]) for row in echelon(seen.row_space)})
+    undetermined, weight, solutions = np.isnan(seen.values), _weights(system), list[FloatArray]()
+    starts = _candidates(system, free, J[:, free])
+    refined = [_refined(system, start, free, weight) for start in starts or ()]
+    fits = sorted(((_misfit(system, end), end) for end in refined), key=lambda one: one[0])
+    for misfit, theta in fits:
+        again = any(np.allclose(theta, other, rtol=SAME, atol=0) for other in solutions)
+        if misfit <= max(1.0, 3 * fits[0][0]) and np.isfinite(misfit) and not again:
+            solutions.append(theta)
+    if not solutions:
+        reason = "no real values of the parameters give the estimated combinations"
+        if starts is None:
+            reason = "the estimated combinations do not lead back to the parameters in a few steps"
+        return Recovery((), undetermined, values, gain, (reason,))
+    solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
+    lost = several(solutions) | undetermined
+    gain[free] = solution(weight @ system.combinations(solutions[0])[1][:, free], weight, rcond=1e-13)
+    gain[undetermined] = np.nan
+    reasons = why_several(solutions, system.names, np.flatnonzero(lost & ~undetermined).tolist())
+    values = np.where(lost, np.nan, solutions[0])
+    return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons))
+
+
+def _candidates(system: System, free: list[int], J: FloatArray) -> list[FloatArray] | None:
+    """All real solutions (n,) for the free unknowns, the others at `GAUGE`; None: nobody knows them.
+
+    J are derivatives (q, free) at a general point.
+    """
+    from scipy.linalg import qr
+    from scipy.sparse.csgraph import connected_components
+
+    powers = [[Fraction(e).limit_denominator(50).denominator for e in row] for row in system.exponents]
+    roots = np.lcm.reduce(powers, axis=0)[free]  # 2 where sqrt(k) stands in the model
+    exponents = np.round(system.exponents[:, free] * roots).astype(int)
+    rows = system.matrix - system.values[:, None] * system.below
+    rows = rows * np.prod(np.delete(GAUGE**system.exponents, free, axis=1), axis=1)
+    stands = (rows != 0) @ (exponents != 0)
+    simple = 4.0 ** -(np.count_nonzero(rows, axis=1) + stands.sum(axis=1))
+    sizes = simple / np.fmax(np.linalg.norm(J, axis=1), 1e-300)
+    chosen = qr((J * sizes[:, None]).T, mode="r", pivoting=True)[1][: len(free)]
+    solutions = [np.full(len(system.names), GAUGE)]
+    count, part = connected_components(stands[chosen].T @ stands[chosen])
+    for k in range(count):
+        inside = np.flatnonzero(part == k)
+        ends = _solved(rows[chosen][stands[chosen][:, inside].any(axis=1)], exponents[:, inside])
+        if ends is None:
+            return None
+        ends = [end ** roots[inside] for end in ends if (end[roots[inside] > 1] >= 0).all()]
+        places = np.array(free)[inside]
+        solutions = [_put(theta, places, end) for theta in solutions for end in ends]
+    return solutions
+
+
+def _solved(rows: FloatArray, exponents: IntArray) -> list[FloatArray] | None:
+    """Real zeros (u,) of polynomials (u, m) in monomials with exponents (m, u); None: not in a few steps."""
+    from sympy import QQ, ring
+    from sympy.polys.groebnertools import groebner
+
+    unknowns = exponents.shape[1]
+    R, polynomials = ring([f"x{j}" for j in range(unknowns)], QQ)[0], []
+    for row in rows:
+        powers, place = np.unique(exponents[row != 0], axis=0, return_inverse=True)
+        lowest = powers.min(axis=0)  # an unknown that all of several terms have is not 0
+        powers = powers - (lowest if len(powers) > 1 else lowest.clip(None, 0))
+        each = zip(powers.tolist(), np.bincount(place.ravel(), row[row != 0]).tolist(), strict=True)
+        polynomials.append(R.from_dict({tuple(e): QQ(*x.as_integer_ratio()) for e, x in each if x}))
+    if math.prod(max(map(sum, p), default=0) for p in polynomials) > MOST:
+        return None
+    basis = groebner(polynomials, R)
+    solutions = [np.zeros(unknowns)] if all(any(p.degrees()) for p in basis) else []
+    for j in reversed(range(unknowns) if solutions else ()):
+        stairs = [p for p in basis if p.degrees()[j] and not any(p.degrees()[:j])]
+        if not stairs:
+            return None
+        stairs.sort(key=lambda p: p.degrees()[j])
+        solutions = [_put(one, j, root) for one in solutions for root in _real_roots(stairs, j, one)]
+    return solutions
+
+
+def _real_roots(polynomials: Sequence[Expression], j: int, behind: FloatArray) -> list[float]:
+    """Real roots for unknown j of the first polynomial whose degree stays, at the values of those behind."""
+    for p in polynomials:
+        powers, x = np.array(p.monoms()), np.array([float(x) for x in p.coeffs()])
+        terms = x * np.prod(behind[j + 1 :] ** powers[:, j + 1 :], axis=1)
+        line = np.bincount(powers[:, j], terms)[::-1]
+        if abs(line[0]) > SAME * np.abs(terms[powers[:, j] == len(line) - 1]).sum():
+            break
+    return [float(root.real) for root in np.roots(line) if abs(root.imag) <= SAME * abs(root)]
+
+
+def _put(values: FloatArray, places: IntArray | int, new: FloatArray | float) -> FloatArray:
+    whole = values.copy()
+    whole[places] = new
+    return whole
+
+
+def _weights(system: System) -> FloatArray:
+    """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
+    if system.covariance is None:
+        return np.diag(1.0 / np.where(system.values != 0, np.abs(system.values), 1.0))
+    scale = np.maximum(np.sqrt(np.diag(system.covariance)), 1e-14 * np.abs(system.values) + 1e-100)
+    shares = system.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(shares)) / scale)
+
+
+def _refined(system: System, theta: FloatArray, free: list[int], weight: FloatArray) -> FloatArray:
+    """Least squares of all combinations from a solution (n,) of some, by Gauss–Newton steps."""
+    best, lowest = theta, np.inf
+    for _ in range(STEPS):
+        with np.errstate(all="ignore"):
+            values, J = system.combinations(theta)
+            left = weight @ (system.values - values)
+        if not left @ left < lowest:
+            break
+        best, lowest, theta = theta, float(left @ left), theta.copy()
+        theta[free] += solution(weight @ J[:, free], left, rcond=1e-13)
+    return best
+
+
+def _misfit(system: System, theta: FloatArray) -> float:
+    """Largest error of a combination in units of what rounding and four standard deviations allow."""
+    monomials = np.abs(products_of_powers(system.exponents, theta)[0])
+    size = np.abs(system.matrix) @ monomials / (np.abs(system.below) @ monomials)
+    size += np.abs(system.values) + 1e-300
+    std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
+    error = np.abs(system.combinations(theta)[0] - system.values)
+    return float(np.nan_to_num(error / (1e-6 * size + 4 * std), nan=np.inf).max())
+
+
+def passive_elements(model: HarmonicModel) -> dict[str, int]:
+    """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
+
+    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite.
+    """
+    e, kinds_of = len(model.equations), dict[str, int]()
+    for j, name in enumerate(model.parameters if len(model.outputs) == e else ()):
+        (m, *others) = np.flatnonzero(model.exponents[:, j])
+        used = np.flatnonzero(model.coefficients[:, m])
+        kinds = {*model.power[used].tolist()}
+        alone = not others and np.abs(model.exponents[m]).sum() == model.exponents[m, j] == 1
+        if not alone or len(kinds) > 1 or not kinds <= {0, 1, 2}:
+            continue
+        S = np.zeros((e, len(model.signals) + 1))
+        S[model.equation[used], model.column[used]] = model.coefficients[used, m]
+        S = S[:, :e]
+        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
+        if passive and not any(model.features[f].varying for f in used):
+            (kinds_of[name],) = kinds
+    return kinds_of

@@ -1,4 +1,4 @@
-"""Modes from amplitudes around resonances, the measurements that [S] lesson 7 begins with.
+"""Modes from amplitudes around resonances, with which [S] lesson 7 begins, and from run-ups and run-downs.
 
 The search begins at the peaks and their circles; errors are those of the fitted amplitudes.
 """
@@ -11,27 +11,31 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.identify.answers import Answers
-from rotorid.identify.modes_readings import Readings, Whitened
-from rotorid.identify.modes_result import FittedModes
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.identify.amplitudes import trusted
+from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
+from rotorid.identify.modes_result import RARE, FittedModes, Readings, projected
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.search import together
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
-TRUSTED = 3.0
-"""Farther than this factor from a reading the fit does not set its error."""
 CLEARLY = 3.0
 """By so much more likely (logarithm, of as many readings as are spare) errors must be of one size."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
+NOISE = 5.0
+"""Standard deviations of a vector that are no peak."""
+SAME = 1e-9
+"""So much beyond its ends a speed is still one of a sweep."""
+SLOWEST, NEIGHBOURS = 3, 7
+"""So many vectors of the slowest are the run-out, where peaks are looked for; so many around a speed lie on
+a parabola, but for what modes explain."""
+Bands = Sequence[tuple[float, float]]
 
 
 def fit_modes(
-    readings: Readings,
-    answers: Answers,
-    bands: Sequence[tuple[float, float]] | None = None,
-    around: Sequence[tuple[float, float]] | None = None,
+    readings: Readings, answers: Answers, bands: Bands | None = None, around: Bands | None = None
 ) -> FittedModes:
     """Fit modes to amplitudes around resonances.
 
@@ -52,17 +56,17 @@ def fit_modes(
     ValueError
         Where there is no peak, bands overlap, and where readings are fewer than unknowns.
     """
-    read = ~np.isnan(readings.vectors).all(axis=1)
+    w, read = readings.speeds, ~np.isnan(readings.vectors).all(axis=1)
     if bands is not None:
-        read &= np.any([(readings.speeds >= low) & (readings.speeds <= high) for low, high in bands], axis=0)
+        read &= np.any([(w >= low) & (w <= high) for low, high in bands], axis=0)
     if not read.any():
         raise ValueError("there are no readings in --bands")
-    order = np.flatnonzero(read)[np.argsort(readings.speeds[read], kind="stable")]
+    order = np.flatnonzero(read)[np.argsort(w[read], kind="stable")]
     readings, answers = readings.take(order), answers.take(order)
     omega, Z = readings.speeds, readings.vectors
     H = (Z.T / answers.excitation).T
     sections = sorted(bands or around or peak_bands(omega, H))
-    if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
+    if any(low < high for (_, high), (low, _) in pairwise(sections if bands else ())):
         raise ValueError("--bands overlap: each holds one mode")
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
     spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
@@ -73,33 +77,33 @@ def fit_modes(
         )
     q = np.transpose([_circle(omega[row], H[row]) for row in rows]).ravel()
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
-    if readings.covariances is not None or readings.shares is not None:
-        return FittedModes(readings, answers, *_search(readings, answers, q, ends)[1:], ends, "")
+    stated = readings.covariances is not None or readings.shares is not None
+    share = _search(readings, answers, q, ends, stated=stated)
+    if stated:
+        return FittedModes(readings, answers, *share[1:], ends, "")
     size = replace(readings, covariances=np.broadcast_to(np.eye(2), (*Z.shape, 2, 2)))
-    share, other = (_search(each, answers, q, ends, stated=False) for each in (readings, size))
-    likely = other[0] >= share[0] + CLEARLY
-    same = "size everywhere" if likely else "share of every amplitude"
-    return FittedModes(readings, answers, *(other if likely else share)[1:], ends, same)
+    other = _search(size, answers, q, ends, stated=False)
+    if other[0] >= share[0] + CLEARLY:
+        return FittedModes(readings, answers, *other[1:], ends, "size everywhere")
+    return FittedModes(readings, answers, *share[1:], ends, "share of every amplitude")
 
 
 def _search(
-    readings: Readings,
-    answers: Answers,
-    q: FloatArray,
-    ends: Sequence[tuple[float, float]],
-    *,
-    stated: bool = True,
-) -> tuple[float, NonlinearEstimate, Whitened]:
-    """Likelihood (its logarithm but for a constant), fit, and the readings over their errors."""
+    readings: Readings, answers: Answers, q: FloatArray, ends: Bands, *, stated: bool
+) -> tuple[float, NonlinearEstimate, FloatArray]:
+    """Likelihood (its logarithm but for a constant), fit, and inverse roots of the readings' covariances."""
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(ends) + 1)]
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
     limits = [*((low / 2, 2 * high) for low, high in ends), *[answers.damping] * len(ends)]
     amplitudes = Z = readings.vectors
     for turn in range(ROUNDS):
-        whitened = Whitened(answers, Z, readings.inverse_roots(amplitudes))
+        root = readings.roots(amplitudes)
+
+        def both(q: FloatArray, root: FloatArray = root) -> tuple[AnyArray, ...]:
+            return projected(answers.basis(q), Z, root)
+
         fit = nonlinear_least_squares(
-            whitened.rest,
-            whitened.slopes,
+            *together(both),
             q,
             names=names,
             sigma_stated=stated,
@@ -107,13 +111,10 @@ def _search(
             near=turn > 0,
         )
         q = fit.estimate.solution
-        model = whitened.model(q)
-        ratio = np.abs(model) / np.abs(Z)
-        amplitudes = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
-    r = fit.estimate.residuals
-    size = np.abs(np.linalg.det(whitened.root[~np.isnan(Z)]))
+        amplitudes = trusted(answers.basis(q)[0] @ both(q)[2].T, Z)
+    r, size = fit.estimate.residuals, np.abs(np.linalg.det(root[~np.isnan(Z)]))
     likely = np.log(size).mean() - np.log(np.fmax(r @ r, 1e-300))
-    return float(likely * fit.estimate.dof / 2), fit, whitened
+    return float(likely * fit.estimate.dof / 2), fit, root
 
 
 def peak_bands(
@@ -149,8 +150,8 @@ def peak_bands(
     sections = []
     for peak, (first, last) in zip(peaks, pairwise(valleys), strict=True):
         rows = np.arange(first, last + 1)
-        near = rows[(level[rows] > level[peak] - np.log(SKIRT)) | (np.abs(rows - peak) < 2)]
-        sections.append((float(omega[near[0]]), float(omega[near[-1]])))
+        near = omega[rows[(level[rows] > level[peak] - np.log(SKIRT)) | (np.abs(rows - peak) < 2)]]
+        sections.append((float(near[0]), float(near[-1])))
     return sections
 
 
@@ -160,12 +161,126 @@ def _circle(omega: FloatArray, H: ComplexArray) -> tuple[float, float]:
     It is linear in s, which all points share, and in c and a of each (Kennedy and Pancu, 1947).
     """
     H = H[:, ~np.isnan(H).all(axis=0)]
-    H = np.where(np.isnan(H), np.nanmean(H, axis=0), H)
-    v = omega**2
-    line = np.stack((np.ones_like(v), v / v.mean()), axis=1)
+    H, v = np.where(np.isnan(H), np.nanmean(H, axis=0), H), omega**2
+    line = np.vander(v / v.mean(), 2)
     rest = H - line @ (np.linalg.pinv(line) @ H)
     s = np.vdot(rest, H * v[:, None]) / (np.vdot(rest, rest).real or 1.0)
     if not v[0] < s.real < v[-1]:
         return float(omega[np.abs(H).sum(axis=1).argmax()]), 0.01
     damping = s.imag / (2 * s.real)
     return float(np.sqrt(s.real)), float(np.copysign(np.clip(abs(damping), 1e-6, 0.5), damping))
+
+
+def fit_sweep(sweep: Readings, *, steady: bool = False, bands: Bands | None = None) -> FittedModes:
+    """Fit modes to the vectors of a sweep.
+
+    Parameters
+    ----------
+    sweep
+        Its times tell the acceleration; then the modes as if every speed had been held stand beside.
+    steady
+        The acceleration does not matter, or nobody knows it.
+    bands
+        As of `fit_modes`.
+
+    Raises
+    ------
+    ValueError
+        As `fit_modes`.
+    """
+    held = SteadyAnswers(sweep.speeds, (sweep.speeds**2).astype(np.complex128))
+    if steady or sweep.time is None:
+        return _fit(sweep, held, bands)
+    fit = _fit(sweep, swept_answers(sweep.time, sweep.speeds), bands)
+    return replace(fit, steady=fit_modes(sweep, held, bands, fit.ends))
+
+
+def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
+    """Modes around the peaks of what differs from the slowest vectors, but for those that are noise."""
+    around = None
+    if not bands:
+        order = np.argsort(sweep.speeds, kind="stable")
+        Z = sweep.vectors[order]
+        slow = [z[~np.isnan(z)][:SLOWEST].mean() for z in Z.T]
+        around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
+    while True:
+        fit = fit_modes(sweep, answers, bands, around)
+        noise = fit.by_noise()
+        if not around or len(around) == 1 or noise.max() <= RARE:
+            return fit
+        del around[int(noise.argmax())]
+
+
+def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
+    """What no speed changes: run-out, and modes far below. Vectors (C,) and covariances of their parts."""
+    k = len(fit.ends)
+    vectors, covariances = fit.predicted(lambda q: np.eye(k + 2, dtype=complex)[-1:] * q[0] ** 2)
+    return vectors[0], covariances[0]
+
+
+def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArray]:
+    """Mean of the vectors at or below a speed, rad/s: (C,), and covariances of their parts, NaN of one alone.
+
+    Raises
+    ------
+    ValueError
+        For a sensor without a vector there.
+    """
+    slow = sweep.take(np.flatnonzero(sweep.speeds <= speed))
+    read, words = ~np.isnan(slow.vectors), sweep.labels.speed_words
+    count = read.sum(axis=0)
+    if not count.all():
+        raise ValueError(
+            f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
+            f"{words(speed)}; the lowest speed is {words(float(sweep.speeds.min()))}"
+        )
+    mean, variances = np.nanmean(slow.vectors, axis=0), slow.covariances
+    if variances is None:  # as the vectors scatter
+        off = slow.vectors - mean
+        parts = np.stack((off.real, off.imag), axis=-1)
+        free = np.where(count > 1, 1 - 1 / count, np.nan)[:, None, None]
+        variances = parts[..., None] * parts[..., None, :] / free
+    return mean, np.where(read[..., None, None], variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
+
+
+def vectors_when_passing(
+    sweep: Readings, speeds: FloatArray, modes: FittedModes | None = None
+) -> tuple[ComplexArray, FloatArray]:
+    """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
+
+    Of the modes, where these explain the sweep; else what they leave of the nearest vectors lies on a
+    parabola.
+
+    Raises
+    ------
+    ValueError
+        For a speed that the sweep does not pass, and for too few vectors near it.
+    """
+    low, high = float(sweep.speeds.min()), float(sweep.speeds.max())
+    if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
+        first, last, other = (sweep.labels.speed_words(float(each)) for each in (low, high, beyond[0]))
+        raise ValueError(f"--speeds: run {sweep.run!r} goes from {first} to {last}, not to {other}")
+    vectors, rest = np.zeros((len(speeds), len(sweep.sensors)), dtype=complex), sweep.vectors
+    if modes is not None and modes.explains:
+        answers = modes.answers.at(speeds)
+        return modes.predicted(lambda q: answers.basis(q)[0])
+    if modes is not None:
+        vectors, rest = modes.curve(speeds), rest - modes.curve(sweep.speeds)
+    covariances = np.zeros((*vectors.shape, 2, 2))
+    for m, c in np.ndindex(vectors.shape):
+        seen, x = np.flatnonzero(~np.isnan(rest[:, c])), sweep.speeds - speeds[m]
+        rows = seen[np.argsort(np.abs(x[seen]), kind="stable")[:NEIGHBOURS]]
+        if len(rows) < NEIGHBOURS:
+            raise ValueError(
+                f"--speeds: run {sweep.run!r} has {len(rows)} vectors of sensor {sweep.sensors[c]!r}, and "
+                f"{NEIGHBOURS} are needed to find what lies between them"
+            )
+        parabola = np.vander(x[rows] / np.abs(x[rows]).max(), 3)
+        solve = np.linalg.pinv(parabola)
+        left = rest[rows, c] - parabola @ (solve @ rest[rows, c])
+        variance = np.vdot(left, left).real / (2 * NEIGHBOURS - 6)
+        if sweep.covariances is not None:
+            variance = max(variance, np.trace(sweep.covariances[rows, c], axis1=1, axis2=2).mean() / 2)
+        vectors[m, c] += solve[2] @ rest[rows, c]
+        covariances[m, c] = variance * (solve[2] @ solve[2]) * np.eye(2)
+    return vectors, covariances

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -25,8 +24,10 @@ from rotorid.base.arrays import FloatArray
 from rotorid.identify import expressions
 from rotorid.identify.expression_functions import Compiled, Expression, jacobian, real, signs
 
+BIG = 2.0**60
+"""So large a state or input that nothing of its slope is lost beside constants."""
 UNROLLED = 300
-"""Products in f_x S up to which they are written out: quicker than matrices of this size."""
+"""Products in f_x S below which they are written out."""
 
 
 class SimulationError(ValueError):
@@ -85,21 +86,21 @@ class OdeModel:
 
     def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Rates of the states, then their derivatives by states and parameters, (*B, n_x, 1 + n_x + n_p)."""
-        table = _values(self._rates_table, t, x, theta, u)
+        table = self._values("rates", t, x, theta, u)
         if self.inertia:
             inverse, slopes = self._inverse(theta)
-            table = np.moveaxis(np.tensordot(inverse, table, (1, -2)), 0, -2)
-            moved = np.tensordot(np.tensordot(inverse, slopes, (1, 1)), table[..., 0], (2, -1))
-            table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-2, -1))
+            table = inverse @ table
+            moved = np.tensordot(inverse @ slopes, table[..., 0], (2, -1))
+            table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-1, -2))
         return table
 
     def h(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Outputs, then their derivatives by states and parameters, (*B, n_y, 1 + n_x + n_p)."""
-        return _values(self._outputs_table, t, x, theta, u)
+        return self._values("observed", t, x, theta, u)
 
     def x0(self, theta: ArrayLike) -> FloatArray:
         """Initial states, then their derivatives by the parameters, (n_x, 1 + n_p)."""
-        return self._initial_table.one(np.asarray(theta).tolist())
+        return self._alone("initial", theta)
 
     def matrices(self, theta: ArrayLike) -> FloatArray:
         """[A b B] of a linear model, then its derivatives by each parameter, (1 + n_p, n_x, n_x + 1 + n_u).
@@ -111,34 +112,33 @@ class OdeModel:
         """
         if not self.linear_driven:
             raise ValueError("this model is not linear with constant coefficients; it has no matrices")
-        table = self._affine_table.one(np.asarray(theta).tolist())
-        if self.inertia:
-            inverse, slopes = self._inverse(theta)
-            table[0] = inverse @ table[0]
-            table[1:] = inverse @ (table[1:] - slopes @ table[0])
-        return table
-
-    def rate(self, t: float, x: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates at one point, quickly, (n_x,)."""
-        values = self._rates_alone.one([t, *x.tolist(), *theta.tolist(), *u.tolist()])
-        return np.asarray(self._inverse(theta)[0] @ values) if self.inertia else values
+        n, nu = len(self.states), len(self.inputs)
+        # where one state or input is BIG and the others 0, and where all are 0
+        points = BIG * np.insert(np.eye(n + nu), n, 0.0, axis=0)
+        table = self.f(np.zeros(len(points)), points[:, :n], theta, points[:, n:])
+        columns = np.delete(table, np.s_[1 : 1 + n], axis=-1)
+        others = np.arange(n + 1 + nu) != n
+        columns[others] = (columns[others] - columns[n]) / BIG
+        return np.moveaxis(columns, (0, 2), (2, 0))
 
     def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates of the states and of S = ∂x/∂θ behind them, row by row, quickly, (n_x (1 + n_p),)."""
-        if self._unrolled is not None:
-            return self._unrolled.one([t, *z.tolist(), *theta.tolist(), *u.tolist()])
-        n = len(self.states)
+        """Rates of the states, and of S = ∂x/∂θ where it stands behind them, row by row, (size,)."""
+        n, size = len(self.states), len(z)
+        if n * size < UNROLLED and not self.inertia:
+            made = self.memory.get(size) or self.memory.setdefault(size, self._unrolled(size > n))
+            return np.asarray(made.one([t, *z.tolist(), *theta.tolist(), *u.tolist()]))
         table = self.f(t, z[:n], theta, u)
-        slopes = table[:, 1 : 1 + n] @ z[n:].reshape(n, -1) + table[:, 1 + n :]
-        return np.concatenate([table[:, 0], slopes.reshape(-1)])
+        slopes = table[:, 1 : 1 + n] @ z[n:].reshape(n, -1) + (table[:, 1 + n :] if size > n else 0.0)
+        return np.concatenate([table[:, 0], slopes.ravel()])
 
     @cached_property
     def linear_driven(self) -> bool:
         """Whether dx/dt = A x + b + B u with constant A, b and B: no explicit time."""
-        varying = {"t", *self.states, *self.inputs}
+        by = [s for s in self.symbols if s.name in {*self.states, *self.inputs}]
         # such as sign(v): its derivative is 0, but it is not constant
-        parts = [*self._affine, *(part for e in self.rates for part in signs(e))] if self.states else []
-        return bool(self.states) and not any(expressions.names(e) & varying for e in parts)
+        parts = [part for e in self.rates for part in (*map(e.diff, by), *signs(e))]
+        varying = {"t", *self.states, *self.inputs}
+        return bool(self.states) and not self.timed and not any(expressions.names(e) & varying for e in parts)
 
     @cached_property
     def timed(self) -> bool:
@@ -148,145 +148,75 @@ class OdeModel:
     @cached_property
     def driven(self) -> bool:
         """Whether inputs stand in the rates."""
-        return any(expressions.names(e) & set(self.inputs) for e in self.rates)
+        return any(expressions.names(e) & {*self.inputs} for e in self.rates)
 
     @cached_property
     def fixed_at_first(self) -> list[int]:
         """Outputs that known initial values fix at the first time: no parameter stands in them there."""
-        put = dict(zip(self._symbols["states"], self.initial, strict=True))
-        parameters = {*self.parameters} if self.states else set()
-        first = (expressions.names(e.subs(put)) for e in self.observed)
-        return [i for i, used in enumerate(first) if self.states and not used & parameters]
+        put = dict(zip(self.symbols[1:], self.initial, strict=False))
+        first = [expressions.names(e.subs(put)) & {*self.parameters} for e in self.observed]
+        return [i for i, free in enumerate(first) if self.states and not free]
 
     @cached_property
     def known_initial(self) -> list[int]:
         """States whose initial values hold no parameter."""
         return [i for i, e in enumerate(self.initial) if not expressions.names(e) & {*self.parameters}]
 
-    @cached_property
-    def with_free_start(self) -> OdeModel:
-        """The model with its initial states as further parameters, behind the others."""
-        import sympy
-
-        names = tuple(f"{name}_at_node" for name in self.states)
-        while set(names) & {*self.parameters, *self.states, *self.inputs}:
-            names = tuple(f"{name}_" for name in names)
-        return replace(
-            self,
-            parameters=(*self.parameters, *names),
-            start=np.append(self.start, np.zeros(len(names))),
-            bounds=np.vstack((self.bounds, np.tile([-np.inf, np.inf], (len(names), 1)))),
-            initial=tuple(sympy.Symbol(name) for name in names),
-            t0=None,
-        )
-
     # -- expressions and their functions, made when needed
 
     @cached_property
-    def _rates_table(self) -> Compiled:
-        return self._table(self.rates)
-
-    @cached_property
-    def _outputs_table(self) -> Compiled:
-        return self._table(self.observed)
-
-    def _table(self, exprs: Sequence[Expression]) -> Compiled:
-        """With the derivatives by states and parameters."""
-        by = [*self._symbols["states"], *self._symbols["parameters"]]
-        return Compiled(self._arguments, jacobian(exprs, by), (len(exprs), 1 + len(by)))
-
-    @cached_property
-    def _rates_alone(self) -> Compiled:
-        return Compiled(self._arguments, self.rates, (len(self.states),))
-
-    @cached_property
-    def _initial_table(self) -> Compiled:
-        by = self._symbols["parameters"]
-        return Compiled(by, jacobian(self.initial, by), (len(self.states), 1 + len(by)))
-
-    @cached_property
-    def _affine_table(self) -> Compiled:
-        return self._stacked(self._affine, len(self.states) + 1 + len(self.inputs))
-
-    @cached_property
-    def _inertia_table(self) -> Compiled:
-        return self._stacked(self.inertia, len(self.states))
-
-    def _stacked(self, exprs: Sequence[Expression], columns: int) -> Compiled:
-        """A matrix with a row a state, and its derivative by each parameter."""
-        by = self._symbols["parameters"]
-        slopes = [e.diff(p) for p in by for e in exprs]
-        return Compiled(by, [*exprs, *slopes], (1 + len(by), len(self.states), columns))
-
-    @cached_property
-    def _symbols(self) -> dict[str, list[Any]]:
-        """Of states, parameters and inputs."""
+    def symbols(self) -> list[Any]:
+        """Of the time, the states, the parameters and the inputs."""
         import sympy
 
-        kinds = {"states": self.states, "parameters": self.parameters, "inputs": self.inputs}
-        return {kind: [sympy.Symbol(name) for name in names] for kind, names in kinds.items()}
+        return [*map(sympy.Symbol, ("t", *self.states, *self.parameters, *self.inputs))]
 
     @cached_property
-    def _arguments(self) -> list[Any]:
-        """Symbols of the time, the states, the parameters and the inputs."""
+    def memory(self) -> dict[Any, Any]:
+        """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
+        return {}
+
+    def _unrolled(self, whole: bool) -> Compiled:
+        """Rates of x, and of S if wanted, with the products of f_x S written out: quicker if they are few."""
         import sympy
 
-        return [sympy.Symbol("t"), *(symbol for kind in self._symbols.values() for symbol in kind)]
+        n, rates = len(self.states), sympy.Matrix(self.rates)
+        first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
+        S = sympy.Matrix(n, len(p), [sympy.Dummy() for _ in range(n * len(p))]) if whole else []
+        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if whole else []
+        exprs = [*rates, *slopes]
+        return Compiled([*first, *x, *S, *p, *u], exprs, (len(exprs),))
 
-    @cached_property
-    def _affine(self) -> list[Expression]:
-        """[A b B] row by row: slopes of r by states and inputs, and r where these are 0."""
-        states, inputs = self._symbols["states"], self._symbols["inputs"]
-        zero = dict.fromkeys([*states, *inputs], 0)
-        parts = [([r.diff(s) for s in states], r.subs(zero), [r.diff(s) for s in inputs]) for r in self.rates]
-        return [e for by_states, constant, by_inputs in parts for e in (*by_states, constant, *by_inputs)]
+    def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
+        """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
+        if what not in self.memory:
+            exprs, by = getattr(self, what), self.symbols[1 : 1 + len(self.states) + len(self.start)]
+            self.memory[what] = Compiled(self.symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
+        table: Compiled = self.memory[what]
+        parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
+        if np.ndim(t) == 0:
+            return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
+        return table.many(
+            np.shape(t), [t, *(column for part in parts for column in np.moveaxis(part, -1, 0))]
+        )
 
-    @cached_property
-    def _unrolled(self) -> Compiled | None:
-        """The products f_x S written out, where they are few."""
-        import sympy
-
-        states, parameters, arguments = self._symbols["states"], self._symbols["parameters"], self._arguments
-        n, k = len(states), len(parameters)
-        rows = [[rate.diff(x) for x in states] for rate in self.rates]
-        if self.inertia or k * sum(e != 0 for row in rows for e in row) > UNROLLED:
-            return None
-        slopes = [[sympy.Dummy() for _ in parameters] for _ in states]
-        exprs = list(self.rates)
-        for rate, row in zip(self.rates, rows, strict=True):
-            exprs += [
-                rate.diff(p) + sum(e * slopes[m][j] for m, e in enumerate(row) if e != 0)
-                for j, p in enumerate(parameters)
-            ]
-        symbols = [arguments[0], *states, *(s for row in slopes for s in row), *arguments[1 + n :]]
-        return Compiled(symbols, exprs, (n * (1 + k),))
+    def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
+        """Expressions of the parameters alone, with the derivatives by these."""
+        n = len(self.states)
+        table = self._values(what, 0.0, np.zeros(n), theta, np.zeros(len(self.inputs)))
+        return np.delete(table, np.s_[1 : 1 + n], axis=1)
 
     def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
-        values = np.asarray(theta, dtype=float)
-        if not self._latest or self._latest[0] != values.tobytes():
-            table = self._inertia_table.one(values.tolist())
+        values, n, memory = np.asarray(theta, dtype=float), len(self.states), self.memory
+        if memory.get("inverse at") != values.tobytes():
+            table = np.moveaxis(self._alone("inertia", values).reshape(n, n, -1), -1, 0)
             if not np.isfinite(table).all() or np.linalg.cond(table[0]) > 1e14:
                 shown = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.parameters, values, strict=True))
                 raise SimulationError(f"the mass matrix is singular at {shown or 'the known values'}")
-            self._latest[:] = values.tobytes(), np.linalg.inv(table[0]), table[1:]
-        _, inverse, slopes = self._latest
-        return inverse, slopes
-
-    @cached_property
-    def _latest(self) -> list[Any]:
-        return []
-
-
-def _values(table: Compiled, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
-    """At one point quickly, or at times (*B,)."""
-    if np.ndim(t) == 0:
-        return table.one([float(v) for part in (t, x, theta, u) for v in np.ravel(part).tolist()])
-    batch = np.shape(t)
-    columns = [np.moveaxis(np.broadcast_to(part, (*batch, np.shape(part)[-1])), -1, 0) for part in (x, u)]
-    return table.many(
-        batch, [np.asarray(t, dtype=float), *columns[0], *np.asarray(theta).tolist(), *columns[1]]
-    )
+            memory |= {"inverse at": values.tobytes(), "inverse": (np.linalg.inv(table[0]), table[1:])}
+        inverse: tuple[FloatArray, FloatArray] = memory["inverse"]
+        return inverse
 
 
 def ode_model(
@@ -344,39 +274,92 @@ def ode_model(
         raise ValueError(f'initial: t0 is the time of the initial values in s, or "first", not {t0!r}')
     if not states and not outputs:
         raise ValueError("a model needs states, or outputs of the time")
-    _check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs})
+    outputs = dict(outputs or {name: name for name in states})
+    _check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs}, outputs)
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
-    if extra := [name for name in initial if name not in states]:
-        raise ValueError(f"initial: {extra[0]} is no state; states are {', '.join(states) or 'none'}")
-    outputs = dict(outputs) if outputs else {name: name for name in states}
-    for name in outputs:
-        if not expressions.is_name(name) or name == "t":
-            raise ValueError(f"output {name!r} is no name; names are letters, digits and _, but not t")
-    if lost := [name for name in per_record if name not in estimate]:
-        raise ValueError(f"per_record: {lost[0]} is no parameter; parameters are {', '.join(estimate)}")
-    start = _finite(estimate, "parameter", "starting value")
-    numbers = _finite(known, "known value", "value")
-    everything = {"t", *states, *estimate, *inputs}
-    measured = _measured_states(initial, outputs, {*everything, *known})
-    initial |= {state: parameter for state, (parameter, _) in measured.items()}
-    recorded = dict(measured.values())
-    read = Reader(dict(zip(known, numbers, strict=True)))
+    check_known("initial", initial, "state", states)
+    check_known("per_record", per_record, "parameter", estimate)
+    _check_numbers("parameter", "starting value", estimate)
+    _check_numbers("known value", "value", known)
+    names = ["t", *states, *estimate, *inputs]
+    measured = [x for x in states if initial[x] == "record" and "record" not in (*names, *known)]
+    recorded: dict[str, str] = {}
+    for state in measured:
+        parameter = f"{state}_0"
+        while parameter in (*names, *known):
+            parameter += "_"
+        initial[state], recorded[parameter] = parameter, _measuring(state, outputs)
+    texts: dict[str, str] = {}
+
+    def read(kind: str, given: Mapping[str, float | str], allowed: Collection[str]) -> tuple[Expression, ...]:
+        """Expressions of the states or outputs."""
+        for name, text in given.items():
+            texts[f"{kind} {name}"] = text if isinstance(text, str) else repr(float(text))
+        return tuple(read_expression(text, f"{kind} {n}", allowed, known) for n, text in given.items())
+
     return OdeModel(
         states=tuple(states),
         parameters=(*estimate, *recorded),
         outputs=tuple(outputs),
         inputs=tuple(inputs),
-        start=np.array([*start, *(math.nan for _ in recorded)]),
-        known=dict(zip(known, numbers, strict=True)),
-        bounds=np.vstack((_limits(bounds or {}, estimate), np.tile([-np.inf, np.inf], (len(recorded), 1)))),
-        rates=tuple(read(e, f"state {name}", everything) for name, e in states.items()),
-        initial=tuple(read(initial[name], f"initial {name}", {*estimate, *recorded}) for name in states),
-        observed=tuple(read(e, f"output {name}", everything) for name, e in outputs.items()),
-        texts=read.texts,
+        start=np.array([*estimate.values(), *(math.nan for _ in recorded)], dtype=float),
+        known={name: float(value) for name, value in known.items()},
+        bounds=_limits(bounds or {}, estimate, len(recorded)),
+        rates=read("state", states, names),
+        initial=read("initial", {name: initial[name] for name in states}, (*estimate, *recorded)),
+        observed=read("output", outputs, names),
+        texts=texts,
         per_record=(*dict.fromkeys(per_record), *recorded),
         t0=t0,
         recorded=recorded,
+    )
+
+
+def read_expression(
+    text: float | str, where: str, allowed: Collection[str], known: Mapping[str, float]
+) -> Expression:
+    """Read one expression that may use the names allowed, and known ones, which become their numbers."""
+    import sympy
+
+    if not isinstance(text, str):
+        if isinstance(text, bool) or not np.isfinite(text):
+            raise ValueError(f"{where}: {text} is no finite number and no expression")
+        text = repr(float(text))
+    expr = expressions.parse(text, where=where)
+    usable = sorted({*allowed, *known})
+    for name in sorted(expressions.names(expr) - {*usable}):
+        near = difflib.get_close_matches(name, usable, n=1)
+        hint = f"did you mean {near[0]}?" if near else "put it under estimate, known or inputs"
+        if name == "t" or where.startswith("initial"):
+            hint = f"it may use {', '.join(usable) or 'numbers'}"
+        raise ValueError(f"{where}: {expressions.quote(text)}: {name} is not defined here; {hint}")
+    put = {sympy.Symbol(name): sympy.Rational(repr(float(value))) for name, value in known.items()}
+    value = real(expr.subs(put))
+    if value.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
+        raise ValueError(f"{where}: {expressions.quote(text)} has no finite real value with known values")
+    return value
+
+
+def check_known(where: str, names: Iterable[str], kind: str, known: Collection[str]) -> None:
+    """Refuse names that are none of a model."""
+    for name in names:
+        if name not in known:
+            raise ValueError(
+                f"{where}: {name} is no {kind}; {kind.split()[0]}s are {', '.join(known) or 'none'}"
+            )
+
+
+def _measuring(state: str, outputs: Mapping[str, str]) -> str:
+    """The output that measures a state, which begins as the record says."""
+    import sympy
+
+    for output, text in outputs.items():
+        if expressions.parse(str(text), where=f"output {output}") == sympy.Symbol(state):
+            return output
+    raise ValueError(
+        f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or other '
+        "states; give a number, or a parameter to be estimated"
     )
 
 
@@ -406,61 +389,14 @@ def with_nuisance(
     return texts, [f"{name}_{output}" for output in outputs for name in terms]
 
 
-class Reader:
-    """Reads expressions, puts known numbers in, and keeps the texts."""
-
-    def __init__(self, known: Mapping[str, float]) -> None:
-        self.exact = {name: Fraction(repr(value)) for name, value in known.items()}
-        self.texts: dict[str, str] = {}
-
-    def __call__(self, text: float | str, where: str, allowed: Collection[str]) -> Expression:
-        """Read one expression that may use the names allowed and the known ones."""
-        import sympy
-
-        if not isinstance(text, str):
-            if isinstance(text, bool) or not np.isfinite(text):
-                raise ValueError(f"{where}: {text} is no finite number and no expression")
-            text = repr(float(text))
-        self.texts[where] = text
-        expr = expressions.parse(text, where=where)
-        usable = sorted({*allowed, *self.exact})
-        for name in sorted(expressions.names(expr) - {*usable}):
-            near = difflib.get_close_matches(name, usable, n=1)
-            hint = f"did you mean {near[0]}?" if near else "put it under estimate, known or inputs"
-            if name == "t" or where.startswith("initial"):
-                hint = f"it may use {', '.join(usable) or 'numbers'}"
-            raise ValueError(f"{where}: {expressions.quote(text)}: {name} is not defined here; {hint}")
-        put = {sympy.Symbol(n): sympy.Rational(v.numerator, v.denominator) for n, v in self.exact.items()}
-        value = real(expr.subs(put))
-        if value.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
-            raise ValueError(f"{where}: {expressions.quote(text)} has no finite real value with known values")
-        return value
+def _check_numbers(kind: str, what: str, values: Mapping[str, float]) -> None:
+    """Refuse what is no finite number."""
+    for name, value in values.items():
+        if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+            raise ValueError(f"{kind} {name}: the {what} must be a finite number, not {value!r}")
 
 
-def _measured_states(
-    initial: Mapping[str, float | str], outputs: Mapping[str, str], names: Collection[str]
-) -> dict[str, tuple[str, str]]:
-    """New parameter, and the output that measures it, of each state that begins as the record says."""
-    import sympy
-
-    taken: dict[str, tuple[str, str]] = {}
-    wanted = [x for x, value in initial.items() if value == "record" and "record" not in names]
-    read = {expressions.parse(str(e), where=f"output {y}"): y for y, e in outputs.items()} if wanted else {}
-    for state in wanted:
-        output = read.get(sympy.Symbol(state))
-        if output is None:
-            raise ValueError(
-                f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or '
-                "other states; give a number, or a parameter to be estimated"
-            )
-        parameter = f"{state}_0"
-        while parameter in names:
-            parameter += "_"
-        taken[state] = parameter, output
-    return taken
-
-
-def _check_names(groups: Mapping[str, Collection[str]]) -> None:
+def _check_names(groups: Mapping[str, Collection[str]], outputs: Collection[str]) -> None:
     """Refuse names that are none, or used twice; `groups` by kind."""
     seen: dict[str, str] = {}
     for kind, names in groups.items():
@@ -476,25 +412,22 @@ def _check_names(groups: Mapping[str, Collection[str]]) -> None:
                 other = f"a {seen[name]}" if seen[name] != kind else "given"
                 raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
             seen[name] = kind
+    for name in outputs:
+        if not expressions.is_name(name) or name == "t":
+            raise ValueError(f"output {name!r} is no name; names are letters, digits and _, but not t")
 
 
-def _finite(values: Mapping[str, float], kind: str, what: str) -> list[float]:
-    for name, value in values.items():
-        number: object = value
-        if isinstance(number, bool | str) or not np.isscalar(number) or not np.isfinite(value):
-            raise ValueError(f"{kind} {name}: the {what} must be a finite number, not {value!r}")
-    return [float(value) for value in values.values()]
-
-
-def _limits(bounds: Mapping[str, tuple[float, float]], estimate: Mapping[str, float]) -> FloatArray:
-    """Bounds of all parameters, (n_p, 2)."""
+def _limits(
+    bounds: Mapping[str, tuple[float, float]], estimate: Mapping[str, float], more: int
+) -> FloatArray:
+    """Bounds of all parameters, (n_p, 2), without any for those that the records begin with."""
+    check_known("bounds", bounds, "parameter", estimate)
     for name, (low, high) in bounds.items():
-        if name not in estimate:
-            raise ValueError(f"bounds: {name} is no parameter; parameters are {', '.join(estimate)}")
         if not low < high:
             raise ValueError(f"bounds of {name}: the lower one, {low:g}, must be below the upper, {high:g}")
         if not low <= estimate[name] <= high:
             raise ValueError(
                 f"bounds of {name}: the starting value {estimate[name]:g} is outside {low:g} … {high:g}"
             )
-    return np.array([bounds.get(name, (-np.inf, np.inf)) for name in estimate]).reshape(-1, 2)
+    free = (-np.inf, np.inf)
+    return np.array([*(bounds.get(name, free) for name in estimate), *[free] * more]).reshape(-1, 2)

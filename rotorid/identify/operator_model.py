@@ -28,9 +28,6 @@ from rotorid.identify.combinations import (
     monomials_of,
 )
 
-MAC_SLACK = 0.02
-"""Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""
-
 
 @dataclass(frozen=True, eq=False)
 class HarmonicModel:
@@ -83,6 +80,11 @@ class HarmonicModel:
         return np.array([[float(f.exact.get(m, 0)) for m in (ONE, *self.monomials)] for f in self.features])
 
     @cached_property
+    def of_unknowns(self) -> FloatArray:
+        """Of the features in the combinations, the unknowns of regression, (features, u)."""
+        return self.coefficients[:, 1:][:, self.combinations.pivots] / self.combinations.scales
+
+    @cached_property
     def exponents(self) -> FloatArray:
         """Exponents of the parameters, (1 + monomials, parameters); row 0 is the constant 1."""
         powers = [dict(m) for m in (ONE, *self.monomials)]
@@ -106,9 +108,10 @@ class HarmonicModel:
 
     @cached_property
     def _place(self) -> FloatArray:
-        """Where the features stand in the equations, (f, equations · (1 + signals))."""
-        columns = 1 + len(self.signals)
-        return np.asarray(np.eye(len(self.equations) * columns)[self.equation * columns + self.column])
+        """Where the features stand in the equations, (f, equations, 1 + signals)."""
+        place = np.zeros((len(self.features), len(self.equations), 1 + len(self.signals)))
+        place[np.arange(len(place)), self.equation, self.column] = 1.0
+        return place
 
     def multipliers(
         self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -119,19 +122,16 @@ class HarmonicModel:
             raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
         # exact powers of i, so that a real row has no imaginary dust
         factors = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
-        for j, feature in enumerate(self.features):
-            for name, exponent in feature.varying:
-                if name not in rows:
-                    raise ValueError(
-                        f"{name} stands as a factor in the equations and is neither known nor estimated: "
-                        f"the measurements must have its value in every row (a column {name})"
-                    )
-                value = np.asarray(rows[name], dtype=float)
-                if exponent < 0 and (value == 0).any():
-                    raise ValueError(
-                        f"an equation divides by {name}, which is 0 in a row of the measurements"
-                    )
-                factors[:, j] *= value ** float(exponent)
+        every = [(j, *part) for j, feature in enumerate(self.features) for part in feature.varying]
+        for j, name, exponent in every:
+            if name not in rows:
+                raise ValueError(
+                    f"{name} stands as a factor in the equations and is neither known nor estimated: "
+                    f"the measurements must have its value in every row (a column {name})"
+                )
+            if exponent < 0 and not np.all(rows[name]):
+                raise ValueError(f"an equation divides by {name}, which is 0 in a row of the measurements")
+            factors[:, j] *= rows[name] ** float(exponent)
         return np.asarray(factors, dtype=complex)
 
     def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -154,15 +154,7 @@ class HarmonicModel:
             Known quantities (n,) that change from row to row, by name.
         """
         terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
-        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
-
-    def sizes(
-        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray]
-    ) -> FloatArray:
-        """Sums of the sizes of the terms of each coefficient, shape as of `matrices`."""
-        products = np.abs(products_of_powers(self.exponents, values)[0])
-        terms = np.abs(self.multipliers(frequencies, varying)) * (np.abs(self.coefficients) @ products)
-        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
+        return np.asarray(np.tensordot(terms, self._place, 1))
 
     def predict(
         self,
@@ -213,17 +205,16 @@ class HarmonicModel:
         numpy.linalg.LinAlgError
             At a resonance without damping.
         """
-        n, e = len(frequencies), len(self.outputs)
+        e, (P, dP) = len(self.outputs), self.polynomials(values)
         multipliers = self.multipliers(frequencies, varying)
-        P, dP = self.polynomials(values)
-        whole = (multipliers * P @ self._place).reshape(n, e, -1)
-        given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
+        whole = np.tensordot(multipliers * P, self._place, 1)
+        given = np.column_stack((inputs, np.ones(len(multipliers))))
         A = whole[:, :, :e]
         Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
         if not slopes:
-            return Z, np.zeros((n, e, 0), dtype=complex)
-        load = multipliers * np.concatenate((Z, given), axis=1)[:, self.column]
-        rows = [np.flatnonzero(self.equation == i) for i in range(e)]
+            return Z, np.zeros((*Z.shape, 0), dtype=complex)
+        load = multipliers * np.column_stack((Z, given))[:, self.column]
+        rows = [self.equation == i for i in range(e)]
         G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
         return Z, np.asarray(np.linalg.solve(A, G))
 
@@ -236,18 +227,15 @@ class HarmonicModel:
         quantities (1,) have the values of one row.
         """
         P, dP = self.polynomials(values)
-        row = np.real(self.multipliers(np.ones(1), varying)[0] / np.array([1, 1j, -1, -1j])[self.power % 4])
-        P, dP = P * row, dP * row[:, None]
-        e = len(self.outputs)
-        use = (self.column < e) & (self.power % 2 == 0)
+        use = (self.column < len(self.outputs)) & (self.power % 2 == 0)
         # multiplied by p^−lowest: a compliance form written with 1/p² would have no polynomial
-        k = (self.power - min(self.power[use], default=0)) // 2
-        sign = np.where(k % 2 == 0, 1.0, -1.0)
-        degree = max(k[use], default=0) + 1
-        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(values)))
-        at = (k[use], self.equation[use], self.column[use])
-        np.add.at(A, at, sign[use] * P[use])
-        np.add.at(dA, at, sign[use, None] * dP[use])
+        k = (self.power[use] - min(self.power[use], default=0)) // 2
+        row = self.multipliers(np.ones(1), varying)[0, use].real  # with the signs of p^k
+        A = np.zeros((max(k, default=0) + 1, len(self.outputs), len(self.outputs)))
+        dA = np.zeros((*A.shape, len(values)))
+        at = (k, self.equation[use], self.column[use])
+        np.add.at(A, at, row * P[use])
+        np.add.at(dA, at, row[:, None] * dP[use])
         return A, dA
 
     def check_square(self) -> None:
@@ -266,12 +254,26 @@ def products_of_powers(exponents: FloatArray, values: FloatArray) -> tuple[Float
     products = np.prod(theta**exponents, axis=1)
     if theta.all():
         return products, products[:, None] * exponents / theta
-    slopes = np.zeros_like(exponents)
-    for j in range(len(theta)):
-        used = np.flatnonzero(exponents[:, j])
-        lower = exponents[used] - np.eye(len(theta))[j]
-        slopes[used, j] = exponents[used, j] * np.prod(theta**lower, axis=1)
-    return products, slopes
+    each = [exponents - np.outer(exponents[:, j] != 0, unit) for j, unit in enumerate(np.eye(len(theta)))]
+    return products, exponents * np.prod(theta ** np.array(each), axis=-1).T
+
+
+def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """All z with Σ A_k z^k singular, A (k, e, e), and vectors of the companion form, shapes above."""
+    from scipy.linalg import eig
+
+    degree, e = len(A) - 1, A.shape[1]
+    if degree < 1:
+        return np.zeros(0, dtype=complex), np.zeros((e, 0), dtype=complex)
+    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
+    first, last = np.abs(A[[0, -1]]).max(axis=(1, 2))
+    unit = float(first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
+    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    L[-e:], R[-e:, -e:] = -np.hstack([*scaled[:-1]]), scaled[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z, y = eig(L, R)
+    return np.asarray(z * unit), np.asarray(y)
 
 
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -287,32 +289,20 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     z (modes,), ascending, and shapes (e, modes), each of unit length. Complex, negative and infinite
     z are left out: they belong to no free vibration.
     """
-    from scipy.linalg import eig
-
-    degree, e = len(A) - 1, A.shape[1]
-    if degree < 1:
-        return np.zeros(0), np.zeros((e, 0))
-    # companion form L y = z R y with y = (v, z v, …); z scaled so that its matrices are of one size
-    first, last = float(np.abs(A[0]).max()), float(np.abs(A[-1]).max())
-    unit = (first / last) ** (1 / degree) if first > 0 and last > 0 else 1.0
-    scaled = A * unit ** np.arange(degree + 1)[:, None, None]
-    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
-    L[-e:] = -np.hstack([*scaled[:-1]])
-    R[-e:, -e:] = scaled[-1]
-    (alpha, beta), y = eig(L, R, homogeneous_eigvals=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z = alpha / beta
-    good = np.flatnonzero(np.isfinite(z) & (np.abs(z.imag) <= 1e-8 * np.abs(z)) & (z.real > 1e-12))
-    good = good[np.argsort(z[good].real)]
-    v = y[:e, good]
+    z, y = eigenvalues(A)
+    size = np.abs(z, where=np.isfinite(z), out=np.full(len(z), np.inf))
+    good = np.isfinite(size) & (np.abs(z.imag) <= 1e-8 * size)
+    good &= z.real > 1e-12 * size[good].max(initial=0.0)
+    order = np.flatnonzero(good)[np.argsort(z[good].real)]
+    v = y[: A.shape[1], order]
     v = (v / v[np.abs(v).argmax(axis=0), np.arange(v.shape[1])]).real
-    return z[good].real * unit, v / np.linalg.norm(v, axis=0)
+    return z[order].real, v / np.linalg.norm(v, axis=0)
 
 
 def nearest_mode(
     z: FloatArray, v: FloatArray, frequency: float, shape: FloatArray
 ) -> tuple[float, FloatArray] | None:
-    """The mode most like a measured shape (NaN: not measured) by MAC; among equals the nearest frequency."""
+    """The mode most like a measured shape (NaN: not measured) by MAC; within 0.02 the nearest frequency."""
     if not len(z):
         return None
     seen = ~np.isnan(shape)
@@ -320,7 +310,7 @@ def nearest_mode(
     size = (w * w).sum(axis=0) * float(u @ u)
     mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
     away = np.abs(np.log(np.sqrt(z) / frequency))
-    best = int(np.argmin(np.where(mac >= mac.max() - MAC_SLACK, away, np.inf)))
+    best = int(np.argmin(np.where(mac >= mac.max() - 0.02, away, np.inf)))
     return float(z[best]), np.asarray(v[:, best])
 
 

@@ -1,251 +1,247 @@
-"""Pictures of an identification from harmonic tests. Nothing is shown or saved: functions draw on axes."""
+"""Pictures of identifications, modes and run-ups. Nothing is shown or saved."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem.plots import draw_polar, right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.plot_style import MARKERS, QUIET, legend_above, look, new_figure, plain, plain_numbers
-from rotorid.base.unit_words import Shown
-from rotorid.identify.amplitude_residuals import compare
+from rotorid.base.plot_style import (
+    COLORS,
+    DARK,
+    MARKERS,
+    QUIET,
+    TEXT,
+    legend_below,
+    look,
+    new_figure,
+    on_figure,
+    plain,
+    plain_numbers,
+    rad_s_above,
+)
+from rotorid.base.rpm import RPM
+from rotorid.base.unit_words import SPEEDS, Shown
+from rotorid.identify.amplitudes import compare, real_matrices
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rotorid.identify.modes_result import FittedModes, Readings
     from rotorid.identify.result import Identification
 
-CURVE_POINTS = 1000
-MANY = 12
-"""Outputs that a legend still names."""
+POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4
+"""Of a curve; most curves of a sweep, outputs in a legend, modes."""
 WIDE = 10.0
 """Ratio of amplitudes above which their scale is logarithmic."""
+HIDDEN = 3.0
+"""Standard deviations below which a vector has no phase to draw."""
 MODEL_UNIT = Shown("model unit")
 """Of amplitudes whose columns name no unit."""
 
 
 def figure_identification(result: Identification) -> Figure:
-    """All about an identification: amplitudes, deviations and phases (or shapes), parameters."""
-    panels: list[tuple[float, Callable[..., None]]] = [(3.4, draw_shapes)]
-    if not result.experiments.free.all():
-        by_unit: dict[str, list[str]] = {}
-        for name in result.model.outputs:
-            by_unit.setdefault(_unit(result, [name]), []).append(name)
-        panels = [(2.4, partial(draw_amplitudes, outputs=names)) for names in by_unit.values()]
-        panels += [(1.1, draw_deviations)] * bool(result.predicted) + [(1.6, draw_phases)]
-    heights, intervals = [height for height, _ in panels], _intervals(result)
-    parts = 0.6 + sum(heights), ROOM[0] + ROOM[1] * len(intervals)
+    """All about an identification: amplitudes and phases (or shapes), parameters."""
+    units = {name: result.experiments.units.get(name, MODEL_UNIT) for name in result.model.outputs}
+    free, intervals = bool(result.experiments.free.all()), _intervals(result)
+    heights = [3.4] if free else [*[2.4] * len({*units.values()}), 1.6]
+    parts = 0.9 + sum(heights), ROOM[0] + ROOM[1] * len(intervals)
     figure = new_figure(sum(parts))
     above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
     axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
-    for ax, (_, draw) in zip(axes, panels, strict=True):
-        draw(result, ax)
+    words = _shapes(result, axes[0], units) if free else _forced(result, axes, units)
+    for ax in axes:
+        plain(ax)
     figure.align_ylabels(axes)
-    for ax in axes[:-1]:
-        ax.set_xlabel("")
-    _legend(result, axes[0])
+    legend_below(above, axes, 2 if free else 4, title=f"points: measured{words}")
     draw_intervals(below.subplots(), intervals)
     return figure
 
 
-def draw_amplitudes(result: Identification, axes: Axes, outputs: Sequence[str]) -> None:
-    """Measured and fitted amplitudes over frequency in the units of their table; ± 2σ where that is known.
-
-    Logarithmic where they are very different.
-    """
-    for name in outputs:
-        scale = result.experiments.units.get(name, MODEL_UNIT).scale
-        _draw(result, name, axes, partial(_size, scale), scale * _errors(result, name)[0])
-    axes.set(xlabel=result.experiments.axis.word, ylabel=f"amplitude, {_unit(result, outputs)}")
-    scale_amplitudes(axes)
-
-
-def _size(scale: float, z: ComplexArray) -> FloatArray:
-    return np.asarray(scale * np.abs(z))
-
-
-def scale_amplitudes(axes: Axes) -> None:
-    """Logarithmic where the amplitudes that are drawn are very different, else from 0."""
-    every = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()])
-    every = every[np.isfinite(every) & (every > 0)]
-    if len(every) and every.max() > WIDE * every.min():
-        axes.set_yscale("log")
-        axes.set_ylim(every.min() / 1.5, every.max() * 1.5)
-        plain_numbers(axes)
-    else:
-        axes.set_ylim(bottom=0.0)
-    plain(axes)
-
-
-def draw_phases(result: Identification, axes: Axes) -> None:
-    """Measured and fitted phases over frequency, positive = lead."""
-
-    def degrees(z: ComplexArray) -> FloatArray:
-        angle = np.where(np.abs(z) > 0, np.degrees(np.angle(z)), np.nan)
-        if len(z) > len(result.experiments):  # no line across a full turn
-            angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan
-        return np.asarray(angle)
-
-    for name in result.model.outputs:
-        size = np.abs(_measured(result, name))
-        _draw(
-            result,
-            name,
-            axes,
-            degrees,
-            np.degrees(_errors(result, name)[1] / np.where(size > 0, size, np.nan)),
-        )
-    axes.set(xlabel=result.experiments.axis.word, ylabel="phase lead, °", ylim=(-205, 205))
-    axes.set_yticks(range(-180, 181, 90))
-    plain(axes)
+def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Shown]) -> str:
+    """Sizes, on axes by their unit, and phases, with two standard deviations, and those of the model."""
+    data, rows, phases = result.experiments, ~result.experiments.free, axes[-1]
+    by_unit, (grid, curves) = dict(zip(dict.fromkeys(units.values()), axes, strict=False)), _curve(result)
+    for j, (name, unit) in enumerate(units.items()):
+        z, ax, line = data.table([name])[rows, 0], by_unit[unit], {"lw": 1.4, **look(j)}
+        turn = real_matrices(np.exp(-1j * np.angle(z)))
+        std = 2 * np.sqrt(np.einsum("nai,nij,naj->an", turn, data.covariance(name)[rows], turn))
+        bars = (unit.scale * std[0], np.degrees(std[1] / np.abs(z))) if data.stated else (None, None)
+        mark = {"elinewidth": 1.2, "zorder": 3, **_mark(j), "label": name if j < NAMES else ""}
+        w, x = data.axis.scale * data.frequencies[rows], data.axis.scale * grid
+        ax.errorbar(w, unit.scale * np.abs(z), bars[0], **mark)
+        phases.errorbar(w, _degrees(z), bars[1], **mark)
+        if name in curves:
+            ax.plot(x, unit.scale * np.abs(curves[name]), **line)
+            phases.plot(x, _degrees(curves[name]), **line)
+        ax.set_ylabel(f"amplitude, {unit.word}")
+    for ax in by_unit.values():
+        low, high = ax.dataLim.minposy, ax.dataLim.y1
+        if high > WIDE * low:
+            ax.set_yscale("log")
+            plain_numbers(ax)
+        else:
+            ax.set_ylim(bottom=0.0)
+    phases.set(xlabel=data.axis.word, ylabel="phase lead, °", ylim=(-205, 205), yticks=range(-180, 181, 90))
+    lost = "; free vibrations not drawn" if data.free.any() else ""
+    return f"{' ± 2σ' if data.stated else ''}; lines: model{lost}"
 
 
-def draw_deviations(result: Identification, axes: Axes) -> None:
-    """How much larger the measured amplitudes are than those of the identified model, in percent."""
-    largest = 0.1
-    for name, predicted in result.predicted.items():
-        fitted = np.abs(predicted)[~result.experiments.free]
-        percent = 100 / np.where(fitted > 0, fitted, np.nan)
-        gap = percent * (np.abs(_measured(result, name)) - fitted)
-        _points(result, name, axes, gap, percent * _errors(result, name)[0])
-        largest = max(largest, float(np.nanmax(np.abs(gap), initial=0.0)))
-    axes.axhline(0.0, color=QUIET, lw=0.8)
-    axes.set(xlabel=result.experiments.axis.word, ylabel="measured −\nmodel, %")
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, -1.2 * largest), max(high, 1.2 * largest))
-    plain(axes)
-
-
-def draw_shapes(result: Identification, axes: Axes) -> None:
+def _shapes(result: Identification, axes: Axes, units: Mapping[str, Shown]) -> str:
     """Measured and fitted mode shapes, one line per natural frequency."""
-    outputs, axis = result.model.outputs, result.experiments.axis
-    table = result.experiments.table(outputs).real
+    data, outputs = result.experiments, result.model.outputs
+    table = data.table(outputs).real
     fitted, natural = np.full(table.shape, np.nan), np.full(len(table), np.nan)
     if result.predicted and np.isfinite(result.values).all():
-        whole, natural = compare(result.model, result.experiments).predict(result.values)
-        fitted = whole.real
-    unit = axis.word.rpartition(", ")[2]
-    for i, w in enumerate(axis.scale * result.experiments.frequencies):
-        style, mark = look(i), MARKERS[i % len(MARKERS)]
-        label = f"{w:.5g} {unit}"
-        if np.isfinite(natural[i]):
-            label += f" (model {axis.scale * natural[i]:.5g})"
-        axes.plot(table[i], mark, color=style["color"], mec="white", ms=8, zorder=3)
-        axes.plot(fitted[i], lw=1.4, **style)
-        axes.plot([], [], marker=mark, label=label, **style)
+        fitted, natural = compare(result.model, data).predict(result.values)
+    for i, (w, other) in enumerate(data.axis.scale * np.transpose((data.frequencies, natural))):
+        label = f"{w:.5g} {data.axis.word.rpartition(', ')[2]}"
+        label += f" (model {other:.5g})" if np.isfinite(other) else ""
+        axes.plot(table[i], zorder=3, label=label if i < NAMES else "", **_mark(i))
+        axes.plot(fitted[i].real, lw=1.4, **look(i))
     axes.axhline(0.0, color=QUIET, lw=0.8)
     axes.set_xticks(range(len(outputs)), outputs)
-    axes.set_ylabel(f"shape, {_unit(result, outputs)}")
-    plain(axes)
+    axes.set_ylabel(f"shape, {' or '.join({unit.word: '' for unit in units.values()})}")
+    return "; lines: model"
+
+
+def _degrees(z: ComplexArray) -> FloatArray:
+    return np.where(z == 0, np.nan, np.degrees(np.angle(z)))
+
+
+def _mark(j: int) -> dict[str, Any]:
+    """Points; every other one is open and larger, so that equal ones are seen."""
+    face = {"mfc": "none", "ms": 9} if j % 2 else {"mec": "white", "ms": 7}
+    return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], **face}
 
 
 def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:
     """Parameters with the half width of their 95 % intervals, and combinations where they say more."""
-    factor, found = result.coverage_factor or np.nan, []
+    factor, lines = result.coverage_factor or np.nan, []
     std = np.full(len(result.parameters), np.nan) if result.std is None else result.std
-    for name, value, sigma in zip(result.parameters, result.values, std, strict=True):
+    for name, value, sigma in zip(result.parameters, result.values.tolist(), std.tolist(), strict=True):
         several = len({solution[name] for solution in result.solutions}) > 1
         words = "no interval" if np.isfinite(value) else "several values" if several else "not determined"
-        found.append((name, float(value), factor * sigma, words))
+        lines.append((name, value, factor * sigma, words))
     more = () if np.isfinite(result.values).all() else result.combinations
-    return [*found, *((c.words, c.value, factor * (c.std or np.nan), "no interval") for c in more)]
+    return [*lines, *((c.words, c.value, factor * (c.std or np.nan), "no interval") for c in more)]
 
 
-def _legend(result: Identification, axes: Axes) -> None:
-    """One key an output, mark and line, above the axes; a sentence alone where there are many."""
-    from matplotlib.lines import Line2D
-
-    outputs, free = result.model.outputs, result.experiments.free
-    words = "points: measured" + (" ± 2σ" if result.experiments.stated and not free.all() else "")
-    keys = axes.get_legend_handles_labels()[0]
-    if not free.all():
-        keys = [Line2D([], [], label=name, **_mark(result, name), **_line(result, name)) for name in outputs]
-    if result.predicted or any("model" in str(key.get_label()) for key in keys):
-        words += ", lines: model" if _curve(result) or free.all() else ", large: model"
-    if free.any() and not free.all():
-        words += "; free vibrations not drawn"
-    sentence = Line2D([], [], ls="", label=words)
-    legend_above(axes, 2 if free.all() else 4, handles=[*(keys if len(keys) <= MANY else []), sentence])
-
-
-def _unit(result: Identification, outputs: Sequence[str]) -> str:
-    return " or ".join(dict.fromkeys(result.experiments.units.get(name, MODEL_UNIT).word for name in outputs))
-
-
-def _mark(result: Identification, name: str) -> dict[str, Any]:
-    """Mark of an output: every other one is open and larger, so that equal ones are seen."""
-    j = result.model.outputs.index(name)
-    color = look(j)["color"]
-    face = {"mfc": "none", "mec": color, "ms": 9} if j % 2 else {"mfc": color, "mec": "white", "ms": 7}
-    return {"marker": MARKERS[j % len(MARKERS)], **face}
-
-
-def _line(result: Identification, name: str) -> dict[str, Any]:
-    return {**look(result.model.outputs.index(name)), "linewidth": 1.4}
-
-
-def _frequencies(result: Identification) -> FloatArray:
-    """Of the forced experiments, as they are shown."""
-    data = result.experiments
-    return np.asarray(data.axis.scale * data.frequencies[~data.free])
-
-
-def _measured(result: Identification, name: str) -> ComplexArray:
-    """An output of the forced experiments."""
-    return np.asarray(result.experiments.table([name])[~result.experiments.free, 0])
-
-
-def _errors(result: Identification, name: str) -> FloatArray:
-    """Two standard deviations along and across each measured amplitude, (2, n); NaN where not stated."""
-    z = _measured(result, name)
-    if not result.experiments.stated:
-        return np.full((2, len(z)), np.nan)
-    along = np.exp(1j * np.angle(z))
-    covariance = result.experiments.covariance(name)[~result.experiments.free]
-    parts = [np.stack((u.real, u.imag), -1) for u in (along, 1j * along)]
-    return np.array([2 * np.sqrt(np.einsum("ni,nij,nj->n", u, covariance, u)) for u in parts])
-
-
-def _points(result: Identification, name: str, axes: Axes, y: FloatArray, error: FloatArray) -> None:
-    """Measured points of an output, with error bars where errors are known."""
-    bars = error if np.isfinite(error).any() else None
-    style = {**_mark(result, name), "color": _line(result, name)["color"]}
-    axes.errorbar(_frequencies(result), y, bars, linestyle="", elinewidth=1.2, zorder=3, **style)
-
-
-def _draw(
-    result: Identification, name: str, axes: Axes, part: Callable[[Any], FloatArray], error: FloatArray
-) -> None:
-    """Part of the amplitudes: as measured, and of the model, a line where one excitation belongs to it."""
-    _points(result, name, axes, part(_measured(result, name)), error)
-    style, curve = _line(result, name), _curve(result)
-    if curve is not None:
-        axes.plot(result.experiments.axis.scale * curve[0], part(curve[1][name]), **style)
-    elif name in result.predicted:
-        large = {**style, "linestyle": "", **_mark(result, name), "mfc": "none", "mec": style["color"]}
-        fitted = np.asarray(result.predicted[name])[~result.experiments.free]
-        axes.plot(_frequencies(result), part(fitted), **{**large, "ms": 13})
-
-
-def _curve(result: Identification) -> tuple[FloatArray, dict[str, ComplexArray]] | None:
-    """Amplitudes over the measured range, where one excitation belongs to it; of values that fit the data."""
+def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArray]]:
+    """Predicted amplitudes over the measured range, where one excitation belongs to it, else at its tests."""
     model, data = result.model, result.experiments
-    w = data.frequencies[~data.free]
-    if not result.predicted or model.varying or len(w) < 2:
-        return None
+    rows = np.flatnonzero(~data.free)[np.argsort(data.frequencies[~data.free], kind="stable")]
+    w, inputs = data.frequencies[rows], data.table(model.inputs)[rows]
+    at_tests = w, {name: values[rows] for name, values in result.predicted.items()}
+    if not result.predicted or model.varying or not np.allclose(inputs, inputs[0], rtol=1e-9, atol=0):
+        return at_tests
     # what is measured may lie at a peak: the line passes exactly there
-    grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
-    inputs = {name: data.table([name])[~data.free, 0] for name in model.inputs}
-    if any(not np.allclose(given, given[0], rtol=1e-9, atol=0.0) for given in inputs.values()):
-        return None
-    try:
-        return grid, model.predict(
-            result.theta, grid, {n: np.full(len(grid), z[0]) for n, z in inputs.items()}
-        )
-    except np.linalg.LinAlgError:
-        return None
+    grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), POINTS), w)))
+    with suppress(np.linalg.LinAlgError):
+        return grid, model.predict(result.theta, grid, dict(zip(model.inputs, inputs[0], strict=True)))
+    return at_tests
+
+
+def figure_modes(modes: FittedModes) -> Figure:
+    """A row a mode: readings and fit in the complex plane, where a mode is a circle, and over frequency."""
+    data, k = modes.readings, min(len(modes.ends), MODES)
+    (word, scale), unit, size = SPEEDS[data.labels.speed_unit], _unit(data), data.labels.vibration_scale
+    figure = new_figure(2.2 * k + 0.7)
+    axes = figure.subplots(k, 2, squeeze=False, width_ratios=(2, 3))
+    for mode, ((circle, peak), (low, high)) in enumerate(zip(axes, modes.ends, strict=False)):
+        rows, grid = (data.speeds >= low) & (data.speeds <= high), np.linspace(low, high, POINTS)
+        fits, w = size * modes.curve(grid), scale * data.speeds[rows]
+        for p, name in enumerate(data.sensors[:CURVES]):
+            read, fit, mark = (
+                size * data.vectors[rows, p],
+                fits[:, p],
+                {**_mark(p), "mfc": "none", "mec": None, "ms": 5},
+            )
+            circle.plot(fit.real, fit.imag, **look(p))
+            circle.plot(read.real, read.imag, label=name, **mark)
+            peak.plot(scale * grid, np.abs(fit), **look(p))
+            peak.plot(w, np.abs(read), **mark)
+        at = "" if modes.undetermined else f": {data.words(modes.values[0, mode])}"
+        circle.set_title(f"mode {mode + 1}{at}", loc="left", fontsize=TEXT)
+        circle.set(xlabel=f"real part, {unit}", ylabel=f"imaginary part, {unit}")
+        circle.set_aspect("equal", adjustable="datalim")
+        peak.set(xlabel=f"frequency, {word}", ylabel=f"amplitude, {unit}")
+        for ax in (circle, peak):
+            ax.locator_params("x", nbins=4)
+            plain(ax)
+    drawn = f"{k} of {len(modes.ends)} modes, at most {CURVES} points"
+    legend_below(figure, axes[:1, 0], 5, title=f"hollow: readings; lines: fit ({drawn})")
+    return figure
+
+
+def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes | None) -> Figure:
+    """Amplitude and phase over speed less the slow roll (C,), and the fit of the first sweep."""
+    figure, labels = new_figure(6.6), sweeps[0].labels
+    above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+    dots: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1))}
+    for k, (sweep, c, name, omega, read) in enumerate(_curves(sweeps)):
+        vectors, lines = read - roll[c], [(read - roll[c], {"lw": 1.6, "label": name, **look(k)})]
+        seen = np.abs(vectors) > HIDDEN * np.nanmedian(sweep.noise[:, c])
+        phase = np.unwrap(np.angle(vectors[seen]))
+        if fit is not None and sweep is sweeps[0]:
+            lines.append((fit.curve(omega)[:, c] - roll[c], {"label": f"fit, run {sweep.run}", **dots}))
+        for z, style in lines:  # phases of the fit beside those of the readings
+            beside = labels.phase_sign * np.degrees(phase + np.angle(z * vectors.conj())[seen])
+            beside -= (
+                360 * np.floor(np.median(labels.phase_sign * np.degrees(phase)) / 360) if seen.any() else 0
+            )
+            above.plot(RPM * omega, labels.vibration_scale * np.abs(z), **style)
+            below.plot(RPM * omega[seen], beside, **style)
+    above.set(ylabel=f"amplitude, {_unit(sweeps[0])}", ylim=(0.0, None))
+    below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees")
+    below.yaxis.set_major_locator(right_angles(below))
+    if labels.phase == "lag":
+        below.invert_yaxis()  # through a critical speed the curve falls, as everywhere
+    critical = [] if fit is None else RPM * fit.values[0]
+    for ax in axes:
+        for speed in critical:
+            ax.axvline(speed, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
+        plain(ax)
+        ax.margins(x=0.01)
+    rad_s_above(above)
+    words = ", ".join(f"{speed:.0f}" for speed in critical)
+    title = f"less the slow roll; at most {CURVES} curves" + (f"; critical: {words} rpm" if words else "")
+    legend_below(figure, (above,), 3, title=title)
+    return figure
+
+
+def polar_plot(sweeps: Sequence[Readings], roll: ComplexArray) -> Figure:
+    """Paths of the vectors less the slow roll (C,), with speeds marked."""
+    every, nothing = np.unique(np.concatenate([s.speeds for s in sweeps])), complex(np.nan, np.nan)
+    labels, curves = sweeps[0].labels, _curves(sweeps)
+    paths = [np.interp(every, omega, read - roll[c], nothing, nothing) for _, c, _, omega, read in curves]
+    unit, marks = Shown(_unit(sweeps[0]), labels.vibration_scale), max(3, 16 // len(curves))
+
+    def draw(ax: Axes) -> None:
+        names, lag = [name for _, _, name, *_ in curves], labels.phase == "lag"
+        draw_polar(every, np.transpose(paths), names, ax, marks=marks, unit=unit, lag=lag)
+        ax.set_title(f"{ax.get_title()}\nless the slow roll; at most {CURVES} curves", fontsize=TEXT)
+
+    return on_figure(draw, height=7.4, projection="polar")
+
+
+def _unit(readings: Readings) -> str:
+    return readings.labels.vibration_in or "no unit"
+
+
+def _curves(sweeps: Sequence[Readings]) -> list[tuple[Readings, int, str, FloatArray, ComplexArray]]:
+    """Sweeps and sensors to draw, with names, rising speeds, and vectors."""
+    curves = []
+    for sweep in sweeps:
+        for c, name in enumerate(sweep.sensors):
+            order = np.argsort(sweep.speeds, kind="stable")
+            seen = order[~np.isnan(sweep.vectors[order, c])]
+            words = f"{name}, run {sweep.run}" if len(sweeps) > 1 else name
+            curves.append((sweep, c, words, sweep.speeds[seen], sweep.vectors[seen, c]))
+    return curves[:CURVES]

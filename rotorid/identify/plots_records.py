@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rotorid.identify.result_records import Fit
     from rotorid.identify.simulation import Trajectory
 
-CURVE_POINTS, BAND = 600, "#d9dde3"
+CURVE_POINTS = 600
 MANY = 8
 """Records that a legend still names."""
 
@@ -43,9 +43,7 @@ def figure_fit(result: Fit) -> Figure:
         _finish(ax, f"input {name}")
     axes[-1].set_xlabel(result.records[0].axis.word)
     figure.align_ylabels(axes)
-    stated = result.errors or any(record.sigma for record in result.records)
-    words = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
-    _legend(result, above, words)
+    _legend(result, above)
     draw_parameters(result, below.subplots())
     return figure
 
@@ -55,9 +53,8 @@ def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
     curves = []
     for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
         if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
-            finer = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
-            theta = result.estimate.solution
-            run = simulate(model, theta, finer, sensitivities=False)
+            finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
+            run = simulate(model, result.estimate.solution, finer, sensitivities=False)
         curves.append(run)
     return tuple(curves)
 
@@ -76,62 +73,60 @@ def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory]
 def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
     j = result.model.outputs.index(name)
-    residuals = {
-        k: run.y[:, j] - record.outputs[name]
-        for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
-        if not np.isnan(record.outputs.get(name, np.nan)).all()
-    }
-    if not residuals:
-        words = "nothing measured" if result.simulations else "the states diverge: no residuals"
+    runs = [*zip(result.records, result.simulations, strict=False)]
+    residuals = [run.y[:, j] - record.outputs.get(name, np.nan) for record, run in runs]
+    seen = np.concatenate([np.zeros(0), *residuals])
+    if np.isnan(seen).all():
+        words = "nothing measured" if runs else "the states diverge: no residuals"
         axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
-    for k, r in residuals.items():
-        record = result.records[k]
-        rms = np.sqrt(np.nanmean(np.concatenate([*residuals.values()]) ** 2))
-        sigma = (record.sigma or result.errors or {}).get(name, rms)
-        t, size = record.axis.scale * record.t, np.broadcast_to(2 * np.asarray(sigma), record.t.shape)
-        axes.fill_between(t, -size, size, color=BAND, lw=0, zorder=0.5)
-        axes.plot(t, r, **_mark(result, k))
+        runs = []
+    for k, (record, _) in enumerate(runs):
+        sizes = record.sigma or result.errors or {name: np.sqrt(np.nanmean(seen**2))}
+        band, t = 2 * np.broadcast_to(sizes[name], len(record)), record.axis.scale * record.t
+        axes.fill_between(t, -band, band, color="#d9dde3", lw=0, zorder=0.5)
+        axes.plot(t, residuals[k], **_mark(result, k))
     axes.axhline(0.0, color=QUIET, lw=0.8)
     _finish(axes, "residual")
 
 
 def draw_parameters(result: Fit, axes: Axes) -> None:
     """Parameters with their 95 % intervals, below how the search ended."""
-    estimate = result.estimate
-    std = np.full(len(result.parameters), np.nan) if estimate.std is None else estimate.std
-    half = (estimate.coverage_factor or np.nan) * std
-    words = ["no interval" if np.isfinite(value) else "not determined" for value in result.values]
-    draw_intervals(axes, [*zip(result.parameters, result.values.tolist(), half.tolist(), words, strict=True)])
+    values, ends = result.values.tolist(), result.ci95
+    half = [np.nan] * len(values) if ends is None else (np.diff(ends)[:, 0] / 2).tolist()
+    words = ["not determined" if np.isnan(value) else "no interval" for value in values]
+    draw_intervals(axes, [*zip(result.parameters, values, half, words, strict=True)])
     state = "converged" if result.converged else "not converged"
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 
 
-def _legend(result: Fit, above: Any, title: str) -> None:  # noqa: ANN401 - a part of a figure
+def _legend(result: Fit, above: Any) -> None:  # noqa: ANN401 - a part of a figure
     """Records by their marks and lines, above all axes."""
     from matplotlib.lines import Line2D
 
     names = record_names([record.name for record in result.records])
     keys = [
-        Line2D([], [], label=name, **{**_mark(result, k), **_line(result, k, 2)})
+        Line2D([], [], label=name, **(_mark(result, k) | _line(result, k, 2)))
         for k, name in enumerate(names[:MANY])
     ]
-    if len(names) > MANY:
-        keys.append(Line2D([], [], ls="", label=f"and {len(names) - MANY} more records"))
-    columns = max(1, min(4, 150 // (10 + max(len(str(key.get_label())) for key in keys))))
+    if more := names[MANY:]:
+        keys.append(Line2D([], [], ls="", label=f"and {len(more)} more records"))
+    stated = result.errors or any(record.sigma for record in result.records)
+    title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
+    columns = max(1, min(4, 150 // (10 + max(map(len, names)))))
     style = {"frameon": False, "fontsize": TEXT, "title_fontsize": TEXT}
     above.legend(loc="outside upper center", ncols=columns, handles=keys, title=title, **style)
 
 
 def _mark(result: Fit, k: int) -> dict[str, Any]:
     """Points of a record; of a single one in grey, so that the line of the model is seen on them."""
-    color = DARK if len(result.records) == 1 else look(k)["color"]
+    color = look(k)["color"] if len(result.records) > 1 else DARK
     size = 5.0 if len(result.records[k]) <= 60 else 2.5
     return {"linestyle": "", "marker": MARKERS[k % len(MARKERS)], "color": color, "ms": size, "alpha": 0.6}
 
 
 def _line(result: Fit, k: int, number: int) -> dict[str, Any]:
     """Line of a record; a single value is a dash, as a line through it would not show."""
-    style = look(k) if len(result.records) > 1 else {"color": BLUE, "linestyle": "-"}
+    style = look(k) if len(result.records) > 1 else {"color": BLUE}
     return {**style, "lw": 1.3, "alpha": 1.0, **({"marker": "_", "ms": 22.0} if number == 1 else {})}
 
 

@@ -11,27 +11,25 @@ need not solve the equations until the end. D + G θ_s is integrated in place of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
-from rotorid.base.text import counted
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
 from rotorid.identify.records import Record, inputs_of, refined
-from rotorid.identify.sensitivity_steps import Steps
-
-FINER = 5  # points of a trajectory from sample to sample; of the schemes of `HEUN` one
+from rotorid.identify.sensitivity_steps import Step, iterate
 
 
 def quasilinearization(
     problem: Problem,
-    start: FloatArray,
-    trajectories: Sequence[tuple[FloatArray, FloatArray]],
-    *,
-    max_iterations: int,
+    theta: FloatArray,
+    states: Sequence[FloatArray],
+    near: tuple[float, float],
+    most: int,
     epsilon: float | None,
 ) -> Iterations:
     """Iterate linear fits about the last trajectory until neither it nor the parameters change.
@@ -40,97 +38,99 @@ def quasilinearization(
     ----------
     problem
         Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
-        [Q] does; with any other the linear equations are solved by a step of DOP853 from point to point.
-    trajectories
-        First states (n, n_x) of each record at the times of `refined`, and their slopes.
-    start, max_iterations, epsilon
-        As in `sensitivity_steps`.
+        [Q] does; with any other the linear equations are solved by two steps of DOP853 from sample to sample.
+    theta
+        First parameters (n,).
+    states
+        Of each record the first trajectory, (n, n_x) at the times of `grid`.
+    near, most, epsilon
+        As in `sensitivity_steps` and `iterate`.
 
     Raises
     ------
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    theta, states, last, fitted = start.copy(), list(trajectories), np.inf, None
-    every = FINER if problem.integrator not in HEUN else 1
-    records = [refined(record, every) for record in problem.records]
-    samples = [tuple(x[::every] for x, _ in states)]
-    steps = Steps(problem, theta, problem.residual(theta), max_iterations, epsilon)
-    for count in range(1, max_iterations + 1):
-        try:
+    grids = [grid(problem, record) for record in problem.records]
+
+    def seen(states: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        """At the times of the records."""
+        return tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))
+
+    samples = [seen(states)]
+    rows: list[tuple[FloatArray, FloatArray]] = []
+
+    def steps(theta: FloatArray, states: Sequence[FloatArray]) -> Iterator[Step]:
+        last = 1e-300
+        yield theta, problem.residual(theta), None, theta, False, False
+        while True:
             tables = [
-                linear_solutions(model, theta, record, *x, problem.integrator)
-                for model, record, x in zip(problem.models, records, states, strict=True)
+                linear_solutions(model, theta, record, x, problem.integrator)
+                for model, (record, _), x in zip(problem.models, grids, states, strict=True)
             ]
-            K, Y = linear_rows(problem, theta, samples[-1], [W[::every] for W, _ in tables])
+            K, Y = linear_rows(problem, theta, samples[-1], seen(tables))
             fitted = problem.linear_fit(K, Y, theta)
-        except SimulationError as error:
-            if fitted is None:
-                raise
-            steps.message = f"quasilinearization diverged after {counted(count - 1, 'iteration')}: {error}"
-            break
-        step = fitted.solution
-        regression, theta = (K, Y + K @ theta), theta + step
-        states = [(W @ np.append(1.0, step), rates @ np.append(1.0, step)) for W, rates in tables]
-        samples.append(tuple(x[::every] for x, _ in states))
-        steps.append(theta, fitted.residuals)
-        pairs = zip(*samples[-2:], strict=True)
-        still = all(np.abs(b - a).max(initial=0) < 1e-3 * np.abs(b).max(initial=1e-300) for a, b in pairs)
-        # quadratic convergence: the next step is smaller than this one by more than this one than the last
-        size = max(float(np.abs(step).max()), 1e-300)
-        following, last = step * min(1.0, size / last if count > 1 else 1.0), size
-        settled = still and negligible(following, theta, fitted, steps.near)
-        if steps.end(step, negligible(following, theta, fitted, (1e-9, 1e-5)), settled):
-            break
-    assert fitted is not None
-    r = problem.residual(theta)
-    if not np.isfinite(r).all():
-        steps.converged, steps.message, r = False, "not converged: the states diverge", -fitted.residuals
-    return steps.result(fitted, r, trajectories=tuple(samples), regression=regression)
+            step = fitted.solution
+            rows[:], theta = [(K, Y + K @ theta)], theta + step
+            states = [W @ np.append(1.0, step) for W in tables]
+            samples.append(seen(states))
+            pairs = zip(*samples[-2:], strict=True)
+            still = all(np.abs(b - a).max(initial=0) < 1e-3 * np.abs(b).max(initial=1e-300) for a, b in pairs)
+            # quadratic convergence: the next step is smaller than this one by more than this than the last
+            size = max(float(np.abs(step).max()), 1e-300)
+            following, last = step * min(1.0, size / last), size
+            short, settled = (negligible(following, theta, fitted, x) for x in ((1e-9, 1e-5), near))
+            yield theta, fitted.residuals, fitted, step, short, still and settled
+
+    done = iterate(problem, "quasilinearization", steps(theta, states), most, epsilon)
+    return replace(done, trajectories=tuple(samples), regression=rows[0])
+
+
+def grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
+    """The times of a trajectory, and where those of the record stand among them."""
+    return (record, np.arange(len(record))) if problem.integrator in HEUN else refined(record, 2)
 
 
 def linear_solutions(
-    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, slopes: FloatArray, integrator: str
-) -> tuple[FloatArray, FloatArray]:
-    """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), and dW/dt.
+    model: OdeModel, theta: FloatArray, record: Record, x: FloatArray, integrator: str
+) -> FloatArray:
+    """W = [D + G θ_s | G] at the times of a record, (n, n_x, 1 + n_p), about θ_s and states (n, n_x).
 
-    About θ_s and states (n, n_x) with slopes. DOP853 steps from all times at once: W is P W + q of the last.
+    All steps are taken at once: W is P W + q of the last.
     """
     from scipy.integrate import DOP853
-    from scipy.interpolate import CubicHermiteSpline
+    from scipy.interpolate import CubicSpline
 
-    t, n, u = record.t, len(model.states), inputs_of(model, record)
-    first = model.x0(theta)
+    t, n, u, first = record.t, len(model.states), inputs_of(model, record), model.x0(theta)
     if not n or len(t) == 1:
-        W = np.broadcast_to(first, (len(t), *first.shape))
-        return W, np.zeros_like(W)
+        return np.broadcast_to(first, (len(t), *first.shape))
 
-    def linear(t: FloatArray, x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A and B of dW/dt = A W + B."""
+    def linear(t: FloatArray, x: FloatArray, u: FloatArray) -> FloatArray:
+        """[A B] of dW/dt = A W + B."""
         table = model.f(t, x, theta, u)
-        A, B = table[..., 1 : 1 + n], np.delete(table, np.s_[1 : 1 + n], axis=-1)
-        B[..., 0] -= (A @ x[..., None])[..., 0]
-        return A, B
+        A, B = table[..., 1 : 1 + n], table[..., 1 + n :]
+        return np.concatenate([A, table[..., :1] - A @ x[..., None], B], axis=-1)
 
-    A, B = linear(t, x, u)
+    def rate(table: FloatArray, z: FloatArray) -> FloatArray:
+        rates: FloatArray = table[..., :n] @ z
+        rates[..., n:] += table[..., n:]
+        return rates
+
+    h, table = np.diff(t)[:, None, None], linear(t, x, u)
+    z = np.broadcast_to(np.eye(n, n + first.shape[1]), table[1:].shape)
     if integrator in HEUN:
-        W, parts = np.empty((len(t), *first.shape)), HEUN[integrator](n)
-        W[0] = w = first
-        for i, h in enumerate(np.diff(t)):
-            W[i + 1] = w = heun_step(lambda j, w: A[j] @ w + B[j], i, i + 1, w, h, parts)
+        z = heun_step(rate, table[:-1], table[1:], z, h, [np.s_[:, i] for i in HEUN[integrator](n)])
     else:
-        h, curve = np.diff(t)[:, None, None], CubicHermiteSpline(t, x, slopes)
-        begin, rates = np.eye(n, n + first.shape[1]), np.zeros((12, len(t) - 1, n, n + first.shape[1]))
+        curve, rates = CubicSpline(t, x), np.zeros((12, *z.shape))
         for j, (weights, c) in enumerate(zip(DOP853.A, DOP853.C, strict=True)):
-            at = t[:-1] + c * h[:, 0, 0]
-            between, load = linear(at, curve(at), u[:-1] + c * np.diff(u, axis=0))
-            rates[j] = between @ (begin + h * np.tensordot(weights[:j], rates[:j], 1))
-            rates[j, :, :, n:] += load
-        end = begin + h * np.tensordot(DOP853.B, rates, 1)
-        W = np.concatenate([first[None], recurrence(end[..., :n], first, end[..., n:])])
+            times = t[:-1] + c * h[:, 0, 0]
+            between = linear(times, curve(times), u[:-1] + c * np.diff(u, axis=0)) if j else table[:-1]
+            rates[j] = rate(between, z + h * np.tensordot(weights[:j], rates[:j], 1))
+        z = z + h * np.tensordot(DOP853.B, rates, 1)
+    W = np.concatenate([first[None], recurrence(z[..., :n], first, z[..., n:])])
     if not np.isfinite(W).all():
         raise SimulationError("the linearised equations have no finite solution; start from another place")
-    return W, A @ W + B
+    return W
 
 
 def linear_rows(

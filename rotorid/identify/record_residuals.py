@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.adaptive_steps import worth_compiling
-from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.records import Record, from_t0, inputs_of, models_of
 from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
@@ -88,30 +88,39 @@ class Problem:
     ) -> None:
         self.given, self.records = model, tuple(from_t0(model, record) for record in records)
         self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
-        if not self.records:
+        if not records:
             raise ValueError("a fit needs at least one record")
-        self.models = models_of(model, len(self.records))
+        self.models = models_of(model, len(records))
         """One per record, all with the same parameters."""
-        self.model = self.models[0]
+        self.model, outputs = self.models[0], self.models[0].outputs
         self.prior = prior or prior_rows(self.model.parameters, {})
         self.inputs = [inputs_of(model, record) for record in self.records]
-        self.measured, deviations = zip(*map(self._table, self.records), strict=True)
-        self.masks = [~np.isnan(data.T) for data in self.measured]
-        stated = {s is not None for each in deviations for s in each if s is not False}
-        if len(stated) > 1:
+        for record in self.records:
+            check_known(record.name, record.outputs, "output of the model", outputs)
+            if not record.outputs:
+                raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
+        self.measured = [_table(record.outputs, outputs, len(record)) for record in self.records]
+        stated = [_table(record.sigma or {}, outputs, len(record)) for record in self.records]
+        self.masks = [~np.isnan(data) for data in self.measured]
+        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(stated, self.masks, strict=True)])
+        self.stated = bool(known.any())
+        if self.stated and not known.all():
             raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        self.stated = stated == {True}
-        sizes = [self.errors.get(name, 1.0) for name in self.model.outputs]
-        self.weights = []
-        for data, each, mask in zip(self.measured, deviations, self.masks, strict=True):
-            mask[self.model.fixed_at_first, :1] = False
-            known = [size if s is None or s is False else s for s, size in zip(each, sizes, strict=True)]
-            sigma = np.stack([np.broadcast_to(s, len(data)) for s in known], axis=-1)
-            self.weights.append(1.0 / np.where(np.isnan(data), 1.0, sigma))
-        self.data = self.vector(self.measured)
-        """Measured values as weighted rows."""
-        if not len(self.data):
+        sizes = [self.errors.get(name, 1.0) for name in outputs]
+        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in stated]
+        self.series: list[tuple[str, str, slice]] = []
+        """Of each output of a record its name, words for it, and its rows."""
+        low = 0
+        for record, mask in zip(self.records, self.masks, strict=True):
+            mask[:1, self.model.fixed_at_first] = False
+            for name, count in zip(outputs, mask.sum(axis=0).tolist(), strict=True):
+                words = f"{name} in {record.name}" if len(records) > 1 else name
+                self.series += [(name, words, slice(low, low + count))] * (count > 0)
+                low += count
+        if not low:
             raise ValueError("the records have no samples of an output beside those that known values fix")
+        self.data, self.scale = self.vector(self.measured), self.vector([*map(np.ones_like, self.measured)])
+        """Measured values and 1 as weighted rows."""
         most = np.abs(self.data).max()
         if most > LARGEST or 0 < most < 1 / LARGEST:
             raise ValueError(
@@ -122,52 +131,29 @@ class Problem:
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
         self.quick = integrator
-        """That of the evaluations: after the first one "taylor" where that is worth compiling."""
+        """That of the evaluations: for "auto" that which is quick for this model and these times."""
 
     @property
     def scaled(self) -> bool:
         """Whether a residual of 1 is one standard deviation, stated or estimated: a prior counts on it."""
         return self.stated or (len(self.prior) > 0 and not self.prior.ridge)
 
-    def again(self, integrator: str, rtol: float) -> Problem:
-        """The same problem, integrated otherwise."""
-        return Problem(self.given, self.records, integrator, rtol, self.errors, self.prior)
-
-    def weighed(self, errors: Mapping[str, float]) -> Problem:
-        """The same problem with estimated errors to weigh by."""
-        return Problem(self.given, self.records, self.integrator, self.rtol, errors, self.prior)
-
-    @cached_property
-    def series(self) -> dict[tuple[int, str], int]:
-        """Number of samples of each series (an output of a record), in the order of the rows."""
-        return {
-            (k, name): int(count)
-            for k, mask in enumerate(self.masks)
-            for name, count in zip(self.model.outputs, mask.sum(axis=1), strict=True)
-            if count
-        }
-
-    @cached_property
-    def series_names(self) -> list[str]:
-        """Of each series."""
-        several = len(self.records) > 1
-        return [f"{name} in {self.records[k].name}" if several else name for k, name in self.series]
-
-    def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Rows by series."""
-        return np.split(rows, np.cumsum([*self.series.values()])[:-1])
-
-    def plain(self, r: FloatArray) -> FloatArray:
-        """Weighted rows in the unit of the outputs."""
-        return np.asarray(r / self.vector([np.ones_like(data) for data in self.measured]))
+    def again(self, integrator: str, rtol: float, errors: Mapping[str, float]) -> Problem:
+        """The same problem, integrated or weighed otherwise."""
+        return Problem(self.given, self.records, integrator, rtol, errors, self.prior)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
         parts = [
-            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask]
+            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask.T]
             for table, mask, weight in zip(tables, self.masks, self.weights, strict=True)
         ]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return np.concatenate(parts)
+
+    def by_time(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """What belongs to the times of each record, (n,), as rows without weights."""
+        tables = [np.tile(column[:, None], len(self.model.outputs)) for column in columns]
+        return self.vector(tables) / self.scale
 
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
@@ -177,32 +163,36 @@ class Problem:
         SimulationError
             The states diverge.
         """
-        key = theta.tobytes()
-        if self._last is None or self._last[0] != key:
+        if self._last is None or self._last[0] != theta.tobytes():
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
-            runs, r, J = self._evaluated(theta)
-            steps = sum(run.steps for run in runs) if self._last is None and self.quick == "auto" else 0
-            if len({*self.models}) == 1 and worth_compiling(self.model, steps):
-                self.quick = "taylor"
-                again = self._evaluated(theta)
-                if np.abs(again[1] - r).max() <= 1e-7 * (np.abs(r) + np.abs(self.data)).max():
-                    runs, r, J = again
-                else:
-                    self.quick = "dop853"
-            self._last, self.runs = (key, r, J), tuple(runs)
-        return self._last[1], self._last[2]
+            if self._last is None and self.quick == "auto" and len({*self.models}) == 1:
+                self.quick = self._quickest(theta)
+            runs = self._simulated(theta, self.quick)
+            r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
+            J = self.vector([run.y_theta for run in runs])
+            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+                raise SimulationError(
+                    "the outputs of the model, or their sensitivities, are beyond all bounds"
+                )
+            self._last, self.runs = (theta.tobytes(), r, J), tuple(runs)
+        return self._last[1:]
 
-    def _evaluated(self, theta: FloatArray) -> tuple[list[Trajectory], FloatArray, FloatArray]:
-        runs = [
-            simulate(model, theta, record, integrator=self.quick, rtol=self.rtol)
-            for model, record in zip(self.models, self.records, strict=True)
-        ]
-        r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
-        J = self.vector([run.y_theta for run in runs])
-        if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
-            raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
-        return runs, r, J
+    def _simulated(self, theta: FloatArray, integrator: str, **options: Any) -> list[Trajectory]:  # noqa: ANN401
+        options = {"rtol": self.rtol} | options
+        pairs = zip(self.models, self.records, strict=True)
+        return [simulate(m, theta, record, integrator=integrator, **options) for m, record in pairs]
+
+    def _quickest(self, theta: FloatArray) -> str:
+        """Taylor series where compiling is worth it and they find what a rough integration finds."""
+        if self.model.linear_driven:
+            return "auto"
+        rough = self._simulated(theta, "auto", rtol=1e-6, sensitivities=False)
+        if not worth_compiling(self.model, (1 if self.model.timed else 4) * sum(run.steps for run in rough)):
+            return "auto"
+        pairs = zip(rough, self._simulated(theta, "taylor"), strict=True)
+        same = all(np.abs(a.y - b.y).max() <= 1e-4 * np.abs(a.y).max() for a, b in pairs)
+        return "taylor" if same else "auto"
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""
@@ -227,21 +217,10 @@ class Problem:
         step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 
-    def _table(self, record: Record) -> tuple[FloatArray, list[float | FloatArray | bool | None]]:
-        """Measured values (n, n_y), and of each output its deviation: None unknown, False not measured."""
-        outputs = self.model.outputs
-        if unknown := [name for name in record.outputs if name not in outputs]:
-            raise ValueError(
-                f"{record.name}: {', '.join(unknown)} is no output of the model; outputs are "
-                f"{', '.join(outputs)}"
-            )
-        if not record.outputs:
-            raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
-        nothing = np.full(len(record), np.nan)
-        data = np.stack([record.outputs.get(name, nothing) for name in outputs], axis=-1)
-        missing = np.isnan(data).all(axis=0)
-        sigma = record.sigma or {}
-        return data, [False if lost else sigma.get(n) for n, lost in zip(outputs, missing, strict=True)]
+
+def _table(columns: Mapping[str, float | FloatArray], outputs: Sequence[str], samples: int) -> FloatArray:
+    """Columns of the outputs, (samples, n_y), NaN where there are none."""
+    return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs], axis=-1)
 
 
 def at(step: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.unit_words import Shown
 from rotorid.identify.ode import OdeModel
 
@@ -53,35 +52,31 @@ class Record:
     axis: Shown = SECONDS
 
     def __post_init__(self) -> None:
-        t = _column(self.t, f"{self.name}: the times")
-        _check_times(t, self.name)
+        name, t = self.name, _column(self.t, f"{self.name}: the times")
+        _check_times(t, name)
         object.__setattr__(self, "t", t)
         for kind in ("outputs", "inputs"):
-            columns = {key: self._samples(value, key) for key, value in getattr(self, kind).items()}
+            columns = {key: _column(x, f"{name}: {key}") for key, x in getattr(self, kind).items()}
             object.__setattr__(self, kind, columns)
-        for key, value in self.inputs.items():
-            if np.isnan(value).any():
-                raise ValueError(
-                    f"{self.name}: the input {key} is missing at t = {t[np.isnan(value)][0]:g}; an input "
-                    "needs a value at every time"
-                )
+            for key, column in columns.items():
+                if len(column) != len(t):
+                    raise ValueError(f"{name}: {key} has {len(column)} values, but there are {len(t)} times")
+                if (bad := np.flatnonzero(np.isinf(column))).size:
+                    raise ValueError(
+                        f"{name}: {key} is infinite in row {bad[0] + 1}; leave missing samples empty"
+                    )
+                if kind == "inputs" and np.isnan(column).any():
+                    raise ValueError(
+                        f"{name}: the input {key} is missing at t = {t[np.isnan(column)][0]:g}; an input "
+                        "needs a value at every time"
+                    )
         if self.sigma is not None:
-            sigma = {key: self._deviation(value, key) for key, value in self.sigma.items()}
-            object.__setattr__(self, "sigma", sigma)
+            object.__setattr__(self, "sigma", {key: self._deviation(key, x) for key, x in self.sigma.items()})
 
     def __len__(self) -> int:
         return len(self.t)
 
-    def _samples(self, value: ArrayLike, key: str) -> FloatArray:
-        column = _column(value, f"{self.name}: {key}")
-        if len(column) != len(self):
-            raise ValueError(f"{self.name}: {key} has {len(column)} values, but there are {len(self)} times")
-        if np.isinf(column).any():
-            at = np.flatnonzero(np.isinf(column))[0]
-            raise ValueError(f"{self.name}: {key} is infinite in row {at + 1}; leave missing samples empty")
-        return column
-
-    def _deviation(self, value: float | FloatArray, key: str) -> float | FloatArray:
+    def _deviation(self, key: str, value: float | FloatArray) -> float | FloatArray:
         if key not in self.outputs:
             raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
         array = np.array(value, dtype=float)
@@ -120,11 +115,19 @@ def from_t0(model: OdeModel, record: Record) -> Record:
     return replace(record, t=np.append(model.t0, record.t), outputs=outputs, inputs=inputs, sigma=sigma)
 
 
-def refined(record: Record, every: int) -> Record:
-    """The times of a record and others between them, with its inputs."""
-    t = np.interp(np.arange(every * (len(record) - 1) + 1) / every, np.arange(len(record)), record.t)
+def refined(record: Record, every: int) -> tuple[Record, IntArray]:
+    """The times of a record and others between them, with its inputs, and where its own stand.
+
+    Samples are usually so many steps apart, and further ones in proportion.
+    """
+    if len(record) == 1:
+        return record, np.arange(1)
+    gaps = np.diff(record.t)
+    steps = np.ceil((every - 1e-6) * np.clip(gaps / np.median(gaps), 1.0 / every, 1e3)).astype(int)
+    at = np.append(0, np.cumsum(steps))
+    t = np.interp(np.arange(at[-1] + 1), at, record.t)
     inputs = {name: np.interp(t, record.t, u) for name, u in record.inputs.items()}
-    return Record(t, {}, inputs, None, record.name)
+    return Record(t, {}, inputs, None, record.name), at
 
 
 def inputs_of(model: OdeModel, record: Record) -> FloatArray:
@@ -132,8 +135,7 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
     if missing := [name for name in model.inputs if name not in record.inputs]:
         have = ", ".join(record.inputs) or "none"
         raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
-    columns = [record.inputs[name] for name in model.inputs]
-    return np.array(columns).reshape(len(columns), len(record)).T
+    return np.array([record.inputs[name] for name in model.inputs]).reshape(-1, len(record)).T
 
 
 def record_names(names: Sequence[str]) -> list[str]:
@@ -149,11 +151,8 @@ def record_names(names: Sequence[str]) -> list[str]:
     if len(set(names)) < len(names):
         return [f"record {k + 1}" for k in range(len(names))]
     parts = [PurePath(name).parts or (name,) for name in names]
-    for depth in range(1, max(len(part) for part in parts) + 1):
-        short = ["/".join(part[-depth:]) for part in parts]
-        if len(set(short)) == len(short):
-            return short
-    return list(names)
+    every = (["/".join(part[-depth:]) for part in parts] for depth in range(1, max(map(len, parts)) + 1))
+    return next((short for short in every if len({*short}) == len(names)), list(names))
 
 
 def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
@@ -171,22 +170,15 @@ def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
     import sympy
 
     copies = _copies(model, count)
-    place = [model.parameters.index(name) for name in model.parameters for _ in copies[name]]
-    one_for_all = replace(
-        model,
-        parameters=tuple(copy for name in model.parameters for copy in copies[name]),
-        start=model.start[place],
-        bounds=model.bounds[place],
-        per_record=(),
-    )
+    place = [i for i, each in enumerate(copies.values()) for _ in each]
+    new: dict[str, Any] = {"parameters": sum(copies.values(), ()), "per_record": ()}
+    new |= {"start": model.start[place], "bounds": model.bounds[place]}
     models = []
     for i in range(count):
         put = {sympy.Symbol(name): sympy.Symbol(copies[name][i]) for name in model.per_record}
-        rates, initial, observed, inertia = (
-            tuple(e.subs(put) for e in part)
-            for part in (model.rates, model.initial, model.observed, model.inertia)
-        )
-        models.append(replace(one_for_all, rates=rates, initial=initial, observed=observed, inertia=inertia))
+        for kind in ("rates", "initial", "observed", "inertia"):
+            new[kind] = tuple(e.subs(put) for e in getattr(model, kind))
+        models.append(replace(model, **new))
     return tuple(models)
 
 
@@ -207,13 +199,12 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
     copies, starts = _copies(model, len(records)), {}
     for name, output in model.recorded.items():
         for copy, record in zip(copies[name], records, strict=True):
-            first = float(record.outputs[output][0]) if output in record.outputs else math.nan
-            if math.isnan(first):
+            starts[copy] = float(record.outputs.get(output, np.full(1, np.nan))[0])
+            if np.isnan(starts[copy]):
                 raise ValueError(
                     f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
                     f"[initial] takes it from the record; give a number there, or a parameter"
                 )
-            starts[copy] = first
     return starts
 
 
@@ -226,17 +217,12 @@ def for_copies(model: OdeModel, count: int, given: Mapping[str, T]) -> dict[str,
 def _copies(model: OdeModel, count: int) -> dict[str, tuple[str, ...]]:
     """Copies of each parameter."""
     taken = {*model.parameters, *model.states, *model.inputs}
-
-    def numbered(name: str, gap: str) -> Iterable[str]:
-        return (f"{name}{gap}{i + 1}" for i in range(count))
-
-    copies: dict[str, tuple[str, ...]] = {}
-    for name in model.parameters:
-        gap = "_"
-        while taken & {*numbered(name, gap)}:
-            gap += "_"
-        own = name in model.per_record and count > 1
-        copies[name] = tuple(numbered(name, gap)) if own else (name,)
+    copies: dict[str, tuple[str, ...]] = {name: (name,) for name in model.parameters}
+    for name in model.per_record if count > 1 else ():
+        base = f"{name}_"
+        while taken & {f"{base}{i + 1}" for i in range(count)}:
+            base += "_"
+        copies[name] = tuple(f"{base}{i + 1}" for i in range(count))
     return copies
 
 
@@ -255,8 +241,7 @@ def _check_times(t: FloatArray, name: str) -> None:
         raise ValueError(f"{name} has no samples")
     if (bad := np.flatnonzero(~np.isfinite(t))).size:
         raise ValueError(f"{name}: the time in row {bad[0] + 1} is missing or infinite")
-    if (back := np.flatnonzero(np.diff(t) <= 0)).size:
-        i = int(back[0])
+    for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
         if t[i] == t[i + 1]:
             raise ValueError(
                 f"{name}: the time {t[i]:g} is repeated in row {i + 2}; merge these samples, or use one "

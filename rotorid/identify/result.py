@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,12 +77,12 @@ class Identification(Answered, Uncertain):
     solutions: tuple[Mapping[str, float], ...]
     theta: FloatArray
     unidentifiable: tuple[str, ...]
-    predicted: Mapping[str, ComplexArray]
     left_out: tuple[str, ...]
-    converged: bool
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
     normal_matrix: NormalMatrix
+    notes: tuple[str, ...]
+    predicted: Mapping[str, ComplexArray] = field(default_factory=dict)
+    converged: bool = True
+    warnings: tuple[str, ...] = ()
     prior: PriorEffect | None = None
 
     @property
@@ -104,28 +105,36 @@ class Identification(Answered, Uncertain):
         """Whether errors are stated: intervals are normal ones, else Student's t of what the model leaves."""
         return self.estimate.errors_stated
 
-    @property
-    def residuals(self) -> dict[str, ComplexArray]:
-        """Of each output (n,): measured less predicted, relative to the size; without predictions of each
-        equation. NaN where left out.
+    @cached_property
+    def residuals(self) -> tuple[Column, ...]:
+        """Measured less predicted, as a share of the size, of each output; else of each equation.
+
+        A row an experiment and output; NaN where left out.
         """
-        if not self.predicted and self.linear:
-            rows = self.linear.rows
-            left = np.where(rows.used, rows.Y - rows.K @ self.linear.solution, np.nan)
-            return {
-                f"equation {e // 2 + 1}": left[:, e] + 1j * left[:, e + 1] for e in range(0, left.shape[1], 2)
-            }
-        measured = self.experiments.table(self.model.outputs).T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            gaps = (measured - np.array([*self.predicted.values()])) / np.abs(measured)
-        gaps[~np.isfinite(gaps)] = np.nan
-        return dict(zip(self.predicted, gaps, strict=True))
+        if self.predicted or self.linear is None:
+            measured, rows_of = self.experiments.table(self.model.outputs), list(self.model.outputs)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                left = (measured - np.transpose([*self.predicted.values()])) / np.abs(measured)
+            left[~np.isfinite(left)] = np.nan
+        else:
+            parts = np.full(self.linear.used.shape, np.nan)
+            parts[self.linear.used] = self.linear.estimate.residuals
+            left = parts[:, ::2] + 1j * parts[:, 1::2]
+            rows_of = [f"equation {e + 1}" for e in range(left.shape[1])]
+        n, e = left.shape
+        return (
+            Column("experiment", np.repeat(self.experiments.names, e), str),
+            Column("frequency_rad_s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format, "rad/s"),
+            Column("row", rows_of * n, str),
+            Column("re", left.real.ravel(), "{:.3g}".format, "left, re"),
+            Column("im", left.imag.ravel(), "{:.3g}".format, "left, im"),
+        )
 
     @property
     def residual_rms(self) -> float:
         """Over the real rows used; NaN where there are none."""
-        parts = np.array([*self.residuals.values()]).view(float)
-        return float(np.sqrt(np.nanmean(np.square(parts)))) if np.isfinite(parts).any() else np.nan
+        parts = np.concatenate([column.values for column in self.residuals[3:]])
+        return float(np.sqrt(np.nanmean(parts**2))) if np.isfinite(parts).any() else np.nan
 
     def value(self, name: str) -> float:
         """Value of a parameter by name; NaN if it is not determined."""
@@ -135,19 +144,11 @@ class Identification(Answered, Uncertain):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        names, correlation, left = self.parameters, self.correlation, self.residuals
+        names, correlation = self.parameters, self.correlation
 
         def by_name(values: Sequence[Any]) -> dict[str, Any]:
             return dict(zip(names, values, strict=True))
 
-        n, e, z = len(self.experiments), len(left), np.array([*left.values()]).T.ravel()
-        residuals = (
-            Column("experiment", np.repeat(self.experiments.names, e)),
-            Column("frequency_rad_s", np.repeat(self.experiments.frequencies, e)),
-            Column("row", [*left] * n),
-            Column("re", z.real),
-            Column("im", z.imag),
-        )
         keys = (
             *("method", "converged", "identifiable", "unidentifiable"),
             *("solutions", "residual_rms", "left_out", "warnings"),
@@ -160,7 +161,7 @@ class Identification(Answered, Uncertain):
                 "condition_number": self.estimate.condition_number,
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
                 "correlation": None if correlation is None else by_name([*map(by_name, correlation)]),
-                "residuals": rows(residuals),
+                "residuals": rows(self.residuals),
                 "normal_matrix": self.normal_matrix.to_dict(),
                 **(self.prior.to_dict() if self.prior else {}),
             }
@@ -173,14 +174,14 @@ class Identification(Answered, Uncertain):
     @property
     def answer(self) -> Answer:
         """What is determined and how well the model fits, the values, and what it leaves of each reading."""
-        why = dict(self.prior.why) if self.prior else {}
+        why, several = dict(self.prior.why) if self.prior else {}, len(self.solutions) > 1
         for k, name in enumerate(self.parameters):
             if np.isnan(self.values[k]) and len({f"{s[name]:.9g}" for s in self.solutions}) > 1:
                 why[name] = "several values: see the solutions"
-        found = [parameter_text(self.parameters, self, why), *(f"  {c.line()}" for c in self.combinations)]
-        for i, solution in enumerate(self.solutions if len(self.solutions) > 1 else ()):
+        lines = [parameter_text(self.parameters, self, why), *(f"  {c.line()}" for c in self.combinations)]
+        for i, solution in enumerate(self.solutions if several else ()):
             values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
-            found.append(f"  solution {i + 1}: {values}")
+            lines.append(f"  solution {i + 1}: {values}")
         notes = [f"left out: {row}" for row in self.left_out]
         if self.covariance is None and self.converged and not self.prior:
             notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
@@ -188,45 +189,24 @@ class Identification(Answered, Uncertain):
             notes.append(
                 f"the intervals rest on what is left by {counted(self.dof, 'degree')} of freedom only"
             )
-        columns = self.misfit
-        left = np.array(columns[-1].values)
-        words = f"{self._judgement()} Method: {HEADINGS[self.method]}."
-        if known := bool(np.isfinite(left).any()):
-            rms = float(np.sqrt(np.nanmean(np.square(left))))
-            words += f"\nThe model leaves {percent(round(rms, 10))} % of the readings (rms)."
+        if not self.converged:
+            judgement = "NOT converged: the values are where the search stopped, no estimates."
+        elif not self.identifiable:
+            judgement = "\n".join(map(sentence, self.unidentifiable))
+        else:
+            n, condition = len(self.parameters), self.estimate.condition_number
+            known = "The parameter is" if n == 1 else f"All {n} parameters are"
+            judgement = f"{known} determined (condition number {condition:.3g})."
+            judgement = self.prior.judgement(judgement) if self.prior else judgement
+        judgement += f" Method: {HEADINGS[self.method]}."
+        if self.predicted and np.isfinite(self.residual_rms):
+            left = percent(round(2**0.5 * self.residual_rms, 10))
+            judgement += f"\nThe model leaves {left} % of the readings (rms)."
         return Answer(
-            words,
-            "\n".join(found),
+            judgement,
+            "\n".join(lines),
             self.warnings[::-1],  # what speaks against the answer comes last there
             (*notes, *self.notes),
-            (*((text(columns),) if known else ()), self.normal_matrix.text()),
-            "what it leaves of each reading, " * known + "the normal matrix",
-        )
-
-    def _judgement(self) -> str:
-        if not self.converged:
-            return "NOT converged: the values are where the search stopped, no estimates."
-        if not self.identifiable:
-            return "\n".join(map(sentence, self.unidentifiable))
-        n = len(self.parameters)
-        known = "The parameter is" if n == 1 else f"All {n} parameters are"
-        words = f"{known} determined (condition number {self.estimate.condition_number:.3g})."
-        return self.prior.judgement(words) if self.prior else words
-
-    @property
-    def misfit(self) -> tuple[Column, ...]:
-        """Size of measured and predicted amplitudes, and their difference as a share of the measured one."""
-        names = [name for name in self.model.outputs if name in self.predicted]
-        n, e = len(self.experiments), len(names)
-        measured = self.experiments.table(names).ravel()
-        model = np.array([self.predicted[name] for name in names]).T.ravel()
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left = np.abs(model - measured) / np.abs(measured)
-        return (
-            Column("experiment", np.repeat(self.experiments.names, e), str),
-            Column("rad/s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format),
-            Column("output", names * n, str),
-            Column("measured", np.abs(measured), "{:.4g}".format),
-            Column("model", np.abs(model), "{:.4g}".format),
-            Column("%", left, percent, "left, %"),
+            (text(self.residuals), self.normal_matrix.text()),
+            "what it leaves of each reading, the normal matrix",
         )

@@ -121,21 +121,18 @@ class Fit(Answered, Iterations):
     def series(self) -> tuple[Column, ...]:
         """Of each output of each record: number and rms of its samples, and rms of what the model leaves."""
         names = record_names([record.name for record in self.records])
-        each = [
-            (name, output, measured, run.y[:, self.model.outputs.index(output)] - measured)
-            for name, record, run in zip(names, self.records, self.simulations, strict=False)
-            for output, measured in record.outputs.items()
-            if not np.isnan(measured).all()
-        ]
-        short, outputs, measured, left = zip(*each, strict=True) if each else [()] * 4
-        rms = [[float(np.sqrt(np.nanmean(x**2))) for x in columns] for columns in (measured, left)]
-        return (
-            Column("record", short, str if len(self.records) > 1 else None),
-            Column("output", outputs, str),
-            Column("samples", [int(np.isfinite(x).sum()) for x in measured], "{:d}".format),
-            Column("rms", rms[0], "{:.4g}".format),
-            Column("residual_rms", rms[1], "{:.4g}".format, "left, rms"),
-        )
+        lines: list[tuple[str, str, int, float, float]] = []
+        for name, record, run in zip(names, self.records, self.simulations, strict=False):
+            for output, measured in record.outputs.items():
+                seen, y = np.isfinite(measured), run.y[:, self.model.outputs.index(output)]
+                if seen.any():
+                    rms = [float(np.sqrt(np.mean(x[seen] ** 2))) for x in (measured, y - measured)]
+                    lines.append((name, output, int(seen.sum()), rms[0], rms[1]))
+        columns = zip(*lines, strict=True) if lines else [()] * 5
+        headings = ("record", "output", "samples", "rms", "residual_rms")
+        shown = (str if len(self.records) > 1 else None, str, str, "{:.4g}".format, "{:.4g}".format)
+        titles = (None, None, None, None, "left, rms")
+        return tuple(map(Column, headings, columns, shown, titles))
 
     def tables(self) -> tuple[tables.Table, ...]:
         """Parameters by iteration, and the states by iteration where a trajectory was iterated."""
@@ -156,30 +153,25 @@ class Fit(Answered, Iterations):
         """As JSON types; what is unknown is None."""
         names, change = self.parameters, self.integration_change
         steps = zip(self.history, self.costs, strict=True)
-        told = {
-            "residual_rms": self.residual_rms,
-            "method": self.method,
-            "integrator": self.integrator,
-            "loss": self.loss,
-            "converged": self.converged,
-            "message": self.message,
-            "reliable": self.reliable,
-            "stopped_by": self.stopped_by,
-            "iterations": self.iterations,
+        kept = "residual_rms method integrator loss converged message reliable stopped_by iterations errors"
+        kept = f"{kept} at_bounds autocorrelation warnings"
+        document = {key: getattr(self, key) for key in kept.split()} | {
             "history": [
                 {"cost": cost, "parameters": dict(zip(names, row, strict=True))} for row, cost in steps
             ],
-            "errors": self.errors,
             "series": rows(self.series),
-            "at_bounds": self.at_bounds,
             "minima": [{"parameters": m.values, "cost": m.cost, "starts": m.starts} for m in self.minima],
             "integration_change": None if change is None else dict(zip(names, change, strict=True)),
-            "autocorrelation": self.autocorrelation,
-            "warnings": self.warnings,
         }
         matrix = self.normal_matrix and self.normal_matrix.to_dict()
         more = self.prior.to_dict() if self.prior else {}
-        return {**self.estimate.to_dict(), "solutions": [], **plain(told), "normal_matrix": matrix, **more}
+        return {
+            **self.estimate.to_dict(),
+            "solutions": [],
+            **plain(document),
+            "normal_matrix": matrix,
+            **more,
+        }
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, the 95 % interval, and whether it stands at a bound."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import signs
 from rotorid.identify.expressions import names as names_in
-from rotorid.identify.ode import OdeModel, Reader, ode_model
+from rotorid.identify.ode import OdeModel, check_known, ode_model, read_expression
 
 if TYPE_CHECKING:
     from fem import StateSpace
@@ -35,15 +35,12 @@ def second_order(  # noqa: PLR0913
     bounds: Mapping[str, tuple[float, float]] | None = None,
     per_record: Sequence[str] = (),
     names: Sequence[str] | None = None,
-    masses: Mapping[str, float | str] | None = None,
-    dampers: Mapping[str, float | str] | None = None,
-    springs: Mapping[str, float | str] | None = None,
 ) -> OdeModel:
     """Make a model M y'' + C y' + K y = f of matrices.
 
     Those of a rotor come from `fem.equations_of_motion` (`motion.M, motion.C, motion.K`, with
     `names=motion.coordinates`), those of a reduced model from `Reduction.equations_of_motion`; what is to be
-    estimated at a bearing or a disc is added by `masses`, `dampers` and `springs`.
+    estimated at a bearing or a disc is written into them as text.
 
     Parameters
     ----------
@@ -60,9 +57,6 @@ def second_order(  # noqa: PLR0913
     names
         Names of the displacements, y1, y2, … by default; the velocity of y1 is v_y1. The states are
         y1, v_y1, y2, v_y2, …
-    masses, dampers, springs
-        {displacement: number or expression}, added to the diagonals of M, C and K: what stands between this
-        displacement and the ground.
 
     Raises
     ------
@@ -80,51 +74,47 @@ def second_order(  # noqa: PLR0913
     >>> import fem
     >>> shaft = fem.Rotor(length=[0.5, 0.5], outer_diameter=0.05)
     >>> motion = fem.equations_of_motion(shaft, plane="x")
-    >>> model = second_order(motion.M, motion.C, motion.K, names=motion.coordinates,
-    ...                      springs={"x1": "k", "x3": "k"}, estimate={"k": 1e7}, initial={"x2": 1e-3})
+    >>> K = motion.K.tolist()
+    >>> for i in (motion.index("x1"), motion.index("x3")):
+    ...     K[i][i] = f"{K[i][i]} + k"
+    >>> model = second_order(motion.M, motion.C, K, names=motion.coordinates,
+    ...                      estimate={"k": 1e7}, initial={"x2": 1e-3})
     >>> model.parameters
     ('k',)
     """
     import sympy
 
-    n = len(mass)
-    dofs = tuple(names) if names is not None else tuple(f"y{i + 1}" for i in range(n))
-    m, c, k = (
-        _entries(matrix, what, dofs, added or {}, ground)
-        for matrix, what, added, ground in (
-            (mass, "mass", masses, "masses"),
-            (damping, "damping", dampers, "dampers"),
-            (stiffness, "stiffness", springs, "springs"),
-        )
-    )
+    given = {"mass": mass, "damping": damping, "stiffness": stiffness}
+    m, c, k = (_entries(matrix, what) for what, matrix in given.items())
+    n, force = len(m), force or {}
     if not len(c) == len(k) == n:
         raise ValueError(f"the matrices have different sizes: mass {n}, damping {len(c)}, stiffness {len(k)}")
+    dofs = tuple(names or (f"y{i + 1}" for i in range(n)))
     if len(dofs) != n:
         raise ValueError(f"{n} names of displacements are needed, not {len(dofs)}")
-    if extra := [name for name in force or {} if name not in dofs]:
-        raise ValueError(f"force: {extra[0]} is no displacement; displacements are {', '.join(dofs)}")
+    check_known("force", force, "displacement", dofs)
+    rates = [f"v_{dof}" for dof in dofs]
     states: dict[str, str] = {}
-    for i, dof in enumerate(dofs):
-        terms = [f"({(force or {}).get(dof, 0)})"]
-        terms += [f"({c[i][j]})*v_{dofs[j]}" for j in range(n) if c[i][j] != "0"]
-        terms += [f"({k[i][j]})*{dofs[j]}" for j in range(n) if k[i][j] != "0"]
-        states |= {dof: f"v_{dof}", f"v_{dof}": " - ".join(terms)}
+    for dof, *row in zip(dofs, c, k, strict=True):
+        terms = zip([*row[0], *row[1]], [*rates, *dofs], strict=True)
+        products = [f"({value})*{name}" for value, name in terms if value != "0"]
+        states |= {dof: f"v_{dof}", f"v_{dof}": " - ".join([f"({force.get(dof, 0)})", *products])}
     plain = ode_model(
         states,
         estimate=estimate,
         initial=dict.fromkeys(states, 0.0) | dict(initial or {}),
-        outputs=dict(outputs) if outputs else {name: name for name in dofs},
+        outputs=outputs or {name: name for name in dofs},
         known=known,
         inputs=inputs,
         bounds=bounds,
         per_record=per_record,
     )
-    read = Reader(plain.known)
-    cells = [[sympy.Integer(i == j) for j in range(2 * n)] for i in range(2 * n)]
-    for i, row in enumerate(m):
-        cells[2 * i + 1][1::2] = [read(cell, f"mass matrix, row {i + 1}", set(estimate)) for cell in row]
-    model = replace(plain, inertia=tuple(cell for row in cells for cell in row))
-    model.rate(0.0, np.zeros(2 * n), model.start, np.zeros(len(model.inputs)))  # a singular mass matrix
+    inertia = sympy.eye(2 * n)
+    for i, j in np.ndindex(n, n):
+        where = f"mass matrix, row {i + 1}"
+        inertia[2 * i + 1, 2 * j + 1] = read_expression(m[i][j], where, estimate, plain.known)
+    model = replace(plain, inertia=tuple(inertia))
+    model.augmented(0.0, np.zeros(2 * n), model.start, np.zeros(len(inputs)))  # a singular mass matrix
     return model
 
 
@@ -156,58 +146,38 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
     >>> state_space(model).A
     array([[-2.]])
     """
-    import sympy
-
     from fem import StateSpace
 
     if not model.states:
         raise ValueError("a model without states has no state space")
-    symbols = [sympy.Symbol(name) for name in (*model.states, *model.inputs)]
-    varying = {*model.states, *model.inputs}
-    parts = [("the rate of", *pair) for pair in zip(model.states, model.rates, strict=True)]
-    parts += [("the output", *pair) for pair in zip(model.outputs, model.observed, strict=True)]
-    for what, name, expression in parts:
-        if "t" in names_in(expression):
+    varying = [s for s in model.symbols if s.name in {*model.states, *model.inputs}]
+    parts = [(f"the rate of {x}", e) for x, e in zip(model.states, model.rates, strict=True)]
+    parts += [(f"the output {y}", e) for y, e in zip(model.outputs, model.observed, strict=True)]
+    for what, e in parts:
+        if "t" in names_in(e):
             raise ValueError(
-                f"{what} {name} depends on the time itself: a state space does not; make what varies an input"
+                f"{what} depends on the time itself: a state space does not; make what varies an input"
             )
-        if any(names_in(e) & varying for e in (*signs(expression), *map(expression.diff, symbols))):
-            raise ValueError(f"{what} {name} is not linear in states and inputs: a state space must be")
+        if any(part.free_symbols & {*varying} for part in (*signs(e), *map(e.diff, varying))):
+            raise ValueError(f"{what} is not linear in states and inputs: a state space must be")
+        if e.subs(dict.fromkeys(varying, 0)) != 0:
+            raise ValueError(f"{what} has a constant part, which a state space cannot hold: make it an input")
     values = model.start if theta is None else np.asarray(theta, dtype=float)
     if values.shape != model.start.shape or not np.isfinite(values).all():
         raise ValueError(f"{len(model.parameters)} parameter values are needed, finite numbers")
-    n, m = len(model.states), len(model.inputs)
-    table, at_rest = model.matrices(values)[0], model.h(0.0, np.zeros(n), values, np.zeros(m))
-    constants = [*table[:, n], *at_rest[:, 0]]
-    for (what, name, _), constant in zip(parts, constants, strict=True):
-        if constant:
-            raise ValueError(
-                f"{what} {name} has a constant part, which a state space cannot hold: make it an input"
-            )
-    # linear, and 0 without inputs: the outputs of unit inputs are the columns of D
-    D = model.h(np.zeros(m), np.zeros((m, n)), values, np.eye(m))[..., 0].T
-    C = at_rest[:, 1 : 1 + n]
-    return StateSpace(table[:, :n], table[:, n + 1 :], C, D.copy(), model.states, model.inputs, model.outputs)
+    A, _, B = np.split(model.matrices(values)[0], np.add(len(model.states), (0, 1)), axis=1)
+    # linear, and 0 without states and inputs: outputs of unit states and inputs are the columns of C and D
+    n, both = len(A), np.eye(len(varying))
+    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
+    return StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
 
 
-def _entries(
-    matrix: Matrix, what: str, dofs: Sequence[str], added: Mapping[str, float | str], ground: str
-) -> list[list[str]]:
-    """Texts of a matrix, with what stands between displacements and the ground on its diagonal."""
-    rows = [[_entry(v, f"{what} matrix, row {i + 1}") for v in row] for i, row in enumerate(matrix)]
-    if not rows or any(len(row) != len(rows) for row in rows):
+def _entries(matrix: Matrix, what: str) -> list[list[str]]:
+    """Texts of a matrix."""
+    if not len(matrix) or any(len(row) != len(matrix) for row in matrix):
         raise ValueError(f"the {what} matrix must be square, (n, n)")
-    for name, value in added.items():
-        if name not in dofs:
-            raise ValueError(f"{ground}: {name} is no displacement; displacements are {', '.join(dofs)}")
-        i = dofs.index(name)
-        rows[i][i] = f"({rows[i][i]}) + ({_entry(value, f'{ground}, {name}')})"
-    return rows
-
-
-def _entry(value: float | str, where: str) -> str:
-    if isinstance(value, str):
-        return value
-    if not np.isfinite(value):
-        raise ValueError(f"{where}: {value} is no finite number")
-    return "0" if value == 0 else repr(float(value))
+    for i, row in enumerate(matrix):
+        for value in row:
+            if not isinstance(value, str) and not np.isfinite(value):
+                raise ValueError(f"{what} matrix, row {i + 1}: {value} is no finite number")
+    return [[v if isinstance(v, str) else repr(float(v)) if v else "0" for v in row] for row in matrix]

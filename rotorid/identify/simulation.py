@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +17,25 @@ from rotorid.identify.records import Record, from_t0, inputs_of
 
 STEPWISE = (*HEUN, "rk4")
 """Integrators without error control, of one step from sample to sample."""
-Integrate = Callable[[System, float], tuple[FloatArray, str]]
-"""System and rtol → states and sensitivities (n, size), and the integrator used."""
+INTEGRATORS: tuple[Method[None], ...] = (
+    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", None),
+    Method("expm", "the exact solution of a linear model with constant coefficients", None),
+    Method("dop853", "error control, for smooth models", None),
+    Method("lsoda", "error control, for stiff models", None),
+    Method(
+        "taylor",
+        "Taylor series, compiled for the model: for long or many fits, with the extra rotorid[fast]",
+        None,
+    ),
+    Method("heun", "one step from sample to sample", None),
+    Method(
+        "sequential-heun",
+        "the scheme of [Q], to repeat its tables: heun, but each state is corrected with those before it in "
+        "the model, whose order matters",
+        None,
+    ),
+    Method("rk4", "one step from sample to sample, as [F]", None),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +99,7 @@ def simulate(
     ValueError
         An integrator that does not suit the model, missing inputs.
     """
-    integrate = find(INTEGRATORS, integrator, "integrator").function
+    find(INTEGRATORS, integrator, "integrator")
     given = record if isinstance(record, Record) else Record(np.asarray(record), name="the times")
     values = np.asarray(theta, dtype=float)
     if values.shape != (len(model.parameters),) or not np.isfinite(values).all():
@@ -91,17 +108,14 @@ def simulate(
         )
     whole = from_t0(model, given)
     t, u, n = whole.t, inputs_of(model, whole), len(model.states)
-    size, used, steps = n * (1 + sensitivities * len(values)), "none", 0
-    table = np.zeros((len(t), 0))
+    x, S, used, steps = np.zeros((len(t), n)), np.zeros((len(t), n, len(values))), "none", 0
     if n:
         system = System(model, values, t, u, sensitivities)
         _check(model, t[:1], system.first[None])
-        table, used = integrate(system, rtol)
-        steps = system.steps
+        table, used = _solved(system, integrator, rtol)
         _check(model, t, table)
-    x, S = table[:, :n], table[:, n:size].reshape(len(t), n, -1) if sensitivities and n else None
-    if S is None:
-        S = np.zeros((len(t), n, len(values)))
+        x, steps = table[:, :n], system.steps
+        S = table[:, n:].reshape(S.shape) if sensitivities else S
     outputs = model.h(t, x, values, u)
     y, y_theta = outputs[..., 0], outputs[..., 1 : 1 + n] @ S + outputs[..., 1 + n :]
     y_theta = y_theta if sensitivities else np.zeros_like(y_theta)
@@ -137,6 +151,15 @@ def simulated_record(
     return replace(plan, outputs=dict(zip(model.outputs, columns, strict=True)), sigma=sigma)
 
 
+def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, str]:
+    """States and sensitivities (n, size), and the integrator used."""
+    if integrator in STEPWISE:
+        return stepwise(system, integrator), integrator
+    if integrator == "expm" or (integrator == "auto" and system.model.linear_driven):
+        return exact(system), "expm"
+    return adaptive(system, rtol, integrator)
+
+
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
     """Refuse states and sensitivities (n, size) that have diverged, with the time and the state."""
     n = len(model.states)
@@ -146,40 +169,3 @@ def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
         j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
         value = f"{table[i, j]:.3g}" if lost[i].any() else "not finite in its sensitivity to the parameters"
         raise diverged(model, float(t[i]), j, value)
-
-
-def _auto(system: System, rtol: float) -> tuple[FloatArray, str]:
-    return (exact(system), "expm") if system.model.linear_driven else adaptive(system, rtol, "auto")
-
-
-def _adaptive(name: str) -> Integrate:
-    return lambda system, rtol: adaptive(system, rtol, name)
-
-
-def _stepwise(name: str) -> Integrate:
-    return lambda system, _: (stepwise(system, name), name)
-
-
-INTEGRATORS: tuple[Method[Integrate], ...] = (
-    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", _auto),
-    Method(
-        "expm",
-        "the exact solution of a linear model with constant coefficients",
-        lambda system, _: (exact(system), "expm"),
-    ),
-    Method("dop853", "error control, for smooth models", _adaptive("dop853")),
-    Method("lsoda", "error control, for stiff models", _adaptive("lsoda")),
-    Method(
-        "taylor",
-        "Taylor series, compiled for the model: for long or many fits, with the extra rotorid[fast]",
-        _adaptive("taylor"),
-    ),
-    Method("heun", "one step from sample to sample", _stepwise("heun")),
-    Method(
-        "sequential-heun",
-        "the scheme of [Q], to repeat its tables: heun, but each state is corrected with those before it in "
-        "the model, whose order matters",
-        _stepwise("sequential-heun"),
-    ),
-    Method("rk4", "one step from sample to sample, as [F]", _stepwise("rk4")),
-)

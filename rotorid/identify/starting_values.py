@@ -13,8 +13,8 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.amplitudes import Experiments
-from rotorid.identify.checks_amplitudes import passive_elements
 from rotorid.identify.combinations import CONSTANT
+from rotorid.identify.linear_start import passive_elements
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.regression.search import search_from
 
@@ -63,9 +63,9 @@ def starting_values(
         raise ValueError(f"no start was found: give starting values of {missing}")
     apart: list[FloatArray] = []
     for _, point in ends:
-        if not any(np.allclose(point, other, rtol=1e-3) for other in apart):
+        if len(apart) < BEST and not any(np.allclose(point, other, rtol=1e-3) for other in apart):
             apart.append(point)
-    return apart[:BEST]
+    return apart
 
 
 def _projected(
@@ -95,11 +95,7 @@ def _projected(
         r = (v - np.einsum("neh,nfh,nf->ne", Q, Q.conj(), v)) / known[:, None]
         return np.concatenate((r.real.ravel(), r.imag.ravel()))
 
-    scale = np.ones(len(model.parameters))
-    alone = np.abs(model.exponents).sum(axis=1) == 1
-    for j in range(len(scale)):
-        slopes = np.abs(model.coefficients[:, alone & (model.exponents[:, j] == 1)]).sum(axis=1)
-        sizes = np.median(force, axis=0)[slopes > 0] * slopes[slopes > 0]
-        if len(sizes) and sizes.any():
-            scale[j] = float(np.median(known)) / float(np.median(sizes))
-    return projected, scale
+    alone = np.abs(model.exponents).sum(axis=1, keepdims=True) == 1
+    slopes = np.abs(model.coefficients) @ (alone & (model.exponents == 1))
+    sizes, middle = np.median(force, axis=0)[:, None] * slopes, np.median(known)
+    return projected, np.array([middle / np.median(x[x > 0]) if x.any() else 1.0 for x in sizes.T])

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem import CubicSpring, JournalBearing, NodeForce, SqueezeFilm, Stop
+from fem import JournalBearing, NodeForce, Stop
 from fem.forces import kind_of, law
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import speed_text
-from rotorid.motion.system import MotionSystem
+from rotorid.motion.system import MotionSystem, followers
 
 _SMALLEST_STEP = 1e-9
 """Of Newton's way, and of the load in its continuation."""
@@ -104,25 +104,23 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
     """
     speed = number(speed, "speed")
     check_journals(system, speed, "give speeds above 0")
-    resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
-    J = _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1]
     if start is None:
-        _check_held(system, J, speed)
-    q = _condensed(resting, K, speed, start)
-    for force, drop in zip(system.forces, np.abs(system.at_forces(q)), strict=True):
-        if drop >= force.wall:  # which the forces at rest do not know
-            raise ValueError(
-                f"at {speed_text(speed)} the shaft touches {named(force)} under its weight: it drops by "
-                f"{1e3 * drop:.4g} mm there, the clearance is {1e3 * force.wall:.4g} mm"
-            )
-    if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= 1e-6 * np.abs(system.weight).sum():
-        _check_held(system, J, speed)
+        _check_held(system, K, speed)
+    at = np.unique(system.law_tables[2])  # what has no force of its own follows these in a straight line
+    others, T = np.setdiff1d(np.arange(system.size), at), followers(K, at)
+    q = np.zeros(system.size)
+    q[others] = np.linalg.solve(K[np.ix_(others, others)], system.weight[others])
+    names = tuple(system.coordinates[i] for i in at)
+    part = replace(system, coordinates=names, weight=(system.weight - K @ q)[at])
+    q += T @ _solved(part, (K @ T)[at], speed, None if start is None else start[at])
+    if not np.abs(_left_over(system, K, q, speed)[0]).max() <= 1e-6 * np.abs(system.weight).sum():
+        _check_held(system, K, speed)
         raise ValueError(
             f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
     walled = np.flatnonzero(np.isfinite(system.walls))
-    load = -each_force(resting, q, speed)[walled, :, 0]
+    load = -each_force(system, q, speed)[walled, :, 0]
     q.setflags(write=False)
     return Equilibrium(system, speed, q, tuple(system.forces[k] for k in walled), load @ np.array([1, 1j]))
 
@@ -138,7 +136,7 @@ def at_rest(system: MotionSystem, speed: float) -> FloatArray:
 def eigenvalues_at_rest(
     system: MotionSystem, q: FloatArray, speed: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Eigenvalues, rad/s, (2n,), infinite without mass, and shapes, (n, 2n), of motion about rest in q."""
+    """Finite eigenvalues, rad/s, (m,), and shapes, (n, m), of motion about rest in q."""
     from scipy.linalg import eig
 
     C, K = system.about(q, speed)
@@ -149,26 +147,30 @@ def eigenvalues_at_rest(
     else:
         right = np.block([[eye, zero], [zero, system.M]])
         values, vectors = eig(np.block([[zero, eye], [-K, -C]]), right)
-    return values.astype(complex), vectors[: q.size].astype(complex)
+    finite = np.isfinite(values)  # not so without mass
+    return values[finite].astype(complex), vectors[: q.size, finite].astype(complex)
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
     """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,).
 
-    Its size is what is free: one of the shafts comes to its wall, or deflects twice as much as at rest.
+    Its size is what is free: see `room`; without walls it deflects as much as at rest.
     """
     values, shapes = eigenvalues_at_rest(system, q, speed)
-    finite = np.isfinite(values)
-    whirls = finite & (values.imag > 0) if (finite & (values.imag > 0)).any() else finite
-    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
+    whirls = values.imag > 0
+    k = int(np.where(whirls | ~whirls.any(), values.real, -np.inf).argmax())
     shape = shapes[:, k] * np.exp(-0.5j * np.angle(np.sum(shapes[:, k] ** 2)))
-    places = np.array([system.index(node) for node in system.nodes])
-    moved, at = np.linalg.norm(shape[places], axis=1), np.linalg.norm(q[places], axis=1)
-    free = np.full(len(places), max(float(at.max()), 1e-6))
-    for force in system.forces:
-        if np.isfinite(force.wall):
-            free[system.nodes.index(force.node)] = force.wall - at[system.nodes.index(force.node)]
-    return float(values[k].imag), np.asarray(shape * min(free / np.maximum(moved, 1e-300)))
+    size = room(system, q, shape)
+    if size == np.inf:
+        size = max(np.abs(q).max(), 1e-6) / np.abs(shape).max()
+    return float(values[k].imag), np.asarray(size * shape)
+
+
+def room(system: MotionSystem, q: FloatArray, shape: ComplexArray) -> float:
+    """How many times a whirl q + Re(shape e^{iφ}) may be as large until a shaft is at its wall."""
+    moved = np.hypot(*(np.abs(system.at_forces(part)) for part in (shape.real, shape.imag)))
+    free = system.walls - np.abs(system.at_forces(q))
+    return float((free / np.maximum(moved, 1e-300)).min(initial=np.inf))
 
 
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
@@ -193,31 +195,11 @@ def named(force: NodeForce) -> str:
 
 
 def _left_over(
-    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
+    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Forces that are left over under a share of the weight, and minus their derivative."""
     F, F_q, *_ = system.acting(q, np.zeros(system.size), speed)
     return share * system.weight + F - K @ q, K - F_q
-
-
-def _condensed(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
-    """The equilibrium: what has no force of its own follows the rest in a straight line."""
-    at = np.unique(system.law_tables[2])
-    others = np.setdiff1d(np.arange(system.size), at)
-    known = np.column_stack((system.weight[others], -K[np.ix_(others, at)]))
-    follow = np.linalg.solve(K[np.ix_(others, others)], known)
-    across = K[np.ix_(at, others)]
-    part = replace(
-        system,
-        coordinates=tuple(system.coordinates[i] for i in at),
-        weight=system.weight[at] - across @ follow[:, 0],
-    )
-    q = np.empty(system.size)
-    q[at] = _solved(
-        part, K[np.ix_(at, at)] + across @ follow[:, 1:], speed, None if start is None else start[at]
-    )
-    q[others] = follow[:, 0] + follow[:, 1:] @ q[at]
-    return q
 
 
 def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
@@ -227,18 +209,17 @@ def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray
         return near
     while share < 1.0:
         further = min(share + step, 1.0)
-        solution = _newton(system, K, q, speed, further)
-        if solution is not None:
+        if (solution := _newton(system, K, q, speed, further)) is not None:
             q, share, step = solution, further, 2 * step
-        elif step < _SMALLEST_STEP:
+        elif step > _SMALLEST_STEP:
+            step /= 4
+        else:
             e = np.abs(system.at_forces(q)) / system.walls
             k = int(np.argmax(e))
             raise ValueError(
                 f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight "
                 f"the shaft uses {100 * e[k]:.4g} % of its clearance at {named(system.forces[k])}"
             )
-        else:
-            step /= 4
     return q
 
 
@@ -256,32 +237,24 @@ def _newton(
         gap = min((system.walls - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
         if np.abs(dz).max(initial=0.0) <= 1e-8 * gap:
             return np.asarray(q + d)
-        t, size = 1.0, np.linalg.norm(r)
-        while True:
-            r, J = _left_over(system, K, q + t * d, speed, share)
-            if np.linalg.norm(r) < (1 - 0.1 * t) * size:
-                break
+        t, size = 2.0, np.linalg.norm(r)
+        while (
+            not np.linalg.norm(r) < (1 - 0.1 * t) * size
+        ):  # also at first, and beyond a wall, where it is NaN
             t /= 2
             if t < _SMALLEST_STEP:
                 return None
+            r, J = _left_over(system, K, q + t * d, speed, share)
         q = q + t * d
     return None
 
 
-def _at_rest(force: NodeForce) -> NodeForce:
-    """What acts while nothing moves: of a squeeze film its centring spring."""
-    if not isinstance(force, SqueezeFilm):
-        return force
-    return CubicSpring(force.node, force.name, force.centring_stiffness)
-
-
-def _check_held(system: MotionSystem, J: FloatArray, speed: float) -> None:
+def _check_held(system: MotionSystem, K: FloatArray, speed: float) -> None:
+    """Refuse a rotor that nothing holds in the middle."""
+    J = _left_over(system, K, np.zeros(system.size), speed)[1]
     largest = np.abs(J).max(axis=1, keepdims=True)
-    if largest.all() and np.linalg.cond(J / largest) < 1e13:
-        return
-    falls = [f for f in system.forces if isinstance(f, SqueezeFilm) and not f.centring_stiffness]
-    why = [f"{named(f)} has no centring spring, at rest its shaft falls to the wall" for f in falls]
-    raise ValueError(
-        f"at {speed_text(speed)} nothing holds the rotor, its position is not determined: "
-        + ("; ".join(why) or "give it stiffness or journal bearings at two nodes")
-    )
+    if not largest.all() or not np.linalg.cond(J / largest) < 1e13:
+        raise ValueError(
+            f"at {speed_text(speed)} nothing holds the rotor, its position is not determined: give it "
+            "stiffness or journal bearings at two nodes, a squeeze film its centring spring"
+        )

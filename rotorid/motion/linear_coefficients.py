@@ -18,8 +18,7 @@ from rotorid.motion.system import MotionSystem
 from rotorid.reduction import SmallModel
 
 _AnyRotor = TypeVar("_AnyRotor", bound=fem.Rotor | SmallModel)
-_STEP, _MANY = 0.05, 200
-"""Between speeds at which coefficients are known, by the speed; those asked for that count at most."""
+_STEP = 0.05  # between speeds at which coefficients are known, by the speed
 _AROUND = ((1e-2, 40), (1e-4, 1))
 """How far from the threshold, by its speed, the equilibria beside it are, time after time; steps between."""
 
@@ -89,23 +88,22 @@ def threshold(
     lowest, highest = resting[0].speed, resting[-1].speed
     start = max(lowest, 1e-3 * highest)
     more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1].tolist()
-    known = {one.speed: one for one in (*resting[:: 1 + len(resting) // _MANY], resting[-1])}
+    known = {one.speed: one for one in resting}
     known |= {one.speed: one for one in equilibria(system, sorted({*more, *system.knots[1:-1].tolist()}))}
     linear = linear_rotor(rotor, [known[speed] for speed in sorted(known)])
     stable = _search(linear, lowest, highest)
-    ranges = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]
-    guesses = [one.first for one in ranges if one.begins] + [stable.threshold or highest]
     for share, steps in _AROUND:
-        a, b = (float(np.clip(min(guesses) * (1 + s), lowest, highest)) for s in (-share, share))
-        near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
-        if near.threshold is None:
+        if stable.threshold is None:
             break
-        stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
-        guesses = [near.threshold]
+        a, b = np.clip(stable.threshold * np.array([1 - share, 1 + share]), lowest, highest).tolist()
+        near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
+        if near.threshold is not None:
+            stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
+    ends = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]
     again = tuple(
         f"about {speed_text(one.last)} it is stable again; `rotorid campbell` of the file that --output "
         "writes shows all such ranges"
-        for one in ranges
+        for one in ends
         if one.ends
     )
     return replace(stable, warnings=again)

@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.plot_style import (
-    BOX,
     COLORS,
     DARK,
     MARKERS,
-    QUIET,
+    TEXT,
     VERMILION,
-    WIDTH,
     legend_above,
     legend_below,
     look,
-    new_axes,
     new_figure,
     note,
     plain,
@@ -32,63 +29,60 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.branches import Branch
     from rotorid.motion.equilibrium import Equilibrium
-    from rotorid.motion.periodic import Readings
 
-_PANELS, _TURNS, _LARGEST_ORDER = 4, 12, 4.0
+_PANELS, _TURNS, _ORDERS = 4, 12, 4.0
 """Nodes that are drawn, turns of an orbit, orders of a spectrum."""
+CIRCLE = np.array([part(np.linspace(0, 2 * np.pi, 181)) for part in (np.cos, np.sin)])
 _LOWEST_PHASE = -315.0
 """Degrees; phases stand from here on through a whole turn."""
 
 
 def motion_figure(motion: MotionRun) -> Figure:
     """Of each node x and y over time, and at a constant speed the spectrum of the second half beside them."""
-    shown, constant = _shown(motion), motion.speeds[0] == motion.speeds[1]
-    figure = new_figure(1.2 + 1.9 * len(shown))
-    widths = [3, 2] if constant else [1]
+    shown, turn = _shown(motion), motion.speeds[0] / (2 * np.pi)
+    figure, widths = new_figure(1.2 + 1.9 * len(shown)), [3, 2][: 1 + (motion.speeds[0] == motion.speeds[1])]
     axes = figure.subplots(len(shown), len(widths), sharex="col", width_ratios=widths, squeeze=False)
     for i, row in zip(shown, axes, strict=True):
         for k, (name, values) in enumerate((("x", motion.z[:, i].real), ("y", motion.z[:, i].imag))):
-            row[0].plot(motion.time, 1e6 * values, label=name, linewidth=0.7, color=look(k)["color"])
+            row[0].plot(motion.time, 1e6 * values, label=name, linewidth=0.7, color=COLORS[k])
         row[0].set_ylabel(f"node {motion.nodes[i]}, µm")
-        if constant:
-            _draw_spectrum(motion, i, row[1])
+        for ax in row[1:]:
+            z = motion.z[len(motion.z) // 2 :, i]
+            fade = np.hanning(len(z) + 2)[1:-1]
+            lines = np.fft.fftshift(np.abs(np.fft.fft(fade * (z - z.mean())))) / fade.sum()
+            frequency = np.fft.fftshift(np.fft.fftfreq(len(z), motion.time[1])) / (turn or 1.0)
+            ax.plot(frequency, 1e6 * lines, linewidth=1.0, color=COLORS[0])
+            ax.set(ylabel="amplitude, µm", ylim=(0, None), xlim=(-_ORDERS, _ORDERS) if turn else None)
         for ax in row:
             plain(ax)
-    axes[-1, 0].set_xlabel("time, s")
-    if constant:
-        axes[-1, 1].set_xlabel("frequency, cycles a turn" if motion.speeds[0] else "frequency, Hz")
-        axes[0, 1].legend(frameon=False, fontsize="small")
+    against = f"{'cycles a turn' if turn else 'Hz'}, backward < 0"
+    for ax, label in zip(axes[-1], ("time, s", against), strict=False):
+        ax.set_xlabel(label)
     legend_below(figure, [axes[0, 0]])
     return figure
 
 
 def orbits_figure(motion: MotionRun) -> Figure:
     """Of each node the last turns, a dot at each turn, and the clearance circle of its bearing."""
-    from scipy.interpolate import CubicSpline
-
     shown, angle = _shown(motion), motion.turned
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     figure = new_figure(0.9 + 3.2 * rows)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax in axes[len(shown) :]:
-        ax.remove()
     walls = {i: 1e6 * force.wall for force, i in motion.bearings}
-    k = int(np.searchsorted(angle, angle[-1] - 2 * np.pi * _TURNS)) if angle[-1] > angle[0] else 0
-    marks = 2 * np.pi * np.arange(np.ceil(angle[k] / (2 * np.pi)), np.floor(angle[-1] / (2 * np.pi)) + 1)
-    for i, ax in zip(shown, axes, strict=False):
+    k = int(np.searchsorted(angle, angle[-1] - 2 * np.pi * _TURNS))
+    marks = 2 * np.pi * np.arange(np.ceil(angle[k] / (2 * np.pi)), angle[-1] / (2 * np.pi))
+    for place, i in enumerate(shown, start=1):
+        ax = figure.add_subplot(rows, columns, place)
         z = 1e6 * motion.z[k:, i]
-        ax.plot(z.real, z.imag, linewidth=0.9, color=look(0)["color"])
-        if z.size > 3 and marks.size and angle[-1] > angle[k]:
-            at = CubicSpline(angle[k:], z)(marks)
+        ax.plot(z.real, z.imag, linewidth=0.9, color=COLORS[0])
+        if marks.size:
+            at = np.interp(marks, angle[k:], z)
             ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
-        if wall := walls.get(i):
-            ax.axhline(0, color=QUIET, linewidth=0.5)
-            ax.axvline(0, color=QUIET, linewidth=0.5)
-            turn = wall * np.exp(1j * np.linspace(0, 2 * np.pi, 181))
-            ax.plot(turn.real, turn.imag, color=DARK, linewidth=1.2)
-            note(ax, "clearance", (0.0, wall), (0, 2), color=DARK, ha="center")
+        if i in walls:
+            ax.plot(*walls[i] * CIRCLE, color=DARK, label="clearance")
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
         plain(ax)
@@ -109,7 +103,8 @@ def bode_figure(motion: MotionRun) -> Figure:
         raise ValueError("at a constant speed there is no curve over speed: --run-up has one")
     figure = new_figure(5.2)
     above, below = figure.subplots(2, sharex=True, height_ratios=[3, 2])
-    speeds, _, response = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    steady = steady_linear(motion.system, np.linspace(min(first, last), max(first, last), 1000))
+    speeds, _, response = (np.array(each) for each in zip(*steady, strict=True))
     response = response[:, [motion.system.index(node)[0] for node in motion.nodes]]
     run = synchronous_part(motion)
     for k, i in enumerate(_shown(motion)):
@@ -145,20 +140,7 @@ def _shown(motion: MotionRun) -> list[int]:
     return sorted(sorted(range(len(motion.nodes)), key=lambda i: i not in bearings)[:_PANELS])
 
 
-def _draw_spectrum(motion: MotionRun, i: int, ax: Axes) -> None:
-    """Amplitude of what whirls with the rotation and against it, over orders, or Hz where nothing turns."""
-    z = motion.z[motion.time.size // 2 :, i]
-    weight = np.hanning(z.size + 2)[1:-1]
-    lines = 1e6 * np.abs(np.fft.fft(weight * (z - z.mean()))) / weight.sum()
-    order = np.fft.fftfreq(z.size, motion.time[1]) / (motion.speeds[0] / (2 * np.pi) or 1.0)
-    for sign, label, style in ((1, "with the rotation", look(0)), (-1, "against it", look(1))):
-        part = (sign * order > 0) & ((sign * order < _LARGEST_ORDER) | (motion.speeds[0] == 0))
-        at = np.argsort(sign * order[part])
-        ax.plot(sign * order[part][at], lines[part][at], label=label, **{**style, "linewidth": 1.0})
-    ax.set(ylabel="amplitude, µm", ylim=(0, None))
-
-
-def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes | None = None) -> Axes:
+def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
     """Draw the path of each journal in its clearance circle over speed, with load and rotation.
 
     Parameters
@@ -168,87 +150,62 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     labels
         Of the bearings.
     ax
-        None: axes of a figure of their own.
-
-    Returns
-    -------
-    The axes drawn into.
+        Drawn into.
     """
-    ax = new_axes((WIDTH, 4.6)) if ax is None else ax
-    turn = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
-    ax.plot(turn.real, turn.imag, color=DARK)
+    ax.plot(*CIRCLE, color=DARK)
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
-    for end in (0, -1):
-        inwards = end == 0 and abs(Z[0, 0]) < 0.6  # where neither wall nor the other speed is
-        shift, side = ((7.0, 0.0), "left") if inwards else ((-7.0, 0.0), "right")
+    for end, shift, side in ((0, 7.0, "left"), (-1, -7.0, "right")):
         at = (Z[end, 0].real, Z[end, 0].imag)
-        note(ax, rpm_text(resting[end].speed), at, shift, ha=side, va="center")
-    arrow = {"arrowstyle": "-|>", "color": DARK}
+        note(ax, rpm_text(resting[end].speed), at, (shift, 0.0), ha=side, va="center")
     load = resting[-1].load.sum()
-    tip = 0.32 * load / (abs(load) or 1.0)
-    ax.annotate("", (-0.4 + tip.real, 0.45 + tip.imag), (-0.4, 0.45), arrowprops=arrow)
-    note(ax, "load" if load else "no load", (-0.4, 0.45), (0, 4), color=DARK, ha="center")
-    ax.annotate("", (0.36, 0.6), (0.52, 0.4), arrowprops={**arrow, "connectionstyle": "arc3,rad=0.25"})
-    note(ax, "Ω", (0.46, 0.54), (2, 2), color=DARK)
+    where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
+    ax.set_title(f"{where}; rotation anticlockwise", fontsize=TEXT)
     ax.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
     plain(ax)
-    return ax
 
 
-def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
+def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label: str, ax: Axes) -> None:
     """Draw the amplitude of the first sensor, µm, over speed, rpm.
 
     Stable motions are solid, unstable ones dashed; arrows show where the motion jumps at a fold.
 
     Parameters
     ----------
-    readings
+    branches
         Of periodic motion.
+    directions, label
+        Unit vectors of what the sensors read, shape (k, n), and the name of the first.
     ax
-        None: axes of a figure of their own.
-
-    Returns
-    -------
-    The axes drawn into.
+        Drawn into.
     """
-    from rotorid.motion.periodic import KINDS
+    from rotorid.motion.branches import KINDS, amplitudes, jumps
 
-    ax = new_axes((WIDTH, 4.6)) if ax is None else ax
-    branches = readings.motion.branches
     colors = dict(zip(dict.fromkeys(b.kind for b in branches), COLORS, strict=False))
-    for branch, along, at in zip(branches, readings.along, readings.at, strict=True):
-        speeds, sizes, unstable = branch.speeds * RPM, 1e6 * along[:, 0], ~branch.stable
-        near = np.append(unstable[1:], False) | np.append(False, unstable[:-1])  # up to the next stable ones
-        for part, word, style in ((~unstable, "stable", "-"), (unstable | near, "unstable", "--")):
-            if part.any():
-                label = _once(ax, f"{branch.kind}, {word}")
-                drawn: dict[str, Any] = {"color": colors[branch.kind], "linewidth": 1.6, "label": label}
-                drawn["marker"] = "" if len(sizes) > 1 else "o"
-                ax.plot(speeds, np.where(part, sizes, np.nan), style, clip_on=False, **drawn)
-        for bifurcation, size in zip(branch.bifurcations, at[:, 0], strict=True):
-            marker = MARKERS[KINDS.index(bifurcation.kind)]
-            drawn = {"color": DARK, "markersize": 5, "zorder": 3, "label": _once(ax, bifurcation.kind)}
-            ax.plot(bifurcation.point.orbit.speed * RPM, 1e6 * size, marker, **drawn)
-    for speed, before, after_it in readings.jumps:
-        tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after_it, before))
-        arrow = {"arrowstyle": "->", "color": DARK, "linewidth": 1.1, "shrinkA": 4, "shrinkB": 1}
-        ax.annotate("", tip, tail, arrowprops=arrow)
-        middle = (speed * RPM, 5e5 * (before[0] + after_it[0]))
-        where = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX}
-        word = "jump up" if after_it[0] > before[0] else "jump down"
-        note(ax, word, middle, (-3, 0), color=DARK, **where)
-    ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {readings.labels[0]}, µm")
+    for branch in branches:
+        speeds = np.array([orbit.speed for orbit in branch.orbits]) * RPM
+        sizes = 1e6 * amplitudes(branch.orbits, directions)[:, 0]
+        kinds = np.array([orbit.bifurcation for orbit in branch.orbits])
+        stable = np.array([orbit.stable for orbit in branch.orbits])
+        for word, style, part in (("stable", "-", stable | (kinds != "")), ("unstable", "--", ~stable)):
+            if (part & (kinds == "")).any():
+                line: dict[str, Any] = {
+                    "color": colors[branch.kind],
+                    "marker": "" if len(speeds) > 1 else "o",
+                }
+                ax.plot(speeds, np.where(part, sizes, np.nan), style, label=f"{branch.kind}, {word}", **line)
+        for kind, marker in zip(KINDS, MARKERS, strict=False):
+            if (at := kinds == kind).any():
+                ax.plot(speeds[at], sizes[at], marker, color=DARK, markersize=5, zorder=3, label=kind)
+    for speed, before, after in jumps(branches, directions):
+        tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
+        ax.annotate("", tip, tail, arrowprops={"arrowstyle": "->", "color": DARK, "shrinkA": 4})
+    ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)
     rad_s_above(ax)
-    legend_above(ax, height=1.12)
-    return ax
-
-
-def _once(ax: Axes, label: str) -> str:
-    """A label that no line has yet, or none."""
-    return "" if label in {line.get_label() for line in ax.lines} else label
+    pairs = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    legend_above(ax, height=1.12, handles=list(pairs.values()), labels=list(pairs))

@@ -38,8 +38,8 @@ Equations = tuple[
     ComplexArray,
 ]
 Turning = tuple[float, float, float]
-DONE, TOUCHES, STUCK = range(3)
-"""How `advance` ends: at the end; at a wall; because no step is small enough."""
+DONE, STUCK = -1, -2
+"""How `advance` ends, unless at a wall: at the end; because no step is small enough."""
 TOUCH = 0.999
 """Part of its clearance at which a journal touches: a thousandth is left for the film."""
 GAMMA = 0.21193756319429014
@@ -99,7 +99,7 @@ DENSE = np.array(
 
 
 @compiled
-def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray) -> None:
+def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray, slopes: bool) -> None:
     """Write f and its derivatives at the q and v of a state.
 
     Parameters
@@ -109,65 +109,32 @@ def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray
     t
         s.
     state
-        q, v, f, ∂f/∂t, and the rows of J_q and of J_v, shape (4 + 2 n, n).
+        q, v, f, ∂f/∂Ω, ∂f/∂t, and the rows of J_q and of J_v, shape (5 + 2 n, n).
+    slopes
+        Whether J_q and J_v are wanted; else they hold nothing.
     """
     codes, values, places, _, damping, stiffness, damping_slope, stiffness_slope, weight, u, b = equations
     angle, first, alpha = turning
     n = state.shape[1]
-    q, v, f, f_t, J_q, J_v = state[0], state[1], state[2], state[3], state[4 : 4 + n], state[4 + n :]
+    (q, v, f, f_speed, f_t), J_q, J_v = state[:5], state[5 : 5 + n], state[5 + n :]
     gain = alpha * t
     speed = first + gain
-    phi = angle + (first + 0.5 * gain) * t
-    cos, sin = math.cos(phi), math.sin(phi)
-    state[2:] = 0.0
-    add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_t)
+    turned = np.exp(1j * (angle + (first + 0.5 * gain) * t))
+    state[2 : len(state) if slopes else 5] = 0.0
+    add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_speed)
     for i in range(n):
         linear, slope = 0.0, 0.0
         for j in range(n):
             linear -= damping[i, j] * v[j] + stiffness[i, j] * q[j]
+        for j in range(n if slopes or gain != 0.0 else 0):
             slope -= damping_slope[i, j] * v[j] + stiffness_slope[i, j] * q[j]
-            J_q[i, j] -= stiffness[i, j] + gain * stiffness_slope[i, j]
-            J_v[i, j] -= damping[i, j] + gain * damping_slope[i, j]
         force = u[i] * (speed * speed - 1j * alpha) + b[i]
-        rate = 2.0 * u[i] * speed * alpha + 1j * speed * force
-        f[i] += weight[i] + linear + gain * slope + force.real * cos - force.imag * sin
-        f_t[i] = alpha * (f_t[i] + slope) + rate.real * cos - rate.imag * sin
-
-
-@compiled
-def factorise(matrix: FloatArray, pivots: IndexArray) -> bool:
-    """Replace a matrix by its triangular factors with row pivots; False where it has no inverse."""
-    n = len(matrix)
-    for k in range(n):
-        p = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[p, k]):
-                p = i
-        pivots[k] = p
-        if not abs(matrix[p, k]) > 0.0:
-            return False
-        for j in range(n):
-            matrix[k, j], matrix[p, j] = matrix[p, j], matrix[k, j]
-        for i in range(k + 1, n):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, n):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
-    return True
-
-
-@compiled
-def solve(factors: FloatArray, pivots: IndexArray, x: FloatArray) -> None:
-    """Solve in place with what `factorise` made."""
-    n = len(x)
-    for k in range(n):
-        x[k], x[pivots[k]] = x[pivots[k]], x[k]
-    for i in range(n):
-        for j in range(i):
-            x[i] -= factors[i, j] * x[j]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            x[i] -= factors[i, j] * x[j]
-        x[i] /= factors[i, i]
+        f[i] += weight[i] + linear + gain * slope + (force * turned).real
+        f_speed[i] += slope + 2.0 * speed * (u[i] * turned).real
+        f_t[i] = alpha * f_speed[i] + speed * (1j * force * turned).real
+    if slopes:
+        J_q -= stiffness + gain * stiffness_slope
+        J_v -= damping + gain * damping_slope
 
 
 @compiled
@@ -179,70 +146,39 @@ def attempt(
     state: FloatArray,
     now: FloatArray,
     stages: FloatArray,
-    scratch: tuple[FloatArray, IndexArray, FloatArray, FloatArray],
 ) -> bool:
-    """Try a step h: write the p and w of all stages, and the new q and v; False where that is impossible.
+    """Try a step h: write the p and w of all stages, and what is at its end; False where that is impossible.
 
-    `state` is that of `evaluate` at t, `now` that at the end of the step; `stages` (p, w).
+    `state` is that of `evaluate` at t, `now` that at the end of the step; `stages` (p, w), shape (2, 8, n).
     """
-    n = state.shape[1]
-    q, v, f, f_t, J_q, J_v = state[0], state[1], state[2], state[3], state[4 : 4 + n], state[4 + n :]
-    q_now, v_now, f_now = now[0], now[1], now[2]
-    p, w = stages[0], stages[1]
-    W, pivots, slip, pull = scratch
-    M = equations[3]
-    for i in range(n):
-        for j in range(n):
-            W[i, j] = M[i, j] / (GAMMA * h) - J_v[i, j] - GAMMA * h * J_q[i, j]
-    if not factorise(W, pivots):
-        return False
+    n, M = state.shape[1], equations[3]
+    J_q, (p, w), (slip, pull, right) = state[5 : 5 + n], stages, np.empty((3, n))
+    inverse = np.linalg.inv(M / (GAMMA * h) - state[5 + n :] - GAMMA * h * J_q)
     for stage in range(8):
         for i in range(n):
-            q_now[i], v_now[i], slip[i], pull[i] = q[i], v[i], 0.0, 0.0
+            x, y, by_p, by_w = state[0, i], state[1, i], 0.0, 0.0
             for k in range(stage):
-                q_now[i] += A[stage, k] * p[k, i]
-                v_now[i] += A[stage, k] * w[k, i]
-                slip[i] += C[stage, k] / h * p[k, i]
-                pull[i] += C[stage, k] / h * w[k, i]
+                x += A[stage, k] * p[k, i]
+                y += A[stage, k] * w[k, i]
+                by_p += C[stage, k] * p[k, i]
+                by_w += C[stage, k] * w[k, i]
+            now[0, i], now[1, i], now[2, i] = x, y, state[2, i]
+            slip[i], pull[i] = GAMMA * (by_p + h * y), by_w / h
         if stage:
-            evaluate(equations, turning, t + ALPHA[stage] * h, now)
+            evaluate(equations, turning, t + ALPHA[stage] * h, now, False)
         for i in range(n):
-            slip[i] += v_now[i]
-        for i in range(n):
-            w[stage, i] = (f_now[i] if stage else f[i]) + h * D[stage] * f_t[i]
+            push = now[2, i] + h * D[stage] * state[4, i]
             for j in range(n):
-                w[stage, i] += M[i, j] * pull[j] + GAMMA * h * J_q[i, j] * slip[j]
-        solve(W, pivots, w[stage])
+                push += M[i, j] * pull[j] + J_q[i, j] * slip[j]
+            right[i] = push
         for i in range(n):
-            p[stage, i] = GAMMA * h * (slip[i] + w[stage, i])
+            rate = 0.0
+            for j in range(n):
+                rate += inverse[i, j] * right[j]
+            p[stage, i], w[stage, i] = slip[i] + GAMMA * h * rate, rate
     now[:2] += stages[:, 7]
-    evaluate(equations, turning, t + h, now)
-    return bool(np.isfinite(f_now).all())
-
-
-@compiled
-def error_of(
-    error: FloatArray, way: FloatArray, largest: FloatArray, groups: IndexArray, sizes: FloatArray
-) -> float:
-    """Largest error by the way of its unknown, see `tolerance` of `advance`; the largest ways are written."""
-    top = np.full(2, 1e-300)
-    for i in range(len(error)):
-        sizes[i] = max(largest[i], abs(way[i]))
-        top[groups[i]] = max(top[groups[i]], sizes[i])
-    worst = 0.0
-    for i in range(len(error)):
-        size = top[1] if groups[i] else max(sizes[i], 0.01 * top[0])
-        worst = max(worst, abs(error[i]) / size)
-    return worst
-
-
-@compiled
-def touched(walls: FloatArray, places: IndexArray, q: FloatArray) -> int:
-    """Which force's journal is at its wall, see `TOUCH`; −1 for none."""
-    for force in range(len(walls)):
-        if math.hypot(q[places[force, 0]], q[places[force, 1]]) >= TOUCH * walls[force]:
-            return force
-    return -1
+    evaluate(equations, turning, t + h, now, True)
+    return bool(np.isfinite(now[2]).all())
 
 
 @compiled
@@ -253,14 +189,14 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     span: tuple[float, float],
     steps: tuple[float, float],
     tolerance: float,
-    groups: IndexArray,
+    others: FloatArray,
     origin: FloatArray,
     q: FloatArray,
     v: FloatArray,
     largest: FloatArray,
     times: FloatArray,
     out: FloatArray,
-) -> tuple[int, int, float, float, int, int, int]:
+) -> tuple[int, float, float, int, int]:
     """Advance q and v, in place, through a time in which C and K are linear in speed.
 
     Parameters
@@ -279,7 +215,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     tolerance
         Of the error of q in one step: of a deflection by how far it has been from `origin`, or by a hundredth
         of the largest such way; of other unknowns by the largest of theirs.
-    groups
+    others
         0 for deflections, 1 for other unknowns, (n,).
     origin
         Where the motion began, (n,).
@@ -292,54 +228,42 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
 
     Returns
     -------
-    How it ends, see `DONE`; the force that it concerns, or −1; the time; the next step; how many steps; how
-    many were tried in vain; how many of `times` are written.
+    How it ends, see `DONE`, or which force's journal is at its wall; the time; the next step; how many steps;
+    how many of `times` are written.
     """
-    n = len(q)
+    places, n = equations[2], len(q)
     t, end = span
     h, least = steps
-    state, now = np.empty((4 + 2 * n, n)), np.empty((4 + 2 * n, n))
+    state, now, stages = np.empty((5 + 2 * n, n)), np.empty((5 + 2 * n, n)), np.empty((2, 8, n))
     state[0], state[1] = q, v
-    stages = np.empty((2, 8, n))
-    scratch = (np.empty((n, n)), np.empty(n, np.intp), np.empty(n), np.empty(n))
-    sizes = np.empty(n)
-    done, vain, written = 0, 0, 0
-    evaluate(equations, turning, t, state)
+    done, written = 0, 0
+    evaluate(equations, turning, t, state, True)
     while t < end:
-        force = touched(walls, equations[2], q)
-        if force >= 0:
-            return TOUCHES, force, t, h, done, vain, written
+        for force in range(len(walls)):
+            if math.hypot(q[places[force, 0]], q[places[force, 1]]) >= TOUCH * walls[force]:
+                return force, t, h, done, written
         if h < least:
-            return STUCK, -1, t, h, done, vain, written
+            return STUCK, t, h, done, written
         step = end - t if t + 1.0001 * h >= end else h
-        error = math.inf
-        if attempt(equations, turning, t, step, state, now, stages, scratch):
-            error = error_of(stages[0, 7], now[0] - origin, largest, groups, sizes) / tolerance
+        error, ways = math.inf, largest
+        if attempt(equations, turning, t, step, state, now, stages):
+            ways = np.maximum(largest, np.abs(now[0] - origin))
+            sizes = np.maximum(ways, 0.01 * np.max(ways * (1.0 - others)))
+            sizes = np.where(others > 0.0, np.max(ways * others), sizes) + 1e-300
+            error = np.max(np.abs(stages[0, 7]) / sizes) / tolerance
         if not error <= 1.0:
-            vain += 1
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
             continue
         then = end if step == end - t else t + step
-        while written < len(times) and times[written] <= then:
-            between(state[0], now[0], stages[0], (times[written] - t) / step, out[written])
+        while written < len(times) and times[written] <= then:  # by the method's polynomial of degree 4
+            part = (times[written] - t) / step
+            bend = DENSE @ stages[0]
+            bend = bend[0] + part * (bend[1] + part * bend[2])
+            out[written] = (1.0 - part) * state[0] + part * (now[0] + (1.0 - part) * bend)
             written += 1
-        state[:] = now
-        q[:], v[:] = now[0], now[1]
-        largest[:] = sizes
+        state, now = now, state
+        q[:], v[:], largest[:] = state[0], state[1], ways
         t = then
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)
-    return DONE, -1, t, h, done, vain, written
-
-
-@compiled
-def between(q: FloatArray, q_new: FloatArray, p: FloatArray, part: float, out: FloatArray) -> None:
-    """Write q at a part of a step, by the method's polynomial of degree 4."""
-    rest = 1.0 - part
-    for i in range(len(q)):
-        a, b, c = 0.0, 0.0, 0.0
-        for k in range(8):
-            a += DENSE[0, k] * p[k, i]
-            b += DENSE[1, k] * p[k, i]
-            c += DENSE[2, k] * p[k, i]
-        out[i] = rest * q[i] + part * (q_new[i] + rest * (a + part * (b + part * c)))
+    return DONE, t, h, done, written

@@ -15,7 +15,7 @@ from rotorid.base.checks import number
 from rotorid.base.rpm import rpm_text
 from rotorid.base.text import counted
 from rotorid.motion.equilibrium import check_journals, named
-from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
+from rotorid.motion.rosenbrock import DONE, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem
 
 TOLERANCE, LOOSEST = 1e-6, 1e-2
@@ -52,8 +52,8 @@ class MotionRun:
         All unknowns and their velocities at the last sample, shape (n,).
     angle
         Of rotation at time 0, rad.
-    steps, vain
-        Of the method, and how many more were tried and were too long.
+    steps
+        Of the method.
     tolerance
         Error of one step, see `rotorid.motion.rosenbrock.advance`.
     stopped
@@ -69,7 +69,6 @@ class MotionRun:
     v: FloatArray
     angle: float
     steps: int
-    vain: int
     tolerance: float
     stopped: str
 
@@ -150,9 +149,9 @@ def run(
     for speed in (first, last):
         system.linear(speed)  # refuses what lies outside the knots
     check_journals(system, min(first, last), "begin and end above it")
-    reference = max(first, last) or 2 * np.pi / time
+    turn = 2 * np.pi / max(first, last) if max(first, last) else time
     if rate is None:
-        rate = A_TURN * reference / (2 * np.pi) if max(first, last) else 10_000 / time
+        rate = A_TURN / turn if max(first, last) else 10_000 / time
     elif not number(rate, "rate") > 0:
         raise ValueError("rate must be above 0 samples a second")
     names = system.nodes if nodes is None else tuple(nodes)
@@ -164,88 +163,61 @@ def run(
             f"fewer nodes, a shorter time or a lower rate than {rate:.6g} samples a second"
         )
     times = np.linspace(0.0, time, count + 1)
-    z = np.empty((count + 1, len(names)), dtype=complex)
+    deflections = np.empty((count + 1, *places.shape))
     q, v = (np.array(part, dtype=float) for part in start)
-    v = consistent(system, q, v, (angle, first, (last - first) / time))
-    z[0] = q[places] @ [1, 1j]
-    groups = np.array([name[0] not in "xy" for name in system.coordinates], dtype=np.intp)
+    _consistent(system, q, v, (angle, first, (last - first) / time))
+    deflections[0] = q[places]
+    others = np.array([float(name[0] not in "xy") for name in system.coordinates])
     origin = q.copy()
-    largest = np.array([_SMALLEST * np.abs(q[groups == group]).max() for group in groups])
-    h, least = 1e-3 * min(time, 2 * np.pi / reference), 1e-10 * min(time, 2 * np.pi / reference)
-    done, steps, vain, stopped = 1, 0, 0, ""
+    largest = _SMALLEST * np.where(others, np.abs(q * others).max(), np.abs(q * (1 - others)).max())
+    shorter = min(time, turn)
+    h, least, done, steps, stopped = 1e-3 * shorter, 1e-10 * shorter, 1, 0, ""
     for (begin, end), equations, turning in _pieces(system, (first, last), time, angle, count):
         at = times[done:][times[done:] <= end]
         out = np.empty((at.size, system.size))
-        how, force, now, h, good, bad, written = advance(
-            *(
-                equations,
-                turning,
-                system.walls,
-                (0.0, end - begin),
-                (max(h, least), least),
-                tolerance,
-                groups,
-            ),
-            *(origin, q, v, largest, np.minimum(at, end) - begin, out),
-        )
-        z[done : done + written] = out[:written, places] @ [1, 1j]
-        done, steps, vain = done + written, steps + good, vain + bad
+        span, at = (0.0, end - begin), np.minimum(at, end) - begin
+        settings = equations, turning, system.walls, span, (max(h, least), least), tolerance
+        how, now, h, more, written = advance(*settings, others, origin, q, v, largest, at, out)
+        deflections[done : done + written] = out[:written, places]
+        done, steps = done + written, steps + more
         if how != DONE:
             when = f"after {begin + now:.6g} s, at {rpm_text(first + (last - first) * (begin + now) / time)}"
             stopped = f"no step is short enough {when}: the forces change faster than any motion could follow"
-            if how == TOUCHES:
+            if how >= 0:
                 stopped = (
-                    f"the shaft touches the wall of {named(system.forces[force])} {when}: under a thousandth "
+                    f"the shaft touches the wall of {named(system.forces[how])} {when}: under a thousandth "
                     "of its clearance is left"
                 )
             last = first + (last - first) * times[done - 1] / time
             break
-    return MotionRun(
-        system=system,
-        nodes=names,
-        time=times[:done],
-        speeds=(first, last),
-        z=z[:done],
-        q=q,
-        v=v,
-        angle=angle,
-        steps=steps,
-        vain=vain,
-        tolerance=tolerance,
-        stopped=stopped,
-    )
+    z = deflections[:done, :, 0] + 1j * deflections[:done, :, 1]
+    return MotionRun(system, names, times[:done], (first, last), z, q, v, angle, steps, tolerance, stopped)
 
 
-def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> FloatArray:
-    """Velocities with which the forces on what has no mass are in equilibrium, shape (n,).
+def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> None:
+    """Change velocities so that the forces on what has no mass are in equilibrium.
 
     Raises
     ------
     ValueError
         For motion without mass that nothing damps.
     """
-    unit = np.sqrt(np.where(system.M.diagonal() > 0, system.M.diagonal(), 1.0))
-    size, shape = np.linalg.eigh(system.M / np.outer(unit, unit))
-    free = shape[:, size <= _MASSLESS] / unit[:, None]
-    if not free.size:
-        return v
-    n, equations = system.size, _equations(system, turning[1], turning[1])
-    state = np.zeros((4 + 2 * n, n))
-    for _ in range(20):
+    n, free = system.size, np.flatnonzero(~system.M.any(axis=1))
+    state, equations = np.zeros((5 + 2 * n, n)), equations_of(system, turning[1], turning[1])
+    for _ in range(20 if free.size else 0):
         state[0], state[1] = q, v
-        evaluate(equations, turning, 0.0, state)
-        J = free.T @ state[4 + n :] @ free
+        evaluate(equations, turning, 0.0, state, True)
+        J = state[5 + n :][np.ix_(free, free)]
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
-            where = system.coordinates[int(np.abs(free).max(axis=1).argmax())]
+            where = system.coordinates[free[np.abs(J).sum(axis=1).argmin()]]
             raise ValueError(
                 f"{where} has neither mass nor damping, so that its velocity is not determined: give it a "
                 "mass, or a bearing with damping"
             )
-        change = free @ np.linalg.solve(J, free.T @ state[2])
-        v = v - change
+        change = np.linalg.solve(J, state[2, free])
+        v[free] -= change
         if np.abs(change).max() <= 1e-13 * np.abs(v).max():
             break
-    return v
 
 
 def _pieces(
@@ -261,10 +233,10 @@ def _pieces(
     for begin, end in itertools.pairwise(ends):
         speed = first + alpha * begin
         turned = (angle + (first + speed) / 2 * begin) % (2 * np.pi)
-        yield (begin, end), _equations(system, speed, first + alpha * end), (turned, speed, alpha)
+        yield (begin, end), equations_of(system, speed, first + alpha * end), (turned, speed, alpha)
 
 
-def _equations(system: MotionSystem, first: float, last: float) -> Equations:
+def equations_of(system: MotionSystem, first: float, last: float) -> Equations:
     """As `advance` takes them, for speeds between two neighbouring knots."""
     middle = (first + last) / 2
     C, K, C_speed, K_speed = system.around(middle)

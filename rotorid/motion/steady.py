@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -9,15 +11,15 @@ from typing import Literal
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.motion.collocation import LEAST_STEPS, POINTS, Orbit, Periodic
 from rotorid.motion.equilibrium import at_rest
 from rotorid.motion.run import LEAST_A_TURN, TOLERANCE, MotionRun, run
 from rotorid.motion.system import MotionSystem
 
 LEAST_SAMPLES = 64
-_BLOCK, _BLOCKS, _SETTLED = 32, 64, 1e-6
-"""Turns that a start settles at once, how often at most, and what may change from one to the next."""
-_OF_A_TURN, _A_TURN = 64, 8
-"""Samples of the synchronous part that are averaged over, and of these those that are given."""
+_TURNS, _BLOCKS = 100, 8
+"""Turns of a motion that settles, and how often so many more."""
+_A_TURN = 8  # values of the synchronous part
 _TREND, _WANDERS = 1e-3, 1e-2
 """Change at which a motion that goes one way, and one that goes up and down, are not steady."""
 _PERIODIC, _PERIODS = 2e-3, 8
@@ -29,7 +31,7 @@ together leave 0.002 there at most, chaotic rubs 0.006 to 0.1."""
 
 def steady_linear(
     system: MotionSystem, speeds: Sequence[float] | FloatArray
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
+) -> list[tuple[float, FloatArray, ComplexArray]]:
     """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
 
     Parameters
@@ -41,10 +43,10 @@ def steady_linear(
 
     Returns
     -------
-    The speeds at which there is an equilibrium, shape (s,), the equilibria, (s, n), and the response, (s, n):
-    the motion is Re(response e^{iφ}) about the equilibrium.
+    Each speed at which there is an equilibrium, that, shape (n,), and the response, (n,): the motion is
+    Re(response e^{iφ}) about the equilibrium.
     """
-    known, rests, responses = [], [], []
+    motions = []
     for speed in speeds:
         try:
             rest = at_rest(system, speed)
@@ -52,11 +54,9 @@ def steady_linear(
             continue
         C, K = system.about(rest, speed)
         load = speed**2 * system.unbalance + system.bow
-        known.append(speed)
-        rests.append(rest)
-        responses.append(np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load))
-    n = system.size
-    return np.array(known), np.array(rests).reshape(-1, n), np.array(responses, complex).reshape(-1, n)
+        response = np.linalg.solve(K + 1j * speed * C - speed**2 * system.M, load)
+        motions.append((float(speed), rest, response.astype(complex)))
+    return motions
 
 
 def begin(
@@ -76,7 +76,7 @@ def begin(
         rad/s.
     how
         At rest in equilibrium, or in steady motion: where forces are not linear it begins near the steady
-        motion of the linear rotor and settles for so many turns as it takes, 2048 at most.
+        motion of the linear rotor and settles for so many turns as it takes, 800 at most.
     shift
         Nodes moved from there, x + iy, m.
     tolerance
@@ -88,33 +88,88 @@ def begin(
         As `equilibrium` and `run`, if it touches a wall, and for nodes that do not move.
     """
     q, v, warnings = at_rest(system, speed), np.zeros(system.size), tuple[str, ...]()
-    if how == "steady":
-        response = steady_linear(system, [speed])[2][0]
-        moved = q + response.real
-        if not system.forces or (np.abs(system.at_forces(moved)) <= 0.9 * system.walls).all():
-            q, v = moved, (1j * speed * response).real
-        if system.forces and speed:
-            q, v, warnings = _settled(system, speed, q, v, tolerance)
+    if how == "steady" and speed and system.forced:
+        ((_, _, response),) = steady_linear(system, [speed])
+        if (np.abs(system.at_forces(q + response.real)) <= 0.9 * system.walls).all():
+            q, v = q + response.real, (1j * speed * response).real
+        if system.forces:
+            q, v, end = settled(system, speed, q, v, tolerance)
+            warnings = (f"at the first speed {end}",) if isinstance(end, str) else ()
+    q = q.copy()
     for node, by in (shift or {}).items():
         q[[*system.index(node)]] += by.real, by.imag
     return q, v, warnings
 
 
-def _settled(
-    system: MotionSystem, speed: float, q: FloatArray, v: FloatArray, tolerance: float
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """After so many turns that the motion comes again each turn."""
-    before: ComplexArray | None = None
-    for _ in range(_BLOCKS):
-        part = run(system, (speed, speed), _BLOCK * 2 * np.pi / speed, (q, v), tolerance=tolerance)
+def settled(
+    system: MotionSystem,
+    speed: float,
+    q: FloatArray,
+    v: FloatArray,
+    tolerance: float = TOLERANCE,
+    until: float = np.inf,
+) -> tuple[FloatArray, FloatArray, Orbit | str]:
+    """What motion in time comes to from a state at the angle 0, until `time.monotonic` is so late.
+
+    Returns
+    -------
+    The state in the end, and a stable periodic motion there; or, in words, what else, "" for rest.
+    """
+    turn, sizes = 2 * np.pi / speed, list[float]()
+    for block in range(_BLOCKS):
+        try:
+            part = run(system, (speed, speed), _TURNS * turn, (q, v), tolerance=tolerance)
+        except ValueError as problem:
+            return q, v, f"motion in time is not known: {problem}"
         if part.stopped:
-            raise ValueError(f"while it settles at the first speed {part.stopped}")
-        q, v, turn = part.q, part.v, part.z[-(part.time.size // _BLOCK) :]
-        if before is not None and np.abs(turn - before).max() <= _SETTLED * np.abs(turn).max():
-            return q, v, ()
-        before = turn
-    warning = f"at the first speed nothing that comes again each turn is reached in {_BLOCK * _BLOCKS} turns"
-    return q, v, (warning,)
+            return q, v, f"motion in time ends: {part.stopped.split(' after ')[0]}"
+        q, v, end = part.q, part.v, steady_end(part)
+        if end is None or time.monotonic() > until:
+            break
+        sizes.append(float(end.amplitude.max()))
+        if not system.forced and (end.at_rest or sizes[-1] < 1e-4 * sizes[0]):
+            return q, v, ""
+        cycle = turn if system.forced else 2 * np.pi / abs(end.frequency)
+        repeats = np.isfinite(end.period)
+        for period in (cycle, end.period)[: 1 + repeats] if repeats or block == _BLOCKS - 1 else ():
+            orbit = repeating(system, speed, period, q, v)
+            if orbit and orbit.outside == 0:
+                return orbit.start, orbit.velocities[-1, -1], orbit
+    if not system.forced and sizes[-1:] < [0.95 * size for size in sizes[_BLOCKS // 2 :][:1]]:
+        return q, v, ""
+    return q, v, f"motion in time comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
+
+
+def repeating(
+    system: MotionSystem, speed: float, period: float, q: FloatArray, v: FloatArray
+) -> Orbit | None:
+    """The periodic motion near that in time from a state at the angle 0; None where there is none.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speed, period
+        rad/s and s.
+    q, v
+        All unknowns and their velocities, (n,) each.
+    """
+    turns = round(period * speed / (2 * np.pi)) if system.forced else 0
+    period = 2 * np.pi * turns / speed if turns else period
+    steps, first = LEAST_STEPS * max(turns, 1), q
+    velocities = np.empty((steps * POINTS.size, q.size))
+    times = (np.arange(steps)[:, None] + POINTS).ravel() * (period / steps)
+    for k, (begin, end) in enumerate(itertools.pairwise([0.0, *times])):
+        part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
+        q, v = part.q, part.v
+        velocities[k] = v
+    guess = Orbit(speed, period, turns, first, velocities.reshape(steps, POINTS.size, -1))
+    try:
+        at = Periodic(system, speed, speed).newton(guess, guess.at_speed)
+    except np.linalg.LinAlgError:
+        return None
+    away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
+    return at.solution if away.max() < 0.3 else None
 
 
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
@@ -138,9 +193,6 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
     ValueError
         For fewer samples a turn, or fewer turns.
     """
-    from scipy.interpolate import CubicSpline
-    from scipy.signal import fftconvolve
-
     angle = motion.turned - motion.turned[0]
     whole = int(angle[-1] / (2 * np.pi))
     if whole < turns:
@@ -149,14 +201,14 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         raise ValueError(
             f"{LEAST_A_TURN} samples a turn are needed at least for the synchronous part: a higher rate"
         )
-    even = np.arange(whole * _OF_A_TURN + 1) * (2 * np.pi / _OF_A_TURN)
-    rising = np.concatenate([[True], np.diff(angle) > 0])
-    x = CubicSpline(angle[rising], motion.z.real[rising])(even)
-    turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
-    window = np.hanning(turns * _OF_A_TURN + 1)[:-1]
-    mean = fftconvolve(turning, window[:, None] / window.sum(), mode="valid", axes=0)
-    each = slice(None, None, _OF_A_TURN // _A_TURN)
-    return np.interp(even[: len(mean)] + turns * np.pi, angle, motion.speed)[each], mean[each]
+    begins = np.arange(_A_TURN * (whole - turns) + 1) * (2 * np.pi / _A_TURN)
+    turning = 2 * motion.z.real * np.exp(-1j * motion.turned)[:, None]
+    mean, steps = [], np.gradient(angle)
+    for begin in begins:
+        part = slice(*np.searchsorted(angle, (begin, begin + 2 * np.pi * turns)))
+        weight = np.sin((angle[part] - begin) / (2 * turns)) ** 2 * steps[part]
+        mean.append(weight @ turning[part] / weight.sum())
+    return np.interp(begins + np.pi * turns, angle, motion.speed), np.array(mean)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +244,7 @@ class SteadyEnd:
     mean: ComplexArray
     amplitude: FloatArray
     change: float
-    trend: Literal["", "grows", "decays", "drifts"]
+    trend: str
     at_rest: bool
     frequency: float
     speed: float
@@ -224,41 +276,32 @@ def steady_end(motion: MotionRun) -> SteadyEnd | None:
     first, last = motion.speeds
     if first != last or motion.time.size < LEAST_SAMPLES or not motion.resolved:
         return None
-    whole = float(motion.time[-1])
+    whole, t = float(motion.time[-1]), motion.time
     window = max(0.2 * whole, min(8 * 2 * np.pi / last, whole) if last else 0.0)
-    since = int(np.searchsorted(motion.time, whole - window))
-    t, z = motion.time[since:] - motion.time[since], motion.z[since:]
+    since = int(np.searchsorted(t, whole - window))
+    t, z = t[since:] - t[since], motion.z[since:]
     mean = _faded_mean(z)
     size = np.abs(z - mean).max(axis=0)
-    most = int(size.argmax())
+    most, eccentricity = int(size.argmax()), motion.eccentricity(since)
     largest = np.maximum(np.abs(motion.z - mean).max(axis=0), np.abs(mean))
     if (size <= 1e-6 * largest).all():
-        return SteadyEnd(mean, size, 0.0, "", True, np.nan, last, np.nan, motion.eccentricity(since))
+        return SteadyEnd(mean, size, 0.0, "", True, np.nan, last, np.nan, eccentricity)
     halves = [z[k * len(z) // 8 :][: len(z) // 2] for k in range(5)]
     means = np.array([_faded_mean(part) for part in halves])
     strength = np.sqrt([_faded_mean(np.abs(part - mean) ** 2).real for part in halves])
     values = np.hstack([strength, means.real, means.imag])
     spread = np.ptp(values, axis=0)
     which = int(spread.argmax())
-    steps = np.diff(values[:, which])
-    trend: Literal["", "grows", "decays", "drifts"] = ""
-    if (steps > 0).all() or (steps < 0).all():
-        trend = "drifts" if which >= strength.shape[1] else "grows" if steps[0] > 0 else "decays"
+    ways = np.unique(np.sign(np.diff(values[:, which])))
+    trend = ""
+    if len(ways) == 1:
+        trend = "drifts" if which >= strength.shape[1] else "grows" if ways[0] > 0 else "decays"
     around = z[:, most] - mean[most]
     frequency = _strongest(t, around)
     period = _period(t, around, 2 * np.pi / (last if motion.system.forced and last else abs(frequency)))
-    return SteadyEnd(
-        mean=mean,
-        amplitude=size,
-        change=float(spread.max() / strength.max()),
-        trend=trend,
-        at_rest=False,
-        frequency=frequency,
-        speed=last,
-        period=period,
-        eccentricity=motion.eccentricity(since),
-        chaotic=bool(np.isnan(period)) and _beside_lines(motion.z[motion.time.size // 2 :, most]) > _BROAD,
-    )
+    rough = bool(np.isnan(period)) and _beside_lines(motion.z[motion.time.size // 2 :, most]) > _BROAD
+    change = float(spread.max() / strength.max())
+    return SteadyEnd(mean, size, change, trend, False, frequency, last, period, eccentricity, rough)
 
 
 def _faded_mean(z: ComplexArray | FloatArray) -> ComplexArray:

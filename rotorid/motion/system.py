@@ -14,7 +14,6 @@ Static deflections of the kept nodes are exact. Source: R. R. Craig, M. C. C. Ba
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,7 +26,6 @@ from fem.forces import law, tables
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import number
 from rotorid.base.compiled import compiled_part
-from rotorid.base.text import counted, percent
 from rotorid.reduction import SmallModel
 
 ENOUGH = 3e-4
@@ -52,6 +50,11 @@ class MotionSystem:
         What is not linear, f of them.
     weight, unbalance, bow
         w, N, and, complex, u, kg·m, and b, N, shape (n,) each.
+    modes, frequency_error
+        Of a reduced system: how many modes stay in both planes together, and the largest relative error of
+        the natural frequencies without damping, those below twice the highest speed or at least the first two
+        that bend the shaft, at the lowest speed; bearings with films left out. Infinite where fewer unknowns
+        move. Of another one None and 0.
     """
 
     coordinates: tuple[str, ...]
@@ -63,6 +66,8 @@ class MotionSystem:
     weight: FloatArray
     unbalance: ComplexArray
     bow: ComplexArray
+    modes: int | None = None
+    frequency_error: float = 0.0
 
     @property
     def size(self) -> int:
@@ -116,7 +121,7 @@ class MotionSystem:
     def around(self, speed: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """C and K at a speed and their derivatives by it, (n, n) each; beyond the knots as at their ends."""
         i = max(0, min(int(np.searchsorted(self.knots, speed, "right")) - 1, len(self.knots) - 2))
-        over, past = self.knots[i + 1] - self.knots[i], speed - self.knots[i]
+        over, past = max(self.knots[i + 1] - self.knots[i], 1e-9), speed - self.knots[i]
         C_speed, K_speed = ((each[i + 1] - each[i]) / over for each in (self.C, self.K))
         return self.C[i] + past * C_speed, self.K[i] + past * K_speed, C_speed, K_speed
 
@@ -141,7 +146,6 @@ def system(
     forces: Sequence[NodeForce] = (),
     weight: Mapping[str, float] | None = None,
     unbalance: Mapping[int, complex] | None = None,
-    bow: Mapping[str, complex] | None = None,
 ) -> MotionSystem:
     """Put together what moves; ValueError as `linear`, and for nodes that do not move.
 
@@ -151,7 +155,7 @@ def system(
         The equations of motion at a speed, rad/s; where their matrices may change slope, and both ends.
     forces
         What is not linear.
-    weight, bow
+    weight
         N by coordinate.
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
@@ -172,11 +176,10 @@ def system(
     for force in forces:
         for i in made.index(force.node):
             made.M[i, i] += force.mass
+    for name, force_there in (weight or {}).items():
+        made.weight[motions[0].index(name)] += force_there
     for node, value in (unbalance or {}).items():
         made.unbalance[[*made.index(node)]] += value, -1j * value
-    for vector, values in ((made.weight, weight), (made.bow, bow)):
-        for name, force_there in (values or {}).items():
-            vector[motions[0].index(name)] += force_there
     return made
 
 
@@ -216,7 +219,6 @@ def rotor_system(
     if lowest > highest:
         raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
     inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
-    end = highest if highest > lowest else lowest * (1 + 1e-6) + 1e-9
     if isinstance(rotor, SmallModel):
         names = tuple(f"x{node}" for node in rotor.nodes)
         stiffness, load = rotor.stiffness, rotor.weight / GRAVITY
@@ -230,32 +232,24 @@ def rotor_system(
         load = plane.M @ np.array([name[0] == "x" for name in names], dtype=float)
 
     def linear(speed: float) -> fem.Motion:
-        speed = min(speed, highest)
         if isinstance(rotor, SmallModel):
             return rotor.motion(speed)
         return fem.equations_of_motion(rotor.linear, speed=speed)
 
-    angle = np.radians(number(direction, "direction", signed=True))
-    pull = number(gravity, "gravity") * np.array([np.cos(angle), np.sin(angle)])
-    pull[np.abs(pull) < 1e-15 * gravity] = 0.0  # straight down is straight down
-    at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
-    bent = bow_forces(stiffness, at, np.array(list((bow or {}).values()), dtype=complex))
-    made = system(
-        linear,
-        np.array([lowest, *sorted(inside), end]),
-        forces=rotor.forces,
-        weight={
-            name.replace("x", axis, 1): part * mass
-            for axis, part in zip("xy", pull, strict=True)
-            for name, mass in zip(names, load, strict=True)
-        },
-        unbalance=unbalance,
-        bow={
-            names[i].replace("x", axis, 1): turned * force
-            for i, force in zip(at, bent, strict=True)
-            for axis, turned in (("x", 1), ("y", -1j))
-        },
+    knots = np.array([lowest, *sorted(inside), highest])
+    made = system(linear, knots, forces=rotor.forces, unbalance=unbalance)
+    planes = np.array(
+        [[made.coordinates.index(name.replace("x", axis, 1)) for name in names] for axis in "xy"]
     )
+    angle = np.radians(number(direction, "direction", signed=True))
+    way = np.round([np.cos(angle), np.sin(angle)], 15)  # straight down is straight down
+    made.weight[planes] = number(gravity, "gravity") * np.outer(way, load)
+    at = np.array([names.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
+    if 0 < len(at) < 3:
+        raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
+    if bow:  # (K_bb − K_bo K_oo⁻¹ K_ob) times the bow bends the straight shaft as it is bent at rest
+        bent = (stiffness @ followers(stiffness, at))[at] @ np.array([*bow.values()])
+        made.bow[planes[:, at]] = np.outer([1, -1j], bent)
     return without_followers(made) if isinstance(rotor, SmallModel) else made
 
 
@@ -264,15 +258,21 @@ def without_followers(system: MotionSystem) -> MotionSystem:
 
     They stay where their stiffness depends on speed.
     """
-    still = np.asarray(~(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2))))
-    still[system.law_tables[2]] = False
-    rest, others = np.flatnonzero(still), np.flatnonzero(~still)
-    if not rest.size or np.ptp(system.K[:, rest], axis=0).any():
+    moves = np.array(system.M.any(axis=0) | system.C.any(axis=(0, 1)) | system.C.any(axis=(0, 2)))
+    moves[system.law_tables[2]] = True
+    if moves.all() or np.ptp(system.K[:, ~moves], axis=0).any():
         return system
-    T = np.zeros((system.size, others.size))
-    T[others, np.arange(others.size)] = 1.0
-    T[rest] = -np.linalg.solve(system.K[0][np.ix_(rest, rest)], system.K[0][np.ix_(rest, others)])
-    return _in_basis(system, T, tuple(system.coordinates[i] for i in others))
+    kept = np.flatnonzero(moves)
+    return _in_basis(system, followers(system.K[0], kept), tuple(system.coordinates[i] for i in kept))
+
+
+def followers(K: FloatArray, kept: IndexArray) -> FloatArray:
+    """Deflections of all unknowns by those k that are kept, where no force acts on the others, (n, k)."""
+    T = np.zeros((len(K), len(kept)))
+    others = np.setdiff1d(np.arange(len(K)), kept)
+    T[kept, np.arange(len(kept))] = 1.0
+    T[others] = -np.linalg.solve(K[np.ix_(others, others)], K[np.ix_(others, kept)])
+    return T
 
 
 def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...]) -> MotionSystem:
@@ -285,63 +285,8 @@ def _in_basis(system: MotionSystem, T: FloatArray, coordinates: tuple[str, ...])
     )
 
 
-def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> ComplexArray:
-    """Forces that bend the straight shaft as it is bent at rest, N: (K_bb − K_bo K_oo⁻¹ K_ob) times the bow.
-
-    Parameters
-    ----------
-    stiffness
-        Of the free shaft in one plane, N/m, shape (n, n).
-    at
-        Unknowns where the bow is known, b of them; the others follow without a force.
-    bow
-        m, shape (b,).
-
-    Raises
-    ------
-    ValueError
-        If one or two are given: any two points lie on a straight line.
-    """
-    if 0 < len(at) < 3:
-        raise ValueError("a bow needs three nodes or more: through two of them a straight shaft passes")
-    others = np.setdiff1d(np.arange(len(stiffness)), at)
-    across = stiffness[np.ix_(others, at)]
-    held = np.linalg.solve(stiffness[np.ix_(others, others)], across) if len(at) else across
-    return np.asarray((stiffness[np.ix_(at, at)] - across.T @ held) @ bow)
-
-
-@dataclass(frozen=True, eq=False)
-class ReducedSystem:
-    """The system with fewer unknowns, how many modes it has in both planes, and what that costs.
-
-    Attributes
-    ----------
-    system
-        Its unknowns are `x7`, `y7` … of the kept nodes, feet of pedestals, and `mode_1` …
-    modes
-        How many modes stay.
-    error
-        Largest relative error of the natural frequencies without damping, those below twice the highest speed
-        or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
-        Infinite where fewer unknowns move.
-    """
-
-    system: MotionSystem
-    modes: int
-    error: float
-
-    @property
-    def note(self) -> str:
-        """How many unknowns move, and what that costs."""
-        size, modes = counted(self.system.size, "unknown"), counted(self.modes, "mode")
-        high = f"natural frequencies without films are high by {percent(self.error)} % at most"
-        if self.error == np.inf:
-            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
-        return f"of the rotor {size} move, {modes} among them; {high}"
-
-
-def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> ReducedSystem:
-    """Keep some nodes, those of forces and so many modes between them.
+def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> MotionSystem:
+    """Keep some nodes, those of forces, feet of pedestals, and so many modes, `mode_1` …, between them.
 
     Parameters
     ----------
@@ -367,10 +312,9 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
         raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
     K, M, n = (system.K[0] + system.K[0].T) / 2, system.M, len(kept)
     inner = np.ix_(others, others)
-    T = np.zeros((system.size, system.size))
-    T[kept, np.arange(n)] = 1.0
-    T[others, :n] = -np.linalg.solve(K[inner], K[np.ix_(others, kept)])
-    T[others, n:] = eigh(K[inner], M[inner])[1]
+    still = np.zeros((system.size, others.size))
+    still[others] = eigh(K[inner], M[inner])[1]
+    T = np.hstack((followers(K, kept), still))
     K, M = T.T @ K @ T, T.T @ M @ T
 
     def frequencies(size: int) -> FloatArray:
@@ -378,20 +322,17 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     full = frequencies(system.size)
-    bends = int((full <= _RIGID * full[-1]).sum())
-    end = max(int((full <= 2 * system.knots[-1]).sum()), min(bends + 2, full.size))
+    bends, end = np.searchsorted(full, (_RIGID * full[-1], 2 * system.knots[-1])).tolist()
+    end = max(end, min(bends + 2, full.size))
 
     def error(modes: int) -> float:
-        few = frequencies(n + modes)
-        if end > few.size:
-            return np.inf
-        return float(np.max(few[bends:end] / full[bends:end] - 1.0, initial=0.0))
+        few = frequencies(n + modes)[bends:end]
+        return float(np.max(few / full[bends:end] - 1.0, initial=0.0)) if len(few) == end - bends else np.inf
 
-    if modes is None:  # in pairs of both planes; more of them are never worse
-        pairs = bisect_left(range((others.size + 1) // 2), True, key=lambda n: error(2 * n) <= ENOUGH)
-        modes = min(2 * pairs, others.size)
+    if modes is None:  # in pairs of both planes
+        modes = next((few for few in range(0, others.size, 2) if error(few) <= ENOUGH), others.size)
     names = (*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes)))
-    return ReducedSystem(_in_basis(system, T[:, : n + modes], names), modes, error(modes))
+    return replace(_in_basis(system, T[:, : n + modes], names), modes=modes, frequency_error=error(modes))
 
 
 @compiled_part

@@ -5,11 +5,8 @@ from rotorid.reduction.comparison import (
     StabilityCost,
     compare_response,
     compare_stability,
-    stability_threshold,
 )
 from rotorid.reduction.condensation import Method, Methods, compare_methods
-from rotorid.reduction.input_errors import InputErrors, MassErrors, Shift
-from rotorid.reduction.keep_supports import check_free, held_nodes, held_rigidly, keep_supports
 from rotorid.reduction.masses import (
     Separated,
     design,
@@ -19,11 +16,17 @@ from rotorid.reduction.masses import (
     separate,
 )
 from rotorid.reduction.placement import Placement, book_nodes, rank_nodes
-from rotorid.reduction.reduce import Choices, Reduction, reduce, reduce_measured
-from rotorid.reduction.small_model import SmallModel, small_model
+from rotorid.reduction.reduce import InputErrors, MassErrors, Reduction, reduce, reduce_measured
+from rotorid.reduction.small_model import (
+    SmallModel,
+    check_free,
+    held_nodes,
+    held_rigidly,
+    keep_supports,
+    small_model,
+)
 
 __all__ = [
-    "Choices",
     "InputErrors",
     "MassErrors",
     "Method",
@@ -32,7 +35,6 @@ __all__ = [
     "Reduction",
     "ResponseCost",
     "Separated",
-    "Shift",
     "SmallModel",
     "StabilityCost",
     "book_nodes",
@@ -52,5 +54,4 @@ __all__ = [
     "reduce_measured",
     "separate",
     "small_model",
-    "stability_threshold",
 ]

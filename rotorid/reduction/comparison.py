@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import ArrayLike
 
 import fem
 from fem import (
-    DIRECTION_NAMES,
     SensorLike,
     Whirl,
     available_modes,
@@ -22,13 +20,12 @@ from fem import (
     solve_whirl,
 )
 from fem.assembly import both_planes
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.tables import Column, Table, terminal
-from rotorid.base.text import counted, sentence
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import percent
 from rotorid.reduction.small_model import SmallModel
 
 CLOSE = 0.08
@@ -37,8 +34,6 @@ POINTS, STEPS = 400, 40
 """Speeds of a response that are compared where none are given, and steps of a range for stability."""
 APART = 0.2
 """Relative difference of whirl frequencies at the thresholds that is named."""
-UNDAMPED = 1e-8
-"""A logarithmic decrement below this is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +74,7 @@ class ResponseCost(Answered):
     def relative_difference(self) -> FloatArray:
         """|small − full| by the largest |full| at the same speed, shape (S, C, P); NaN at standstill."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            size = np.abs(self.full).max(axis=(1, 2))[:, None, None]
+            size = np.abs(self.full).max(axis=(1, 2), keepdims=True)
             return np.asarray(np.abs(self.small - self.full) / size)
 
     @property
@@ -110,20 +105,18 @@ class ResponseCost(Answered):
         """What the reduction costs, in words."""
         used, size = self.speeds[~self.excluded], self.sizes
         speed, sensor, plane = self.where
-        bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
         details = (
-            "the difference is in percent of the largest influence coefficient at the same speed",
-            f"worst at {rpm_text(speed)}: reading at node {label(sensor)}, unbalance at node {plane}",
-            f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
-            f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands or 'none'}, rpm)",
+            f"in percent of the largest influence coefficient at the same speed; worst at {rpm_text(speed)}, "
+            f"reading at node {label(sensor)}, unbalance at node {plane}; left out: "
+            f"{np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within ±{100 * self.bands:.3g} "
+            "% of the full rotor's critical speeds"
         )
         return Answer(
             f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
-            f"{counted(len(self.nodes), 'mass', 'masses')} is within {_percent(size['largest'])} of the full "
-            f"rotor's, median {_percent(size['median'])}.",
+            f"masses is within {percent(size['largest'])} % of the full rotor's, median "
+            f"{percent(size['median'])} %.",
             warnings=self.warnings,
-            tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
-            more="where the response differs most",
+            notes=(details,),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -176,16 +169,17 @@ def compare_response(
     `fem.influence` has it, too. The critical speeds are those of the undamped rotor, as
     `fem.critical_speeds` gives them: bands are left out around them also where damping is large.
     """
-    nodes = small.massive
     if not (np.isfinite(bands) and 0 <= bands < 1):
         raise ValueError(f"the bands are a part of the critical speed, 0 to below 1, not {bands!r}")
+    nodes, (small, remarks) = small.massive, _undamped(small)
     omega = _default_speeds(rotor, bands) if speeds is None else checked_speeds(speeds, ascending=True)
     sensors: tuple[SensorLike, ...] = nodes
     if not rotor.symmetric:
-        sensors = (*((node, 0.0) for node in nodes), *((node, 90.0) for node in nodes))
+        sensors = tuple((node, angle) for angle in (0.0, 90.0) for node in nodes)
     full = fem.influence(rotor, nodes, sensors, omega)
-    small, remarks = _undamped(small)
-    response = small.response(omega)[:, : len(sensors)]
+    each = [small.deflections(omega, {node: 1.0}) for node in nodes]
+    at = np.concatenate([np.flatnonzero(small.masses) + k for k in (0, len(small.nodes))])[: len(sensors)]
+    response = np.stack(each, axis=2)[:, at]
     try:
         criticals = critical_speeds_below(rotor, omega[-1] / (1 - bands) * (1 - 1e-9))
     except ValueError as problem:
@@ -201,10 +195,9 @@ def compare_response(
         )
     remarks += [f"full rotor: {warning}" for warning in full.warnings]
     cost = ResponseCost(omega, full.W, response, nodes, sensors, criticals, float(bands), excluded)
-    largest = cost.sizes["largest"]
-    if not largest <= CLOSE:
+    if not (largest := cost.sizes["largest"]) <= CLOSE:
         remarks.append(
-            f"at {cost.where[0]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, "
+            f"at {cost.where[0]:.6g} rad/s the small model is {percent(largest)} % off: take more masses, "
             "other nodes or more modes, or use it below this speed"
         )
     return replace(cost, warnings=tuple(remarks))
@@ -213,47 +206,17 @@ def compare_response(
 def _undamped(small: SmallModel) -> tuple[SmallModel, list[str]]:
     """The model without damping of the surroundings, and what to say of it."""
     remark = "the modal damping of the small model is left out of this comparison: the full rotor has none"
-    damped = bool(small.damping.any())
-    return replace(small, damping=np.zeros_like(small.damping)), [remark] * damped
+    return replace(small, damping=0 * small.damping), [remark] * bool(small.damping.any())
 
 
 def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:
     """Up to 1.1 times the second critical speed of each plane, within the tables; with the bands' ends."""
     criticals = np.sort(fem.critical_speeds(rotor, 2 if rotor.symmetric else 4).frequencies)
     tables = [support.speeds for support in rotor.supports if support.speeds]
-    first = max((table[0] for table in tables), default=0.0)
-    last = min((table[-1] for table in tables), default=np.inf)
-    top = min(1.1 * float(criticals[-1]), last)
-    even = np.linspace(max(first, top / POINTS), top, POINTS)
-    ends = np.concatenate((criticals * (1 - bands), criticals * (1 + bands)))
-    return np.unique(np.concatenate((even, ends[(ends > even[0]) & (ends < top)])))
-
-
-def _percent(part: float) -> str:
-    return f"{100 * part:.2g} %" if part < 0.1 else f"{100 * part:.0f} %"
-
-
-def stability_threshold(
-    small: SmallModel, highest: float, *, lowest: float = 0.0, steps: int = STEPS
-) -> fem.Stability:
-    """The first speed at which a mode of a small model stops decaying, as `fem.stability_threshold`.
-
-    Parameters
-    ----------
-    small
-        The small model, of which all motions are watched.
-    highest, lowest
-        Range of speeds, rad/s: within the tables of all supports.
-    steps
-        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
-        speeds is not seen. The threshold itself is found by iteration, to 1e-10 of it or better.
-
-    Raises
-    ------
-    ValueError
-        For an impossible range, or outside the table of a support.
-    """
-    return fem.threshold_of(small.whirl(fem.range_of_speeds(lowest, highest, steps)))
+    top = min([1.1 * float(criticals[-1]), *(table[-1] for table in tables)])
+    even = np.linspace(max([top / POINTS, *(table[0] for table in tables)]), top, POINTS)
+    ends = np.outer((1 - bands, 1 + bands), criticals)
+    return np.union1d(even, ends[(ends > even[0]) & (ends < top)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,14 +230,10 @@ class StabilityCost(Answered):
     full_decrement, small_decrement
         Smallest logarithmic decrement of all modes that oscillate, shape (S,): negative where one grows,
         −inf where the rotor runs away without oscillating, NaN where nothing oscillates.
-    full_frequency, small_frequency
-        Whirl frequency of the mode that has it, rad/s, shape (S,); NaN where there is none.
     full, small
         Where each loses stability.
     nodes
         Where the masses stand.
-    n_full, n_small
-        How many modes were watched.
     warnings
         What the reader must know.
     """
@@ -282,13 +241,9 @@ class StabilityCost(Answered):
     speeds: FloatArray
     full_decrement: FloatArray
     small_decrement: FloatArray
-    full_frequency: FloatArray
-    small_frequency: FloatArray
     full: fem.Stability
     small: fem.Stability
     nodes: tuple[int, ...]
-    n_full: int
-    n_small: int
     warnings: tuple[str, ...] = ()
 
     @property
@@ -300,48 +255,14 @@ class StabilityCost(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What the reduction costs, in words and a table."""
-        table = Table(
-            "stability",
-            (
-                Column("model", ("full rotor", counted(len(self.nodes), "mass", "masses"))),
-                *(Column(*column, "{:.6g}".format) for column in self._both()),
-                Column("direction", [_way(each.direction) for each in (self.full, self.small)]),
-                Column("modes watched", (self.n_full, self.n_small)),
-            ),
+        """Both stabilities, and how far apart the thresholds are."""
+        apart = "" if self.relative_difference is None else f" ({100 * self.relative_difference:+.3g} %)"
+        disagree = "" if self.full.status == self.small.status else "The models DISAGREE. "
+        words = (
+            f"{disagree}Full rotor: {self.full.sentence()}.\n{len(self.nodes)}-mass model: "
+            f"{self.small.sentence()}{apart}."
         )
-        return Answer(
-            sentence(self._verdict()),
-            warnings=self.warnings,
-            tables=(terminal(table),),
-            more="both thresholds of stability",
-        )
-
-    def _both(self) -> list[tuple[str, list[float | None]]]:
-        both = (self.full, self.small)
-        return [
-            ("threshold, rpm", [each.threshold and each.threshold * RPM for each in both]),
-            ("whirl there, rpm", [each.frequency and each.frequency * RPM for each in both]),
-            ("by speed", [each.whirl_ratio for each in both]),
-            ("least log decrement", [each.margin for each in both]),
-        ]
-
-    def _verdict(self) -> str:
-        where, begin = f"from {range_text(self.speeds[0], self.speeds[-1])}", rpm_text(self.speeds[0])
-        if self.relative_difference is None and self.full.status == self.small.status == "stable":
-            decrements = np.concatenate((self.full_decrement, self.small_decrement))
-            if np.nan_to_num(np.abs(decrements)).max() < UNDAMPED:
-                return f"no damping acts on either model {where}: no motion grows, and none decays"
-            return f"both models are stable {where}"
-        words = {"stable": f"is stable {where}", "unstable": f"is unstable already at {begin}"}
-        full, small = (
-            words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
-            for each in (self.full, self.small)
-        )
-        apart = self.relative_difference
-        percent = "" if apart is None else f": {100 * apart:+.3g} %"
-        disagree = "" if self.full.status == self.small.status else "the models disagree: "
-        return f"{disagree}the full rotor {full}, the small model {small}{percent}"
+        return Answer(words, warnings=self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
@@ -351,12 +272,9 @@ class StabilityCost(Answered):
                 "speeds_rad_s": self.speeds,
                 "full_log_decrement": self.full_decrement,
                 "small_log_decrement": self.small_decrement,
-                "full_frequency_rad_s": self.full_frequency,
-                "small_frequency_rad_s": self.small_frequency,
                 "full": self.full.to_dict(),
                 "small": self.small.to_dict(),
                 "relative_difference_of_threshold": self.relative_difference,
-                "modes_watched": {"full": self.n_full, "small": self.n_small},
                 "warnings": self.warnings,
             }
         )
@@ -369,9 +287,11 @@ def compare_stability(
     *,
     lowest: float = 0.0,
     steps: int = STEPS,
-    n: int | None = None,
 ) -> StabilityCost:
     """Compare where a small model and the full rotor lose stability.
+
+    Decrements are those of all modes of the small model, and of as many of the rotor's of lowest frequency,
+    forward and backward whirl apart, 8 at least.
 
     Parameters
     ----------
@@ -382,9 +302,6 @@ def compare_stability(
     steps
         Into how many steps the range is divided; a mode that is unstable only between two neighbouring
         speeds is not seen, in neither model. The thresholds themselves are found by iteration.
-    n
-        Of how many modes of lowest frequency of the full rotor the decrements are taken, forward and backward
-        whirl apart; by default 8, or as many as the small model has. Of the small model all are.
 
     Raises
     ------
@@ -394,12 +311,10 @@ def compare_stability(
     speeds = fem.range_of_speeds(lowest, highest, steps)
     small, remarks = _undamped(small)
     whirl = small.whirl(speeds)
-    n_small = int(np.isfinite(whirl.values).sum(axis=1).max())
-    n_full = checked_number(rotor, min(max(8, n_small), available_modes(rotor)) if n is None else n)
-    full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
+    many = max(8, int(np.isfinite(whirl.values).sum(axis=1).max()))
+    n = checked_number(rotor, min(many, available_modes(rotor)))
+    full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n, steps=steps)
     of_small = fem.threshold_of(whirl)
-    full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
-    small_decrement, small_frequency = _least_damped(whirl)
     a, b = full.frequency, of_small.frequency
     if a and b and abs(b / a - 1) > APART:
         remarks.append(
@@ -408,30 +323,16 @@ def compare_stability(
         )
     return StabilityCost(
         speeds=speeds,
-        full_decrement=full_decrement,
-        small_decrement=small_decrement,
-        full_frequency=full_frequency,
-        small_frequency=small_frequency,
+        full_decrement=_least_damped(solve_whirl(both_planes(rotor), speeds, n)),
+        small_decrement=_least_damped(whirl),
         full=full,
         small=of_small,
         nodes=small.massive,
-        n_full=n_full,
-        n_small=n_small,
         warnings=tuple(remarks),
     )
 
 
-def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """Smallest logarithmic decrement at each speed and the frequency of its mode, rad/s, shape (S,) each.
-
-    −inf and NaN where the rotor runs away.
-    """
+def _least_damped(whirl: Whirl) -> FloatArray:
+    """Smallest logarithmic decrement at each speed, shape (S,); −inf where the rotor runs away."""
     decrements = -2 * np.pi * whirl.values.real / np.abs(whirl.values.imag)
-    rows, k = np.arange(len(decrements)), np.nan_to_num(decrements, nan=np.inf).argmin(axis=1)
-    away = np.array(runs_away(whirl))
-    frequency = np.abs(whirl.values.imag)[rows, k]
-    return np.where(away, -np.inf, decrements[rows, k]), np.where(away, np.nan, frequency)
-
-
-def _way(direction: float | None) -> str:
-    return "" if direction is None else DIRECTION_NAMES[direction]
+    return np.where(runs_away(whirl), -np.inf, np.fmin.reduce(decrements, axis=1))

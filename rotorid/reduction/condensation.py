@@ -18,7 +18,7 @@ Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,29 +26,53 @@ import numpy as np
 
 import fem
 from fem import Pencil, whole_rotor
-from fem.assembly import assemble, ignored_inertia, multiply
-from rotorid.base import registry
+from fem.assembly import assemble, multiply
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
-from rotorid.base.text import counted, listing, percent
-from rotorid.reduction.masses import (
-    Normalisation,
-    RowWeights,
-    design,
-    equivalent_masses,
-    held,
-    like,
-    mac,
-    mass_nodes,
-    natural_frequencies,
-    plane_at_rest,
-)
+from rotorid.base.text import counted, percent
+from rotorid.reduction.masses import like, mac
+from rotorid.reduction.reduce import Reduction
 
 MASSLESS = 1e-12
 """Of the largest eigenvalue of Guyan's mass matrix: below, some motion of the masters moves no mass."""
+
+
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    free = np.ones(band.shape[1])
+    free[unknowns] = 0.0
+    above = range(len(band) - 1, -1, -1)
+    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
+    K[-1, unknowns] = 1.0
+    return K
+
+
+def static_shapes(
+    band: FloatArray, masters: IndexArray
+) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    """Shapes for a unit deflection of each master, shape (size, n), and what solves K_oo x_o = f_o.
+
+    `band` is the upper band of K. ValueError where the structure does not stand when the masters are held.
+    """
+    from scipy.linalg.lapack import dpbtrf, dpbtrs
+
+    factor, info = dpbtrf(held(band, masters))
+    if info != 0:
+        raise ValueError(
+            "the rotor held at these nodes is statically unstable: a support has negative stiffness, check "
+            "its sign and size; or the elements are too many for float64, join neighbouring ones"
+        )
+
+    def carried(force: FloatArray) -> FloatArray:
+        """Deflections of the others under forces on them, masters held."""
+        force[masters] = 0.0
+        return np.asarray(dpbtrs(factor, force)[0])
+
+    unit = np.zeros((band.shape[1], len(masters)), order="F")
+    unit[masters, np.arange(len(masters))] = 1.0
+    return unit + carried(-multiply(band, unit)), carried
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +82,7 @@ class Method:
     Attributes
     ----------
     name
-        As titled in `METHODS`; "regression, k modes".
+        "Guyan", "IRS" or "regression, k modes".
     M, K
         Mass, kg, and stiffness, N/m, shape (n, n); None where the method fails at these masters.
     T
@@ -87,14 +111,9 @@ class Method:
     reason: str = ""
 
     @property
-    def diagonal(self) -> bool:
-        """Whether the mass matrix is diagonal: only then does a mass stand at a node."""
-        return self.T is None and self.M is not None
-
-    @property
     def masses(self) -> FloatArray | None:
         """The masses at the masters, kg, shape (n,); None where the mass matrix is not diagonal."""
-        return np.diag(self.M).copy() if self.diagonal and self.M is not None else None
+        return None if self.M is None or self.T is not None else np.diag(self.M).copy()
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the transformation T is left to Python."""
@@ -104,7 +123,7 @@ class Method:
                 "mass_matrix_kg": self.M,
                 "stiffness_matrix_N_per_m": self.K,
                 "masses_kg": self.masses,
-                "diagonal": self.diagonal,
+                "diagonal": self.masses is not None,
                 "natural_frequencies_rad_s": self.frequencies,
                 "relative_error": self.relative_error,
                 "mac": self.mac,
@@ -121,7 +140,7 @@ class Methods(Answered):
     Attributes
     ----------
     rotor
-        The rotor; its plane x at rest is reduced.
+        The plane x of the rotor at rest.
     nodes
         Masters, n of them.
     rotor_frequencies
@@ -138,35 +157,6 @@ class Methods(Answered):
     rows: tuple[Method, ...]
     warnings: tuple[str, ...]
 
-    def row(self, name: str) -> Method:
-        """The model of one method; "regression" is the regression however many modes it used.
-
-        Raises
-        ------
-        ValueError
-            For a method that was not compared.
-        """
-        for row in self.rows:
-            if row.name.split(",")[0].lower() == name.split(",")[0].lower():
-                return row
-        raise ValueError(f"no method {name!r}: there are {', '.join(row.name for row in self.rows)}")
-
-    def _columns(self) -> tuple[Column, ...]:
-        n, several = len(self.nodes), len(self.rows)
-        frequency, share = "{:.4f}".format, "{:+.3%}".format
-
-        def each(name: str) -> FloatArray:
-            return np.concatenate([getattr(row, name) for row in self.rows])
-
-        return (
-            Column("method", np.repeat([row.name for row in self.rows], n), str),
-            Column("mode", np.tile(np.arange(1, n + 1), several), str),
-            Column("frequency_rad_s", each("frequencies"), frequency, "rad/s"),
-            Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several), frequency, "rotor"),
-            Column("relative_error", each("relative_error"), share, "error"),
-            Column("mac", each("mac"), "{:.5f}".format, "MAC"),
-        )
-
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
         return plain(
@@ -182,80 +172,40 @@ class Methods(Answered):
     @property
     def answer(self) -> Answer:
         """The largest error of each method; behind it frequencies, errors and MAC by method and mode."""
+        n = len(self.nodes)
         worst = [
             f"{row.name} {percent(round(float(np.abs(row.relative_error).max()), 8))} %"
             if np.isfinite(row.relative_error).all()
             else f"{row.name}: no model of all modes"
             for row in self.rows
         ]
-        full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
-        remark = "full mass matrices; they couple the nodes, and no single mass stands at a node"
+        frequencies, errors, agreement = np.concatenate(
+            [(row.frequencies, row.relative_error, row.mac) for row in self.rows], axis=1
+        )
+        columns = (
+            Column("method", np.repeat([row.name for row in self.rows], n), str),
+            Column("mode", [*range(1, n + 1)] * len(self.rows), str),
+            Column("rad/s", frequencies, "{:.4f}".format),
+            Column("error", errors, "{:+.3%}".format),
+            Column("MAC", agreement, "{:.5f}".format),
+        )
+        full = "Guyan and IRS: full mass matrices; they couple the nodes, and no single mass stands at a node"
         return Answer(
-            f"Largest error of {counted(len(self.nodes), 'frequency', 'frequencies')}: {', '.join(worst)}.",
+            f"Largest error of {counted(n, 'frequency', 'frequencies')}: {', '.join(worst)}.",
             warnings=self.warnings,
-            notes=(f"{listing(full, 'and')}: {remark}",) if full else (),
-            tables=(text(self._columns()),),
+            notes=(full,),
+            tables=(text(columns),),
             more="frequencies and shapes of each method",
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Condensed:
-    """What the methods share: the plane at rest, and its static shapes T on masters that are held.
-
-    `factor` is the Cholesky band of K with the masters' rows and columns those of the identity.
-    """
-
-    nodes: tuple[int, ...]
-    plane: fem.Rotor
-    pencil: Pencil
-    masters: IndexArray
-    modes: fem.Modes
-    factor: FloatArray
-    modes_used: int
-    weights: Mapping[str, Any]
-
-    @property
-    def shapes(self) -> FloatArray:
-        """Of the rotor's modes at the masters, (n, n)."""
-        return np.asarray(self.modes.shapes[np.array(self.nodes) - 1])
-
-    def matrices(self, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Tᵀ M T, and Tᵀ K T from strains, which keep their digits on fine meshes."""
-        M = T.T @ multiply(self.pencil.mass, np.asfortranarray(T))
-        return (M + M.T) / 2, np.asarray(self.pencil.energy(T))
-
-    def carried(self, force: FloatArray) -> FloatArray:
-        """K_oo⁻¹ of forces on the others, masters held."""
-        from scipy.linalg.lapack import dpbtrs
-
-        force[self.masters] = 0.0
-        return np.asarray(dpbtrs(self.factor, force)[0])
-
-
-def compare_methods(
-    rotor: fem.Rotor,
-    nodes: Sequence[str | int],
-    *,
-    modes: int = 2,
-    speed: float | None = None,
-    normalise: Normalisation = "first",
-    rows: RowWeights = "equal",
-) -> Methods:
-    """Reduce a rotor to the deflections of the same nodes by all `METHODS`.
+def compare_methods(reduction: Reduction) -> Methods:
+    """Reduce a rotor to the deflections of the same nodes by Guyan's method and IRS, beside formula (50).
 
     Parameters
     ----------
-    rotor
-        On supports; its plane x at rest is reduced.
-    nodes
-        Masters: different nodes, as numbers from 1 or names of stations.
-    modes
-        How many modes the regression uses, 1 … n.
-    speed
-        Where tables of supports are read, rad/s; by default their lowest common speed.
-    normalise, rows
-        Scaling of shapes and weights of rows of the regression, as in `equivalent_masses`.
+    reduction
+        Of a rotor, by its computed modes; of its plane x at rest.
 
     Returns
     -------
@@ -265,120 +215,73 @@ def compare_methods(
     Raises
     ------
     ValueError
-        For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
-        to move, a speed outside a table, or a number of modes out of range.
+        For a reduction without a rotor, or a support of negative stiffness.
 
     Examples
     --------
     >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
     >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
-    >>> model = compare_methods(shaft, [3], modes=1).row("Guyan")
+    >>> model = compare_methods(reduce(shaft, [3], modes=1)).rows[0]
     >>> model.M.round(2), model.relative_error.round(4)
     (array([[7.5]]), array([0.0075]))
     """
-    from scipy.linalg.lapack import dpbtrf
-
-    places = mass_nodes(rotor, nodes)
-    n, modes = len(places), whole(modes, "the number of modes")
-    if not 1 <= modes <= n:
-        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
-    weights: dict[str, Any] = {"normalise": normalise, "rows": rows}
-    design(np.eye(n), np.ones(modes), np.ones((n, modes)), **weights)  # refuses wrong choices
-    plane, remarks = plane_at_rest(rotor, speed)
-    fem.compliance(plane, places)  # refuses a rotor that is free, or a mesh lost in float64
-    full = fem.critical_speeds(plane, n)
-    pencil = whole_rotor(plane, assemble(plane))
-    masters = pencil.waves[0][np.array(places) - 1]
-    factor, info = dpbtrf(held(pencil.stiffness, masters))
-    if info != 0:
-        raise ValueError(
-            "the rotor held at the masters is statically unstable: a support has negative stiffness; check "
-            "its sign and size"
-        )
-    condensed = _Condensed(places, plane, pencil, masters, full, factor, modes, weights)
+    full = reduction.rotor_modes
+    if full is None:
+        raise ValueError("methods are compared at a rotor, not at measured modes alone")
+    places = np.array(reduction.nodes, dtype=int)
+    n, at_masters = len(places), full.shapes[places - 1]
+    pencil = whole_rotor(full.rotor, assemble(full.rotor))
+    static, carried = static_shapes(pencil.stiffness, pencil.waves[0][places - 1])
+    motion = reduction.equations_of_motion
+    try:
+        improved = _ritz(pencil, _improved(pencil, static, carried))
+    except ValueError as failure:
+        improved = None, None, None, np.full(n, np.nan), np.full((n, n), np.nan), str(failure)
+    models: dict[str, _Model] = {
+        "Guyan": _ritz(pencil, static),
+        "IRS": improved,
+        f"regression, {counted(reduction.modes, 'mode')}": (
+            *(motion.M, motion.K, None, reduction.frequencies, reduction.shapes, ""),
+        ),
+    }
     table = []
-    for method in METHODS:
-        name = method.title + ("" if method.function is not _regression else f", {counted(modes, 'mode')}")
-        try:
-            M, K, T, frequencies, shapes, reason = method.function(condensed)
-        except ValueError as failure:
-            lost = np.full(n, np.nan)
-            table.append(
-                Method(name, None, None, None, lost, np.full((n, n), np.nan), lost, lost, f"{failure}")
-            )
-            continue
-        error = frequencies / full.frequencies - 1
-        agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, condensed.shapes)), np.nan)
-        scaled = like(shapes, condensed.shapes)
+    for name, (M, K, T, frequencies, shapes, reason) in models.items():
+        agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, at_masters)), np.nan)
+        scaled, error = like(shapes, at_masters), frequencies / full.frequencies - 1
         table.append(Method(name, M, K, T, frequencies, scaled, error, agreement, reason))
-    ours = ignored_inertia(plane)
-    warnings = (
-        *remarks,
-        *ignored_inertia(rotor),
-        *(warning for warning in full.warnings if warning not in ours),
-        *(f"{row.name}: {row.reason}" for row in table if row.reason),
-    )
-    return Methods(rotor, places, full.frequencies, tuple(table), warnings)
+    warnings = tuple(f"{row.name}: {row.reason}" for row in table if row.reason)
+    return Methods(full.rotor, tuple(places.tolist()), full.frequencies, tuple(table), warnings)
 
 
-_Model = tuple[FloatArray, FloatArray, FloatArray | None, FloatArray, FloatArray, str]
+_Model = tuple[FloatArray | None, FloatArray | None, FloatArray | None, FloatArray, FloatArray, str]
 """M, K, T, frequencies and shapes of a method, and what to know about it."""
 
 
-def _static(condensed: _Condensed) -> FloatArray:
-    """Guyan's T."""
-    n = len(condensed.nodes)
-    unit = np.zeros((condensed.pencil.size, n), order="F")
-    unit[condensed.masters, np.arange(n)] = 1.0
-    return unit + condensed.carried(-multiply(condensed.pencil.stiffness, unit))
+def _matrices(pencil: Pencil, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Tᵀ M T, and Tᵀ K T from strains, which keep their digits on fine meshes."""
+    M = T.T @ multiply(pencil.mass, np.asfortranarray(T))
+    return (M + M.T) / 2, np.asarray(pencil.energy(T))
 
 
-def _guyan(condensed: _Condensed) -> _Model:
-    return _projected(condensed, _static(condensed))
-
-
-def _irs(condensed: _Condensed) -> _Model:
-    T = _static(condensed)
-    M, K = condensed.matrices(T)
+def _improved(pencil: Pencil, static: FloatArray, carried: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """T of IRS."""
+    M, K = _matrices(pencil, static)
     least, most = np.linalg.eigvalsh(M)[[0, -1]]
     if least <= MASSLESS * most:
         raise ValueError(
             "Guyan's mass matrix is singular at these nodes, and IRS needs its inverse: some motion of the "
             "masters moves no mass; choose nodes with mass or fewer of them"
         )
-    inertia = multiply(condensed.pencil.mass, np.asfortranarray(T @ np.linalg.solve(M, K)))
-    return _projected(condensed, T + condensed.carried(inertia))
+    return static + carried(multiply(pencil.mass, np.asfortranarray(static @ np.linalg.solve(M, K))))
 
 
-def _projected(condensed: _Condensed, T: FloatArray) -> _Model:
+def _ritz(pencil: Pencil, T: FloatArray) -> _Model:
+    """The model whose rotor moves as T."""
     from scipy.linalg import eigh
 
-    M, K = condensed.matrices(T)
+    M, K = _matrices(pencil, T)
     mu, shapes = eigh(M, K)  # μ = 1/ω²: the inverse form keeps the digits of the low modes
     mu, shapes = mu[::-1], shapes[:, ::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = np.where(mu > 1e-15 * mu[0], 1 / np.sqrt(mu), np.nan)
-    return M, K, T[condensed.pencil.waves[0]], frequencies, shapes, ""
-
-
-def _regression(condensed: _Condensed) -> _Model:
-    """Formula (50) at the masters."""
-    nodes, k = condensed.nodes, condensed.modes_used
-    alpha = fem.compliance(condensed.plane, nodes)
-    used = condensed.modes.frequencies[:k], condensed.shapes[:, :k]
-    estimate = equivalent_masses(alpha, *used, **condensed.weights)
-    if not estimate.full_rank:
-        raise ValueError(f"these modes do not determine the masses: {estimate.describe_rank()}")
-    masses = estimate.solution
-    bad = [node for node, m in zip(nodes, masses, strict=True) if m <= 0]
-    words = "the mass at node {} is not positive: no physical model; use other nodes or modes"
-    K = np.linalg.inv(alpha)
-    frequencies, shapes = natural_frequencies(alpha, masses)
-    return np.diag(masses), (K + K.T) / 2, None, frequencies, shapes, words.format(bad[0]) if bad else ""
-
-
-METHODS: tuple[registry.Method[Callable[[_Condensed], _Model]], ...] = (
-    registry.Method("guyan", "the shaft bent as at rest", _guyan, "Guyan"),
-    registry.Method("irs", "Guyan's shapes bent further by their inertia forces", _irs, "IRS"),
-    registry.Method("regression", "masses that stand at the nodes, formula (50)", _regression, "regression"),
-)
+    return M, K, T[pencil.waves[0]], frequencies, shapes, ""

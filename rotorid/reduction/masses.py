@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.regression import Estimate, least_squares
+from rotorid.base.arrays import FloatArray
+from rotorid.regression import RCOND, Estimate, least_squares
 
 Normalisation = Literal["first", "largest", "length"]
 """Each shape scaled to 1 at the first mass, to 1 at its largest entry, or to unit length."""
@@ -82,60 +82,53 @@ def design(
         with a node at the first mass (scaled to 1 there) or without any displacement.
     """
     alpha, omega, U, springs = _checked(compliance, frequencies, shapes, seal_stiffness)
-    n, k = U.shape[-2:]
-    batch = np.broadcast_shapes(alpha.shape[:-2], omega.shape[:-1], U.shape[:-2], springs.shape[:-1])
-    U = _normalised(U, normalise, quiet=len(batch) > 0)
     if rows not in ("equal", "relative"):
         raise ValueError(f'rows must be "equal" or "relative", not {rows!r}')
+    scale = _scale(U, normalise)
+    if np.isnan(scale).any() and max(alpha.ndim, U.ndim, omega.ndim + 1, springs.ndim + 1) == 2:
+        raise ValueError(
+            "a mode has a node at the first mass, or no displacement at any mass; choose other nodes, leave "
+            'the mode out, or take normalise="largest"'
+        )
+    U = U / scale
     factors = omega**2 if rows == "relative" else np.ones_like(omega)
     B = np.swapaxes(U, -1, -2)[..., :, None, :] * alpha[..., None, :, :]  # (…, k, i, j)
     B = B * factors[..., :, None, None]
     D = np.swapaxes(U + alpha @ (springs[..., :, None] * U), -1, -2) * (factors / omega**2)[..., None]
-    return (
-        np.ascontiguousarray(np.broadcast_to(B, (*batch, k, n, n))).reshape(*batch, k * n, n),
-        np.ascontiguousarray(np.broadcast_to(D, (*batch, k, n))).reshape(*batch, k * n),
-    )
+    *batch, k, n = D.shape
+    return np.broadcast_to(B, (*batch, k, n, n)).reshape(*batch, k * n, n), D.reshape(*batch, k * n)
 
 
-def _normalised(shapes: FloatArray, normalise: Normalisation, *, quiet: bool = False) -> FloatArray:
-    """Shapes (…, n, k) scaled; with `quiet` NaN where that is impossible, else a ValueError."""
-    largest = np.abs(shapes).max(axis=-2, keepdims=True)
-    bad = largest == 0
-    if not quiet and bad.any():
-        raise ValueError("a mode has no displacement at any mass; choose other nodes or leave the mode out")
+def _scale(shapes: FloatArray, normalise: Normalisation) -> FloatArray:
+    """What each shape of (…, n, k) is divided by, (…, 1, k); NaN where that is impossible."""
+    sizes = np.abs(shapes)
+    largest = sizes.max(axis=-2, keepdims=True)
     if normalise == "first":
         scale = shapes[..., :1, :]
-        bad = bad | (np.abs(scale) < ZERO_AT_FIRST * largest)
+        scale = np.where(np.abs(scale) < ZERO_AT_FIRST * largest, 0.0, scale)
     elif normalise == "largest":
-        scale = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=-2, keepdims=True), axis=-2)
+        scale = np.take_along_axis(shapes, sizes.argmax(axis=-2, keepdims=True), axis=-2)
     elif normalise == "length":
         scale = np.linalg.norm(shapes, axis=-2, keepdims=True)
     else:
         raise ValueError(f'normalise must be "first", "largest" or "length", not {normalise!r}')
-    if not quiet and bad.any():
-        raise ValueError(
-            "a mode has a node at the first mass; choose another node for the first mass, "
-            'or normalise="largest"'
-        )
-    return np.asarray(shapes / np.where(bad, np.nan, scale))
+    return np.where(scale == 0, np.nan, scale)
 
 
 def _checked(
     compliance: ArrayLike, frequencies: ArrayLike, shapes: ArrayLike, seal_stiffness: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    alpha = np.asarray(compliance, dtype=float)
+    """The inputs of formula (50) as arrays that fit each other."""
+    alpha, U, springs = (np.asarray(part, dtype=float) for part in (compliance, shapes, seal_stiffness))
     omega = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    U, springs = np.asarray(shapes, dtype=float), np.asarray(seal_stiffness, dtype=float)
-    fits = alpha.ndim >= 2 and U.ndim >= 2 and alpha.shape[-2] == alpha.shape[-1] == U.shape[-2] > 0
-    if not fits or U.shape[-1] != omega.shape[-1] or omega.shape[-1] == 0:
+    n, k = U.shape[-2:] if U.ndim > 1 else (0, 0)
+    if alpha.shape[-2:] != (n, n) or omega.shape[-1] != k or not n * k:
         raise ValueError(
             f"compliance must be (n, n) and shapes (n, k) for k frequencies; got {alpha.shape}, {U.shape} "
             f"and {omega.shape[-1]} frequencies"
         )
-    n = U.shape[-2]
     if springs.ndim and springs.shape[-1] not in (1, n):
         raise ValueError(f"seal_stiffness must be one number or one per mass ({n}); got {springs.shape}")
-    springs = np.broadcast_to(springs, (*springs.shape[:-1], n))
     for name, value in (("compliance", alpha), ("shapes", U), ("seal_stiffness", springs)):
         if not np.isfinite(value).all():
             raise ValueError(f"{name} must be finite; found NaN or infinity")
@@ -143,26 +136,13 @@ def _checked(
         raise ValueError(
             "natural frequencies must be positive and finite: a rigid-body mode determines no masses"
         )
-    gap = np.abs(alpha - np.swapaxes(alpha, -1, -2)).max(axis=(-2, -1))
-    if (gap > ASYMMETRY * np.abs(alpha).max(axis=(-2, -1))).any():
+    largest = np.abs(alpha).max(axis=(-2, -1), keepdims=True)
+    if (np.abs(alpha - np.swapaxes(alpha, -1, -2)) > ASYMMETRY * largest).any():
         raise ValueError(
             "compliance must be symmetric (deflection at i under a force at j equals that at j under a force "
             "at i); correct it, or average the two entries if both are measured"
         )
-    return alpha, omega, U, springs
-
-
-@dataclass(frozen=True, eq=False)
-class BoundedEstimate(Estimate):
-    """Masses that had to be ≥ 0; those at the bound are kept at zero and have no interval.
-
-    Attributes
-    ----------
-    at_bounds
-        Names of the masses at the bound: the data would make them negative.
-    """
-
-    at_bounds: tuple[str, ...] = ()
+    return alpha, omega, U, np.broadcast_to(springs, (*springs.shape[:-1], n))
 
 
 def equivalent_masses(
@@ -183,8 +163,8 @@ def equivalent_masses(
         As in `design`, without leading dimensions. Computed or measured: the modes need not be those of a
         computed rotor.
     nonnegative
-        Least squares over masses ≥ 0; the result is a `BoundedEstimate`, which names the masses at the
-        bound. Where the bound holds nothing back the masses are those of the free regression.
+        Least squares over masses ≥ 0; those at the bound 0 have no interval. Where
+        the bound holds nothing back the masses are those of the free regression.
 
     Returns
     -------
@@ -212,78 +192,86 @@ def equivalent_masses(
     if not weights.any():
         raise ValueError("every row of the regression is zero: these modes and compliances say nothing")
     free = least_squares(B, D, names=names, weights=weights)
-    return _bounded(B, D, weights, free) if nonnegative else free
+    return _nonnegative(free, B, D, weights) if nonnegative else free
 
 
-def _bounded(B: FloatArray, D: FloatArray, weights: FloatArray, free: Estimate) -> BoundedEstimate:
+def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray, weights: FloatArray) -> Estimate:
     """The masses ≥ 0 with the least residual; covariance of the regression of the positive masses alone."""
     from scipy.optimize import nnls
 
     norms = np.linalg.norm(B, axis=0)
     start, _ = nnls(B / np.where(norms > 0, norms, 1.0), D / (np.linalg.norm(D) or 1.0))
-    kept, n = np.flatnonzero(start > 0), len(free.names)
-    determined = ~np.isnan(free.values)
-    solution, residuals, full = np.zeros(n), D.copy(), None
-    if kept.size:
-        inner = least_squares(B[:, kept], D, names=[free.names[j] for j in kept], weights=weights)
-        solution[kept], residuals = inner.solution, inner.residuals
-        if inner.covariance is not None:
-            full = np.zeros((n, n))
-            full[np.ix_(kept, kept)] = inner.covariance
-    covariance = None if full is None else full.copy()
-    if covariance is not None:
-        lost = ~determined | (solution == 0)
-        covariance[lost, :] = covariance[:, lost] = np.nan
-    changed = {
-        **{field.name: getattr(free, field.name) for field in dataclasses.fields(free)},
-        "values": np.where(determined, solution, np.nan),
-        "solution": solution,
-        "residuals": residuals,
-        "covariance": covariance,
-        "solution_covariance": full,
-        "dof": int(np.count_nonzero(weights)) - kept.size,
-    }
-    at_bounds = tuple(name for j, name in enumerate(free.names) if determined[j] and j not in kept)
-    return BoundedEstimate(**changed, at_bounds=at_bounds)
+    inner = least_squares(B * (start > 0), D, names=free.names, weights=weights)
+    solution, unknown = inner.solution * (start > 0), np.where(np.isnan(free.values), np.nan, 0.0)
+    covariance = inner.covariance
+    return dataclasses.replace(
+        free,
+        values=unknown + solution,
+        solution=solution,
+        residuals=inner.residuals,
+        covariance=None if covariance is None else covariance + np.add.outer(unknown, unknown),
+        solution_covariance=inner.solution_covariance,
+        dof=inner.dof,
+    )
+
+
+def solve_many(B: FloatArray, D: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Masses (t, n) and condition numbers (t,) of many regressions; NaN masses where they are not determined.
+
+    Columns are scaled to length 1 first. The condition number is NaN where a shape cannot be scaled, inf
+    where the rank is deficient.
+    """
+    masses, condition = np.full((len(B), B.shape[2]), np.nan), np.full(len(B), np.nan)
+    usable = np.flatnonzero(np.isfinite(B).all(axis=(1, 2)))
+    B, D = B[usable], D[usable]
+    scale = np.linalg.norm(B, axis=1)
+    scale[scale == 0] = 1.0
+    left, s, right = np.linalg.svd(B / scale[:, None, :], full_matrices=False)
+    determined = s[:, -1] > RCOND * s[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        condition[usable] = np.where(determined, s[:, 0] / s[:, -1], np.inf)
+        solved = np.einsum("tin,ti,tn,tnj->tj", left, D, 1 / s, right, optimize=True) / scale
+    masses[usable[determined]] = solved[determined]
+    return masses, condition
 
 
 def natural_frequencies(
     compliance: ArrayLike, masses: ArrayLike, *, seal_stiffness: ArrayLike = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Natural frequencies and shapes of a model in compliance form.
+    """Natural frequencies and shapes of a model in compliance form, or of many at once.
 
     Parameters
     ----------
     compliance, seal_stiffness
-        As in `equivalent_masses`.
+        As in `design`.
     masses
-        kg, shape (n,). Masses that are zero or negative are taken as they are.
+        kg, shape (…, n). Masses that are zero or negative are taken as they are.
 
     Returns
     -------
-    Frequencies, rad/s, ascending, shape (n,), NaN where a mode does not vibrate (only with masses that are
-    not positive); shapes (n, n), a column per mode, scaled to the largest entry = 1.
+    Frequencies, rad/s, ascending, shape (…, n), NaN where a mode does not vibrate (only with masses that are
+    not positive); shapes (…, n, n), a column per mode, scaled to the largest entry = 1.
     """
-    alpha = np.asarray(compliance, dtype=float)
-    m = np.asarray(masses, dtype=float)
-    n = len(alpha)
-    springs = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,))
-    flexibility = np.linalg.solve(np.eye(n) + alpha * springs, alpha)
-    flexibility = (flexibility + flexibility.T) / 2
-    if (m > 0).all():
-        root = np.sqrt(m)
-        lam, vectors = np.linalg.eigh(root[:, None] * flexibility * root)
-        shapes = vectors / root[:, None]
-    else:
-        complex_lam, complex_shapes = np.linalg.eig(flexibility * m)
-        real = np.abs(complex_lam.imag) <= 1e-9 * np.abs(complex_lam)
-        lam, shapes = np.where(real, complex_lam.real, np.nan), complex_shapes.real
+    alpha, m = np.asarray(compliance, dtype=float), np.asarray(masses, dtype=float)
+    n = m.shape[-1]
+    springs = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), m.shape)[..., None, :]
+    flexible = np.linalg.solve(np.eye(n) + alpha * springs, alpha)
+    flexible = (flexible + np.swapaxes(flexible, -1, -2)) / 2
+    lam, shapes, positive = np.empty_like(m), np.empty_like(flexible), (m > 0).all(axis=-1)
+    root = np.sqrt(m[positive])[..., None]
+    lam[positive], vectors = np.linalg.eigh(root * flexible[positive] * np.swapaxes(root, -1, -2))
+    shapes[positive] = vectors / root
+    if not positive.all():
+        values, vectors = np.linalg.eig(flexible[~positive] * m[~positive][..., None, :])
+        real = np.abs(values.imag) <= 1e-9 * np.abs(values)
+        lam[~positive], shapes[~positive] = np.where(real, values.real, np.nan), vectors.real
+    largest = np.nan_to_num(np.abs(lam)).max(axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        omega = np.where(lam > 1e-15 * np.nanmax(np.abs(lam)), 1.0 / np.sqrt(lam), np.nan)
-    order = np.argsort(omega)  # NaN last
-    omega, shapes = omega[order], shapes[:, order]
-    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], axis=0)
-    return omega, shapes / largest
+        omega = np.where(lam > 1e-15 * largest, 1.0 / np.sqrt(lam), np.nan)
+    order = np.argsort(omega, axis=-1)  # NaN last
+    shapes = np.take_along_axis(shapes, order[..., None, :], axis=-1)
+    top = np.abs(shapes).argmax(axis=-2, keepdims=True)
+    return np.take_along_axis(omega, order, axis=-1), shapes / np.take_along_axis(shapes, top, axis=-2)
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -292,11 +280,11 @@ def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Parameters
     ----------
     a, b
-        Shapes at the same points, (n, j) and (n, k).
+        Shapes at the same points, (…, n, j) and (…, n, k).
 
     Returns
     -------
-    (j, k), 1 where two shapes are proportional, 0 where they are orthogonal.
+    (…, j, k), 1 where two shapes are proportional, 0 where they are orthogonal.
 
     Examples
     --------
@@ -304,7 +292,8 @@ def mac(a: ArrayLike, b: ArrayLike) -> FloatArray:
     array([[1., 0.]])
     """
     A, B = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    return np.asarray((A.T @ B) ** 2 / np.outer((A**2).sum(axis=0), (B**2).sum(axis=0)))
+    sizes = (A**2).sum(axis=-2)[..., :, None] * (B**2).sum(axis=-2)[..., None, :]
+    return np.asarray((np.swapaxes(A, -1, -2) @ B) ** 2 / sizes)
 
 
 def like(shapes: FloatArray, reference: FloatArray) -> FloatArray:
@@ -330,41 +319,27 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
         raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
     lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
     omega = lowest if speed is None else float(speed)
-    supports = []
-    for support in rotor.supports:
-        stand = support.pedestal
-        supports.append(
-            fem.Support(
-                support.node,
-                float(support.at(omega)[0][0, 0]),
-                name=support.name,
-                pedestal=None if stand is None else fem.Pedestal(0.0, stand.xy("stiffness")[0]),
-                kind=support.kind,
-                tilting_stiffness=support.tilting_stiffness,
-            )
+    supports = [
+        dataclasses.replace(
+            support,
+            stiffness=float(support.at(omega)[0][0, 0]),
+            damping=0.0,
+            speeds=(),
+            pedestal=support.pedestal and fem.Pedestal(0.0, support.pedestal.xy("stiffness")[0]),
         )
+        for support in rotor.supports
+    ]
     model = dataclasses.replace(rotor.model, gyroscopic=False)
     plane = dataclasses.replace(rotor, supports=supports, model=model)
-    stiffnesses = [support.at(support.speeds or 0.0)[0] for support in rotor.supports]
-    coupled = any(K[..., 0, 1].any() or K[..., 1, 0].any() for K in stiffnesses)
     remarks = []
-    if rotor.model.gyroscopic or coupled or not rotor.symmetric:
+    pedestals = any(s.pedestal and s.pedestal.mass for s in rotor.supports)
+    if rotor.model.gyroscopic or not rotor.symmetric or any(s.coupled for s in rotor.supports) or pedestals:
         remarks.append(
-            "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
-            "of the rotor at rest, without gyroscopic effect and cross-coupling"
+            "formula (50) knows neither rotation nor coupling of the planes nor masses of pedestals: the "
+            "model holds for the plane x of the rotor at rest; all that comes back in the small model"
         )
-    if any(support.pedestal is not None and support.pedestal.mass > 0 for support in rotor.supports):
-        remarks.append(
-            "the masses of the pedestals are left out here, of the rotor and of the model: they come back in "
-            "the small model (response, stability, model file)"
-        )
-    if not rotor.symmetric:
-        remarks.append("the supports are not the same in x and y: only x is fitted and compared here")
     if not rotor.constant:
-        which = "the lowest of" if speed is None else "chosen in"
-        remarks.append(
-            f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables"
-        )
+        remarks.append(f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s (--speed)")
     return plane, remarks
 
 
@@ -394,62 +369,35 @@ class Separated:
         return np.stack((self.span - self.positions, self.positions), axis=1) / self.span
 
     def compliance(self, stiffness: ArrayLike) -> FloatArray:
-        """α, m/N, shape (n, n), with supports of this stiffness, N/m, one or (2,); formula (47).
-
-        Raises
-        ------
-        ValueError
-            For a stiffness that is not positive and finite.
-        """
-        c = np.asarray(stiffness, dtype=float)
-        if c.shape not in ((), (2,)) or not (np.isfinite(c).all() and (c > 0).all()):
-            raise ValueError(f"the stiffness of both supports must be positive and finite, in N/m; got {c}")
-        R = self.fractions
-        return np.asarray(self.delta + (R / np.broadcast_to(c, (2,))) @ R.T)
+        """α, m/N, shape (n, n), with supports of this stiffness, N/m, one or (2,)."""
+        return np.asarray(self.delta + (self.fractions / np.asarray(stiffness)) @ self.fractions.T)
 
 
 def separate(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Separated:
     """Separate the shaft's flexibility from that of its two supports, [S] (41)–(47).
 
-    Parameters
-    ----------
-    rotor
-        On supports at exactly two nodes, without tilting stiffness; how stiff they are does not matter.
-    nodes
-        Of the n masses: different numbers from 1, or names of stations; they may overhang.
-
-    Raises
-    ------
-    ValueError
-        For more or fewer than two supported nodes, seals among them or tilting stiffness (equilibrium alone
-        then does not give the shares of a force), nodes that do not exist or repeat.
+    `nodes` are those of the n masses, numbers from 1 or names of stations; they may overhang. ValueError for
+    a rotor whose supports equilibrium alone cannot share a force among, and for nodes that cannot be.
     """
     places = mass_nodes(rotor, nodes)
     ends = sorted({support.node for support in rotor.supports})
-    seals = any(support.kind == "seal" for support in rotor.supports)
-    if len(ends) != 2 or seals or any(support.tilting_stiffness > 0 for support in rotor.supports):
+    if len(ends) != 2 or any(s.kind == "seal" or s.tilting_stiffness > 0 for s in rotor.supports):
         raise ValueError(
-            "formula (47) needs bearings at exactly two nodes, without tilting stiffness and seals: "
-            "equilibrium alone must share a force among them; this rotor has supports at "
-            f"{', '.join(map(str, ends)) or 'no node'}: use the small model, which keeps every support"
+            "formula (47) needs bearings at exactly two nodes, without tilting stiffness and seals; this "
+            f"rotor has supports at {', '.join(map(str, ends)) or 'no node'}: use the small model"
         )
-    at = rotor.positions[np.array([*ends, *places]) - 1]
-    span, positions = float(at[1] - at[0]), at[2:] - at[0]
+    left, right, *at = rotor.positions[np.array([*ends, *places]) - 1]
+    n = len(places)
     # on supports about as stiff as the shaft neither δ nor R diag(1/c) Rᵀ is lost in their sum
-    c = 48 * float((rotor.youngs_modulus * rotor.second_moment).max()) / float(np.sum(rotor.length)) ** 3
+    c = bending_stiffness(rotor)
     even = dataclasses.replace(rotor, supports=[fem.Support(node, c) for node in ends])
-    apart = Separated(places, positions, (ends[0], ends[1]), span, np.zeros((len(places),) * 2))
+    apart = Separated(places, np.array(at) - left, (ends[0], ends[1]), right - left, np.zeros((n, n)))
     delta = fem.compliance(even, places) - apart.compliance(c)
-    held = np.isin(places, ends)
-    delta[held, :] = delta[:, held] = 0.0
-    return dataclasses.replace(apart, delta=(delta + delta.T) / 2)
+    off = ~np.isin(places, ends)  # the shaft does not bend where it is held
+    return dataclasses.replace(apart, delta=(delta + delta.T) / 2 * np.outer(off, off))
 
 
-def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
-    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
-    free = np.ones(band.shape[1])
-    free[unknowns] = 0.0
-    above = range(len(band) - 1, -1, -1)
-    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
-    K[-1, unknowns] = 1.0
-    return K
+def bending_stiffness(rotor: fem.Rotor) -> float:
+    """48 E I / l³ of its stiffest section over its whole length, N/m."""
+    bending = float((rotor.youngs_modulus * rotor.second_moment).max())
+    return 48 * bending / float(np.sum(rotor.length)) ** 3

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import chain, combinations, islice
 from math import comb
 from typing import TYPE_CHECKING, Any
@@ -20,8 +19,15 @@ from rotorid.base.checks import whole
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.text import counted
-from rotorid.reduction.masses import Normalisation, RowWeights, design, plane_at_rest
-from rotorid.regression import RCOND
+from rotorid.reduction.masses import (
+    Normalisation,
+    RowWeights,
+    design,
+    mac,
+    natural_frequencies,
+    plane_at_rest,
+    solve_many,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +44,14 @@ BADLY = 30.0
 """Condition number above which a fit is called badly conditioned: 1 % in, up to 30 % out."""
 SMALL_ERROR, SMALL_LOSS = 1e-3, 1e-2
 """Frequency errors, and values of 1 − MAC, below which choices are equally good for a compromise."""
+NAMED = {
+    "best_by_frequency": "best by frequency",
+    "best_by_mac": "best by MAC",
+    "compromise": "compromise",
+    "book_rule": "the book's antinodes",
+}
+"""Choices with a name: keys and words."""
+COUNTS = ("considered", "ranked", "unphysical", "undetermined", "at_node")
 _TOP = 10
 """Choices of the table, and those whose condition is looked at for a warning."""
 
@@ -89,7 +103,7 @@ class Placement(Answered):
     frequencies: FloatArray
     error: FloatArray
     mac: FloatArray
-    worst_mode: NDArray[np.int32]
+    worst_mode: IndexArray
     condition: FloatArray
     ranked: int
     unphysical: int
@@ -114,15 +128,6 @@ class Placement(Answered):
         """Number of choices T."""
         return len(self.nodes)
 
-    @cached_property
-    def pareto(self) -> IndexArray:
-        """Rows that no other beats in both error and MAC: the trade-off, by ascending error."""
-        mac = self.mac[: self.ranked]
-        if not self.ranked:
-            return np.empty(0, dtype=np.intp)
-        before = np.concatenate(([-np.inf], np.maximum.accumulate(mac)[:-1]))
-        return np.flatnonzero(mac > before)
-
     @property
     def best_by_frequency(self) -> int | None:
         """Row of the smallest frequency error; None where no choice is ranked."""
@@ -131,22 +136,26 @@ class Placement(Answered):
     @property
     def best_by_mac(self) -> int | None:
         """Row of the largest smallest MAC (of equals the one of smaller error); None: no choice is ranked."""
-        return int(self.pareto[-1]) if self.ranked else None
+        return int(np.argmax(self.mac[: self.ranked])) if self.ranked else None
 
     @property
     def compromise(self) -> int | None:
-        """Row of the trade-off that loses least, as a factor, against both bests; None: no choice is ranked.
+        """Row that loses least, as a factor, against both bests; None: no choice is ranked.
 
-        The row that minimises max(error / smallest error, (1 − MAC) / smallest (1 − MAC)), after errors
-        are raised to 0.1 % and 1 − MAC to 0.01 at least, below which they are equally good: the knee of the
-        trade-off on logarithmic axes.
+        It minimises max(error / smallest error, (1 − MAC) / smallest (1 − MAC)), after errors are raised to
+        0.1 % and 1 − MAC to 0.01 at least, below which they are equally good. No choice beats it in both.
         """
         if not self.ranked:
             return None
-        front = self.pareto
-        error = np.maximum(self.error[front], SMALL_ERROR)
-        loss = np.maximum(1.0 - self.mac[front], SMALL_LOSS)
-        return int(front[np.argmin(np.maximum(error / error.min(), loss / loss.min()))])
+        error = np.maximum(self.error[: self.ranked], SMALL_ERROR)
+        loss = np.maximum(1.0 - self.mac[: self.ranked], SMALL_LOSS)
+        return int(np.argmin(np.maximum(error / error.min(), loss / loss.min())))
+
+    @property
+    def named(self) -> dict[str, int | None]:
+        """Rows of the choices with a name, by the keys of `NAMED`."""
+        rows = (self.best_by_frequency, self.best_by_mac, self.compromise, self.book)
+        return dict(zip(NAMED, rows, strict=True))
 
     def traps(self) -> IndexArray:
         """Rows with all checked frequencies within 2 % but a shape unlike the rotor's (MAC below 0.9)."""
@@ -155,12 +164,10 @@ class Placement(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per choice, in rank order: nodes, masses, frequencies, error, MAC, condition number."""
-        rank = [*range(1, self.ranked + 1)] + [None] * (self.considered - self.ranked)
-        on_front = np.zeros(self.considered, dtype=bool)
-        on_front[self.pareto] = True
+        rows = np.arange(self.considered)
         table = frame(
             (
-                Column("rank", rank),
+                Column("rank", np.where(rows < self.ranked, rows + 1.0, np.nan)),
                 *numbered("node_{}", self.nodes),
                 *numbered("mass_{}_kg", self.masses),
                 *numbered("frequency_{}_rad_s", self.frequencies),
@@ -168,40 +175,24 @@ class Placement(Answered):
                 Column("smallest_mac", self.mac),
                 Column("worst_mode", self.worst_mode),
                 Column("condition_number", self.condition),
-                Column("trade_off", on_front),
             )
         )
         return table.astype({"rank": "Int64"})
 
     def to_dict(self, top: int = 20) -> dict[str, Any]:
         """As JSON types: counts, the `top` ranked choices, the trade-off, the choices with a name."""
+        same = ("modes", "check", "normalise", "rows", "candidates", "warnings")
         return plain(
-            {
-                "considered": self.considered,
-                "ranked": self.ranked,
-                "unphysical": self.unphysical,
-                "undetermined": self.undetermined,
-                "at_node": self.at_node,
-                "modes": self.modes,
-                "check": self.check,
-                "normalise": self.normalise,
-                "rows": self.rows,
-                "candidates": self.candidates,
+            {name: getattr(self, name) for name in (*COUNTS, *same)}
+            | {
                 "rotor_frequencies_rad_s": self.rotor_frequencies,
                 "choices": [self._choice(i) for i in range(min(top, self.ranked))],
-                "trade_off": [self._choice(i) for i in self.pareto],
-                "best_by_frequency": self._choice(self.best_by_frequency),
-                "best_by_mac": self._choice(self.best_by_mac),
-                "compromise": self._choice(self.compromise),
-                "book_rule": self._choice(self.book),
                 "frequency_match_with_wrong_shapes": len(self.traps()),
-                "warnings": self.warnings,
             }
+            | {key: None if row is None else self._choice(row) for key, row in self.named.items()}
         )
 
-    def _choice(self, i: int | np.intp | None) -> dict[str, Any] | None:
-        if i is None:
-            return None
+    def _choice(self, i: int) -> dict[str, Any]:
         return {
             "rank": i + 1 if i < self.ranked else None,
             "nodes": self.nodes[i],
@@ -217,32 +208,23 @@ class Placement(Answered):
     def answer(self) -> Answer:
         """The compromise beside the best by frequency, by MAC and the book's rule; behind it the best ten."""
         asked = f"Of {self.considered} choices of {self.check} of {len(self.candidates)} nodes"
-        if not self.ranked:
-            said = f"{asked} no choice gives a physical model; use other candidates or more modes."
-            return Answer(said, warnings=self.warnings)
-        i = self.compromise
-        assert i is not None
-        places = ", ".join(map(str, self.nodes[i]))
-        named = {
-            "best by frequency": self.best_by_frequency,
-            "best by MAC": self.best_by_mac,
-            "compromise": i,
-            "the book's antinodes": self.book,
-        }
+        if (i := self.compromise) is None:
+            words = " no choice gives a physical model; use other candidates or more modes."
+            return Answer(asked + words, warnings=self.warnings)
         counts = (
             f"Masses from {counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}: ranked "
             f"{self.ranked}; with masses that are not positive {self.unphysical}; not determined "
             f"{self.undetermined}; a mode has a node at the first mass {self.at_node}."
         )
-        best = self._choices({str(k + 1): k for k in range(min(_TOP, self.ranked))})
+        best = min(_TOP, self.ranked)
         return Answer(
-            f"{asked} the compromise is {places}: frequencies within {100 * self.error[i]:.2g} %, "
-            f"MAC {self.mac[i]:.3g}.",
-            self._choices({words: int(row) for words, row in named.items() if row is not None}),
+            f"{asked} the compromise is {', '.join(map(str, self.nodes[i]))}: frequencies within "
+            f"{100 * self.error[i]:.2g} %, MAC {self.mac[i]:.3g}.",
+            self._choices({NAMED[key]: row for key, row in self.named.items() if row is not None}),
             self.warnings,
-            (self._trap(), *((f"the book's rule: {self.book_note}",) if self.book is None else ())),
-            (f"{counts}\n{best}",),
-            f"the best {min(_TOP, self.ranked)} choices",
+            (self._trap(), *([f"the book's rule: {self.book_note}"] if self.book_note else [])),
+            (f"{counts}\n{self._choices({str(k + 1): k for k in range(best)})}",),
+            f"the best {best} choices",
         )
 
     def _choices(self, named: Mapping[str, int]) -> str:
@@ -321,46 +303,53 @@ def rank_nodes(
     Batches: column-scaled SVD of B (n k rows) for masses and condition, then `eigh` of √m α √m, whose
     eigenvalues are 1/ω² and whose vectors are √m times the shapes.
     """
-    plane, said = plane_at_rest(rotor, speed)
-    places = _candidates(rotor, candidates)
+    plane, remarks = plane_at_rest(rotor, speed)
+    given = range(1, rotor.n_nodes + 1) if candidates is None else candidates
+    places = tuple(sorted({rotor.node(item) for item in given}))
+    if not places or len(places) < len(given):
+        raise ValueError(f"candidates must be different nodes, at least one; got {list(given)}")
     n = _number(n, len(places), "the number of masses", f"{len(places)} candidates hold")
     modes = _number(modes, n, "the number of modes", f"{n} masses can use")
-    total = comb(len(places), n)
-    if total > MOST:
+    if (total := comb(len(places), n)) > MOST:
         raise ValueError(
             f"{n} of {len(places)} nodes can be chosen in {total} ways, more than {MOST}: give fewer nodes "
             "as candidates, such as every second one, or antinodes of the first modes and those beside them"
         )
     full = fem.critical_speeds(plane, n)
     alpha = fem.compliance(plane, places)
-    shapes = full.shapes[np.array(places) - 1]
-    omega = full.frequencies
-    parts = []
-    for tuples in _chunks(len(places), n, max(1, CHUNK // (n * n * (modes + 3)))):
-        A = alpha[tuples[:, :, None], tuples[:, None, :]]
-        U = shapes[tuples]
-        masses, condition = _masses(A, omega[:modes], U[..., :modes], normalise, rows)
-        parts.append((tuples, masses, condition, *_compared(A, masses, omega, U)))
-    tuples, masses, condition, frequencies, error, mac, worst = (
-        np.concatenate(p) for p in zip(*parts, strict=True)
+    shapes, omega = full.shapes[np.array(places) - 1], full.frequencies
+    how: dict[str, Any] = {"normalise": normalise, "rows": rows}
+    every, parts = combinations(range(len(places)), n), []
+    size = max(1, CHUNK // (n * n * (modes + 3)))
+    while (flat := np.fromiter(chain.from_iterable(islice(every, size)), dtype=np.intp)).size:
+        chosen = flat.reshape(-1, n)
+        A, U = alpha[chosen[:, :, None], chosen[:, None, :]], shapes[chosen]
+        masses, condition = solve_many(*design(A, omega[:modes], U[..., :modes], **how))
+        parts.append((chosen, masses, condition, *_compared(A, masses, omega, U)))
+    chosen, masses, condition, frequencies, error, agreement, worst = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
     )
     # best error first, of equal errors the larger MAC, then the lighter; then masses not positive,
     # then nothing determined
-    known = np.isfinite(masses).all(axis=1)
-    good = np.isfinite(error)
-    group = np.where(good, 0, np.where(known, 1, 2))
-    weight = np.where(good, masses.sum(axis=1), 0.0)
-    keys = (weight, -np.where(good, mac, 0.0), np.where(good, error, 0.0))
+    good, known = np.isfinite(error), np.isfinite(condition)
+    keys = np.where(good, (masses.sum(axis=1), -agreement, error), 0.0)
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
-    order = np.lexsort((*np.round(keys, 10), group))
-    nodes = np.array(places, dtype=np.int32)[tuples[order]]
-    book, note = _book(nodes, rotor, n, speed)
+    order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(known, 1, 2))))
+    nodes = np.array(places, dtype=np.int32)[chosen[order]]
+    book, note = None, ""
+    try:
+        antinodes = book_nodes(rotor, n, speed=speed)
+        book = next(iter(np.flatnonzero((nodes == antinodes).all(axis=1)).tolist()), None)
+        if book is None:
+            note = f"its nodes {', '.join(map(str, antinodes))} are not all among the candidates"
+    except ValueError as problem:
+        note = str(problem)
     result = Placement(
         nodes=nodes,
         masses=masses[order],
         frequencies=frequencies[order],
         error=error[order],
-        mac=mac[order],
+        mac=agreement[order],
         worst_mode=worst[order],
         condition=condition[order],
         ranked=int(good.sum()),
@@ -368,13 +357,12 @@ def rank_nodes(
         undetermined=int(np.isinf(condition).sum()),
         at_node=int(np.isnan(condition).sum()),
         modes=modes,
-        normalise=normalise,
-        rows=rows,
+        **how,
         rotor_frequencies=omega,
         candidates=places,
         book=book,
         book_note=note,
-        warnings=(*said, *full.warnings),
+        warnings=(*remarks, *full.warnings),
     )
     return dataclasses.replace(result, warnings=(*result.warnings, *_warnings(result)))
 
@@ -411,46 +399,25 @@ def book_nodes(rotor: fem.Rotor, n: int = 3, *, speed: float | None = None) -> t
     upper = n if n % 2 == 0 else (n + 1) // 2
     needed = [upper] if n % 2 == 0 or n == 1 else [upper, upper - 1]
     full = fem.critical_speeds(plane, upper)
-    held = [support.node for support in plane.supports]
-    first, last = min(held, default=1), max(held, default=1)
-    chosen: list[int] = []
+    supported = [support.node for support in plane.supports]
+    chosen: set[int] = set()
     for mode in needed:
         U = full.shapes[:, mode - 1]
-        peaks = [i + 1 for i in range(first, last - 1) if U[i] * U[i - 1] < U[i] ** 2 >= U[i] * U[i + 1]]
+        between = range(min(supported), max(supported) - 1)
+        peaks = [i + 1 for i in between if U[i] * U[i - 1] < U[i] ** 2 >= U[i] * U[i + 1]]
         if len(peaks) < mode:
             raise ValueError(
                 f"mode {mode} has {counted(len(peaks), 'antinode')} between the outermost supports, the "
                 f"book's rule for {n} masses needs {mode}: use a finer mesh, fewer masses, or choose nodes "
                 "by rank_nodes"
             )
-        chosen += sorted(peaks, key=lambda node: -abs(U[node - 1]))[:mode]
-    if len(set(chosen)) < n:
+        chosen.update(sorted(peaks, key=lambda node: -abs(U[node - 1]))[:mode])
+    if len(chosen) < n:
         raise ValueError(
             f"two antinodes of modes {needed[1]} and {needed[0]} share a node: use a finer mesh, or "
             "choose nodes by rank_nodes"
         )
     return tuple(sorted(chosen))
-
-
-def _book(nodes: NDArray[np.int32], rotor: fem.Rotor, n: int, speed: float | None) -> tuple[int | None, str]:
-    """Row of the book's rule among the choices, or why there is none."""
-    try:
-        wanted = book_nodes(rotor, n, speed=speed)
-    except ValueError as problem:
-        return None, str(problem)
-    found = np.flatnonzero((nodes == wanted).all(axis=1))
-    if not found.size:
-        return None, f"its nodes {', '.join(map(str, wanted))} are not all among the candidates"
-    return int(found[0]), ""
-
-
-def _candidates(rotor: fem.Rotor, candidates: Sequence[int | str] | None) -> tuple[int, ...]:
-    if candidates is None:
-        return tuple(range(1, rotor.n_nodes + 1))
-    places = [rotor.node(item) for item in candidates]
-    if not places or len(set(places)) < len(places):
-        raise ValueError(f"candidates must be different nodes, at least one; got {list(candidates)}")
-    return tuple(sorted(places))
 
 
 def _number(value: int, most: int, name: str, words: str) -> int:
@@ -460,84 +427,31 @@ def _number(value: int, most: int, name: str, words: str) -> int:
     return number
 
 
-def _chunks(count: int, n: int, size: int) -> Iterator[IndexArray]:
-    """All n of `count` places, from 0, ascending, shape (≤ size, n) at a time."""
-    every = combinations(range(count), n)
-    while True:
-        flat = np.fromiter(chain.from_iterable(islice(every, size)), dtype=np.intp)
-        if not flat.size:
-            return
-        yield flat.reshape(-1, n)
-
-
-def _masses(
-    A: FloatArray, omega: FloatArray, U: FloatArray, normalise: Normalisation, rows: RowWeights
-) -> tuple[FloatArray, FloatArray]:
-    """Masses (t, n) and condition numbers (t,) of (50); NaN masses where they are not determined.
-
-    The condition number is NaN where a shape cannot be scaled, inf where the rank is deficient.
-    """
-    B, D = design(A, omega, U, normalise=normalise, rows=rows)
-    t, n = B.shape[0], B.shape[-1]
-    masses, condition = np.full((t, n), np.nan), np.full(t, np.nan)
-    usable = np.flatnonzero(np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1))
-    B, D = B[usable], D[usable]
-    scale = np.linalg.norm(B, axis=1)
-    scale[scale == 0] = 1.0
-    left, s, right = np.linalg.svd(B / scale[:, None, :], full_matrices=False)
-    determined = s[:, -1] > RCOND * s[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        condition[usable] = np.where(determined, s[:, 0] / s[:, -1], np.inf)
-    left, s, right = left[determined], s[determined], right[determined]
-    projected = (D[determined][:, None, :] @ left)[:, 0] / s
-    masses[usable[determined]] = (projected[:, None, :] @ right)[:, 0] / scale[determined]
-    return masses, condition
-
-
 def _compared(
     A: FloatArray, masses: FloatArray, omega: FloatArray, U: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int32]]:
+) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray]:
     """Frequencies (t, n), largest error, smallest MAC and its mode (t,) of the n-mass models.
 
     NaN, and mode 0, where the masses are not all positive or the model does not vibrate in n modes.
     """
-    t = len(masses)
-    frequencies, error, mac = np.full_like(masses, np.nan), np.full(t, np.nan), np.full(t, np.nan)
-    worst = np.zeros(t, dtype=np.int32)
-    positive = np.flatnonzero((masses > 0).all(axis=1))  # False for NaN
-    root = np.sqrt(masses[positive])
-    lam, V = np.linalg.eigh(root[:, :, None] * A[positive] * root[:, None, :])
-    vibrates = lam[:, 0] > 1e-15 * lam[:, -1]
-    positive, root, lam, V = positive[vibrates], root[vibrates], lam[vibrates, ::-1], V[vibrates, :, ::-1]
-    frequencies[positive] = 1.0 / np.sqrt(lam)
-    error[positive] = np.abs(frequencies[positive] / omega - 1.0).max(axis=1)
-    model, reference = V / root[:, :, None], U[positive]
-    size = (model**2).sum(axis=1) * (reference**2).sum(axis=1)
-    product = (model * reference).sum(axis=1) ** 2
+    frequencies, each = np.full_like(masses, np.nan), np.full_like(masses, np.nan)
+    positive = np.flatnonzero((masses > 0).all(axis=1))  # none with NaN
+    frequencies[positive], model = natural_frequencies(A[positive], masses[positive])
+    with np.errstate(invalid="ignore"):
+        each[positive] = np.diagonal(mac(model, U[positive]), axis1=1, axis2=2)
+    vibrates = np.asarray(np.isfinite(frequencies).all(axis=1, keepdims=True))
     # a rotor's mode that does not move these nodes is not in the model: MAC 0
-    each = np.divide(product, size, out=np.zeros_like(size), where=size > 0)
-    mac[positive] = each.min(axis=1)
-    worst[positive] = each.argmin(axis=1) + 1
-    return frequencies, error, mac, worst
+    frequencies, each = np.where(vibrates, (frequencies, np.nan_to_num(each)), np.nan)
+    worst = np.where(vibrates.ravel(), each.argmin(axis=1) + 1, 0)
+    return frequencies, np.abs(frequencies / omega - 1.0).max(axis=1), each.min(axis=1), worst
 
 
 def _warnings(result: Placement) -> list[str]:
-    out = []
-    lost = result.undetermined + result.at_node
-    if lost:
-        out.append(
-            f"{lost} of {result.considered} choices give no masses and are not ranked: {result.undetermined} "
-            f"are not determined by {counted(result.modes, 'mode')}, in {result.at_node} a mode has a node "
-            'at the first mass (normalise="largest" can use these)'
-        )
-    if not result.ranked:
-        return [*out, "no choice gives a physical model: use other candidates, more modes or fewer masses"]
     top = result.condition[: min(_TOP, result.ranked)]
-    bad = int((top > BADLY).sum())
-    if bad:
-        out.append(
-            f"{bad} of the best {len(top)} by frequency are badly conditioned (condition number up to "
-            f"{top.max():.3g}): errors of 1 % in compliances and shapes can move their masses by up to that "
-            "many percent; use more modes or prefer a choice with a smaller number"
-        )
-    return out
+    if not (bad := int((top > BADLY).sum())):
+        return []
+    return [
+        f"{bad} of the best {len(top)} by frequency are badly conditioned (condition number up to "
+        f"{top.max():.3g}): errors of 1 % in compliances and shapes can move their masses by up to that many "
+        "percent; use more modes or prefer a choice with a smaller number"
+    ]

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
     BLUE,
     COLORS,
+    DARK,
     MARKERS,
+    QUIET,
     TEXT,
     VERMILION,
     WIDTH,
@@ -20,7 +21,6 @@ from rotorid.base.plot_style import (
     look,
     new_axes,
     new_pair,
-    note,
     plain,
     plain_numbers,
     rad_s_above,
@@ -28,6 +28,7 @@ from rotorid.base.plot_style import (
 from rotorid.base.rpm import RPM
 from rotorid.base.text import counted
 from rotorid.reduction.masses import like
+from rotorid.reduction.placement import NAMED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,6 @@ SMALLEST_ERROR, SAME_SHAPE = 1e-4, 1e-6
 """Frequency errors, %, and values of 1 − MAC, below which these are drawn as these."""
 HATCHES = ("", "////", "....", "xxxx")
 """Bars that differ without colour."""
-DARK, LINE = "#2f3640", "#6b7480"
 FULL: dict[str, Any] = {"color": BLUE, "linewidth": 2.4}
 SMALL: dict[str, Any] = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, (4, 2))}
 """The full rotor and its small model where both are curves."""
@@ -53,97 +53,82 @@ SMALL: dict[str, Any] = {"color": VERMILION, "linewidth": 1.7, "linestyle": (0, 
 def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     """Draw the shapes of the n-mass model (points) over the rotor's (lines) and the rotor itself.
 
-    Without a rotor the measured shapes (hollow) stand beside those of the model, place by place. Of many
-    modes the first six are drawn.
+    Without a rotor the lines join the measured places. Of many modes the first six are drawn.
     """
     from fem import draw_rotor
     from fem.plots import smooth_shapes
 
-    axes = new_axes((WIDTH, 5.0)) if ax is None else ax
+    axes = ax or new_axes((WIDTH, 5.0))
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.nodes)
-    shapes, measured, x = reduction.shapes, reduction.rotor_shapes, np.arange(n, dtype=float)
-    labels = [f"{mass:.3g} kg".replace("-", "−") for mass in reduction.masses.solution]
-    shown = min(n, MOST_MODES, measured.shape[1])
-    scale = np.abs(measured).max(axis=0)
+    shapes, curves, x = reduction.shapes, reduction.rotor_shapes, np.arange(n, dtype=float)
+    labels, along = [f"{mass:.3g} kg".replace("-", "−") for mass in reduction.masses.solution], x
+    scale = np.abs(curves).max(axis=0)
+    axes.set(xlabel="place of the mass", ylabel="mode shape, largest = 1")
     if rotor is not None and full is not None:
-        at = np.array([int(node) for node in reduction.nodes]) - 1
+        at = np.array(reduction.nodes, dtype=int) - 1
         draw_rotor(rotor, axes, height=0.22)
-        x, shapes, shown = rotor.positions[at], like(shapes, full.shapes[at]), min(n, MOST_MODES)
-        scale, (along, curves) = np.abs(full.shapes).max(axis=0), smooth_shapes(full)
-        for k in range(shown):
-            axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
-        top = axes.secondary_xaxis("top")
-        near = np.diff(np.sort(x)).min(initial=np.inf) < 0.1 * np.ptp(rotor.positions)
-        top.set_xticks(x, labels, rotation=90 if near else 0, fontsize=TEXT)
-        for place in x:
-            axes.axvline(place, color=LINE, linewidth=0.8, linestyle=":", zorder=2)
-        axes.set(xlabel="position, m", ylabel="mode shape, rotor's largest = 1")
-        axes.set_title(f"{n}-mass model (points) and rotor (lines)", pad=10)
+        x, shapes, scale = rotor.positions[at], like(shapes, full.shapes[at]), np.abs(full.shapes).max(axis=0)
+        along, curves = smooth_shapes(full)
+        axes.set_xlabel("position, m")
     else:
-        plain(axes)
-        for k in range(shown):
-            axes.plot(x, measured[:, k] / scale[k], MARKERS[k], color=COLORS[k], mfc="white", ms=14)
-        axes.set_xticks(x, [f"{node}\n{words}" for node, words in zip(reduction.nodes, labels, strict=True)])
-        axes.set(
-            xlim=(-0.4, n - 0.6),
-            xlabel="place of the mass",
-            ylabel="mode shape, largest measured = 1 (hollow: measured)",
-        )
-    lowest = 1.12
+        axes.set_xticks(x, [str(node) for node in reduction.nodes])
+    shown = min(n, MOST_MODES, curves.shape[1])
+    points = shapes[:, :shown] / scale[:shown]
+    points[:, np.isnan(reduction.frequencies[:shown])] = np.nan
     for k, (f, error) in enumerate(
         zip(reduction.frequencies[:shown], reduction.relative_error, strict=False)
     ):
-        text = f"mode {k + 1}: {f * RPM:.0f} rpm ({f:.5g} rad/s"
-        text += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}" if np.isfinite(error) else ")"
-        text = text if np.isfinite(f) else f"mode {k + 1}: does not vibrate"
-        points = shapes[:, k] / scale[k] if np.isfinite(f) else np.full(n, np.nan)
-        lowest = max(lowest, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
+        words = f"{f * RPM:.0f} rpm ({f:.5g} rad/s" if np.isfinite(f) else "does not vibrate"
+        if np.isfinite(f):
+            words += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}"
         style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
-        axes.plot(x, points, MARKERS[k], **style, label=text)
-    axes.axhline(0.0, color=LINE, linewidth=0.8, zorder=3)
-    axes.set_ylim(-lowest, lowest)
-    legend_above(axes, 1, 0.75, -0.15 if rotor is not None else 1.0)
+        axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
+        axes.plot(x, points[:, k], MARKERS[k], **style, label=f"mode {k + 1}: {words}")
+    axes.secondary_xaxis("top").set_xticks(x, labels, rotation=45, fontsize=TEXT)
+    axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
+    height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
+    axes.set_ylim(-height, height)
+    axes.set_title(f"{n}-mass model (points) and {reduction.source} (lines)", pad=10)
+    legend_above(axes, 1, 0.75, -0.15)
     return axes
 
 
-def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
-    """Draw what methods of reduction lose: frequency errors with their sign, and 1 − MAC, as bars.
+def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
+    """Draw frequency errors of methods of reduction as bars, with sign, and with the MAC of each shape.
 
-    Two axes, for the errors and for the shapes; of many modes the first six are drawn.
+    Of many modes the first six are drawn.
     """
-    above, below = new_pair(6.0, (1, 1)) if axes is None else axes
+    axes = ax or new_axes((WIDTH, 5.0))
+    plain(axes)
     n, width = min(len(methods.nodes), MOST_MODES), 0.84 / len(methods.rows)
-    for ax in (above, below):
-        plain(ax)
-        ax.grid(visible=False, axis="x")
-        ax.axhline(0.0, color=DARK, linewidth=0.8)
-        ax.margins(y=0.3)
     for i, row in enumerate(methods.rows):
         x = np.arange(n) + (i - (len(methods.rows) - 1) / 2) * width
-        errors, losses = 100 * row.relative_error[:n], np.maximum(1 - row.mac[:n], 0.0)
-        percents = [_percent(error) for error in errors]
-        macs = ["none" if np.isnan(loss) else f"{1 - loss:.4f}" for loss in losses]
-        for ax, tops, texts in ((above, errors, percents), (below, losses, macs)):
-            bars = ax.bar(x, np.nan_to_num(tops), 0.92 * width, label=row.name, color=COLORS[i])
-            for bar in bars:
-                bar.set(edgecolor="white", linewidth=0, hatch=HATCHES[i])
-            ax.bar_label(bars, texts, padding=3, rotation=90, fontsize=TEXT, color=DARK)
-    above.set_ylabel("frequency error, %")
-    below.set_ylabel("1 − MAC at the masses\n(written: MAC)")
+        errors = 100 * row.relative_error[:n]
+        style: dict[str, Any] = {
+            "color": COLORS[i],
+            "hatch": HATCHES[i],
+            "edgecolor": "white",
+            "linewidth": 0,
+        }
+        bars = axes.bar(x, np.nan_to_num(errors), 0.92 * width, label=row.name, **style)
+        texts = [
+            f"{_percent(error)}, MAC {agreement:.4f}"
+            for error, agreement in zip(errors, row.mac, strict=False)
+        ]
+        axes.bar_label(bars, texts, padding=3, rotation=90, fontsize=TEXT)
+    axes.axhline(0.0, color=DARK, linewidth=0.8)
+    axes.margins(y=0.9)
     ticks = [f"mode {k + 1}\n{f * RPM:.0f} rpm" for k, f in enumerate(methods.rotor_frequencies[:n])]
-    below.set_xticks(range(n), ticks)
+    axes.set_xticks(range(n), ticks)
+    axes.set_ylabel("frequency error, %")
     title = f"reduced to nodes {', '.join(map(str, methods.nodes))}"
-    legend_above(above, len(methods.rows), title=title, title_fontsize="medium")
-    return above, below
+    legend_above(axes, len(methods.rows), title=title, title_fontsize="medium")
+    return axes
 
 
 def _percent(error: float) -> str:
-    """An error in %, short; what has no bar is 0."""
-    if np.isnan(error):
-        return "none"
-    if abs(error) < SMALLEST_ERROR:
-        return "0"
-    return (f"{error:+.2g}" if abs(error) < 99.5 else f"{error:+.0f}").replace("-", "−")
+    """An error in %, short."""
+    return "none" if np.isnan(error) else f"{error:+.2g}".replace("-", "−")
 
 
 def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
@@ -153,7 +138,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.colors import LogNorm
 
-    axes = new_axes((WIDTH, 5.6)) if ax is None else ax
+    axes = ax or new_axes((WIDTH, 5.6))
     plain(axes)
     ranked = np.flatnonzero(np.isfinite(placement.error))[::-1]  # the best on top
     axes.set(
@@ -163,59 +148,25 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
         ylabel=f"largest frequency error\nof {counted(placement.check, 'mode')}, % (log)",
     )
     left_out = placement.considered - ranked.size
-    title = f"{placement.considered} choices of {counted(placement.nodes.shape[1], 'node')}"
+    title = f"{placement.considered} choices of {counted(placement.check, 'node')}"
     title += f", {left_out} without physical model" if left_out else ""
     if not ranked.size:
         axes.set_title(title, fontsize="medium")
         return axes
     x, y = np.maximum(1 - placement.mac, SAME_SHAPE), np.maximum(100 * placement.error, SMALLEST_ERROR)
-    condition = placement.condition[ranked]
-    low = float(condition.min())
-    points = axes.scatter(
-        x[ranked],
-        y[ranked],
-        s=16 if ranked.size > 300 else 34,
-        c=condition,
-        cmap="viridis_r",
-        norm=LogNorm(low, max(float(condition.max()), 1.05 * low)),
-        alpha=0.85,
-        linewidths=0,
-        zorder=2,
-    )
+    condition, low = placement.condition[ranked], float(placement.condition[ranked].min())
+    scale = LogNorm(low, max(float(condition.max()), 1.05 * low))
+    points = axes.scatter(x[ranked], y[ranked], 20, condition, cmap="viridis_r", norm=scale, zorder=2)
     bar = axes.figure.colorbar(points, ax=axes, label="condition number of the regression", pad=0.02)
     plain_numbers(bar.ax)
     plain_numbers(axes)
-    front = placement.pareto
-    line: dict[str, Any] = {"color": COLORS[1], "linewidth": 1.4, "zorder": 3}
-    axes.step(
-        x[front],
-        y[front],
-        "-o",
-        where="pre",
-        ms=5,
-        mfc="none",
-        **line,
-        label="trade-off: no other choice is better in both",
-    )
-    names = (
-        ("best by frequency", placement.best_by_frequency, "s", COLORS[0]),
-        ("best by MAC", placement.best_by_mac, "^", COLORS[3]),
-        ("compromise", placement.compromise, "D", COLORS[4]),
-        ("the book's rule", placement.book, "*", COLORS[5]),
-    )
-    for row in dict.fromkeys(row for _, row, *_ in names if row is not None and row in ranked):
-        same = [(name, marker, color) for name, other, marker, color in names if other == row]
+    rows = {row for row in placement.named.values() if row is not None and row in ranked}
+    for k, row in enumerate(sorted(rows), start=2):
+        names = " and ".join(NAMED[key] for key, other in placement.named.items() if other == row)
         nodes = ", ".join(map(str, placement.nodes[row]))
-        text = f"{' and '.join(name for name, *_ in same)}: {nodes}, {100 * placement.error[row]:.3g} %"
-        style: dict[str, Any] = {
-            "markeredgecolor": "black",
-            "markeredgewidth": 1.2,
-            "zorder": 6,
-            "color": same[0][2],
-        }
-        size = 17 if same[0][1] == "*" else 10
-        label = f"{text}, MAC {placement.mac[row]:.4f}"
-        axes.plot(x[row], y[row], same[0][1], **style, markersize=size, label=label)
+        text = f"{names}: {nodes}, {100 * placement.error[row]:.3g} %, MAC {placement.mac[row]:.4f}"
+        style: dict[str, Any] = {"markersize": 10, "markeredgecolor": "black", "zorder": 6}
+        axes.plot(x[row], y[row], MARKERS[k], color=COLORS[k], label=text, **style)
     legend_above(axes, 1, 0.8, title=title, title_fontsize="medium")
     return axes
 
@@ -225,7 +176,7 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
 
     Of the response the largest influence coefficient at each speed; its axes are returned.
     """
-    above, below = new_pair(5.6) if ax is None else ax
+    above, below = ax or new_pair(5.6)
     moving = running.speeds > 0
     each = (running.full, running.small, running.small - running.full)
     full, small, difference = (np.abs(values[moving]).max(axis=(1, 2)) for values in each)
@@ -237,19 +188,17 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
     # 1 m per kg·m is 1 µm per g·mm.
     above.set(ylabel="largest of all influence\ncoefficients, µm per g·mm (log)")
     below.plot(speeds, percent, color=DARK, linewidth=1.6)
+    words = f"left out, ±{100 * running.bands:.3g} % of a critical speed"
     for panel in (above, below):
         plain(panel)
-        words = f"left out, ±{100 * running.bands:.3g} % of a critical speed"
-        for k, (a, b) in enumerate(running.left_out):
-            shade: dict[str, Any] = {"color": "black", "alpha": 0.1, "linewidth": 0}
-            panel.axvspan(a * RPM, b * RPM, **shade, label=None if k else words)
+        for k, (low, high) in enumerate(running.left_out):
+            panel.axvspan(low * RPM, high * RPM, color="0.9", label=None if k else words, zorder=0)
         panel.set_xlim(speeds[0], speeds[-1])
     rad_s_above(above)
     legend_above(above, borderaxespad=ABOVE_SCALE)
     above.tick_params(labelbottom=False)
     # On a scale of what counts: where the small model is left out, the difference may leave the picture.
-    shown = percent[~running.excluded[moving]]
-    below.set_ylim(0.0, 1.25 * max(1.0, float(shown.max())))
+    below.set_ylim(0.0, 1.25 * max(1.0, float(percent[~running.excluded[moving]].max())))
     below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
     return above
 
@@ -259,34 +208,25 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
 
     Where one grows without oscillating, the curve is at the bottom.
     """
-    axes = new_axes((WIDTH, 4.2)) if ax is None else ax
+    axes = ax or new_axes((WIDTH, 4.2))
     plain(axes)
-    models = (
+    known = np.concatenate((cost.full_decrement, cost.small_decrement))
+    known = known[np.isfinite(known)]
+    far = 20 * np.median(np.abs(known)) if known.any() else 1.0  # beyond nothing matters
+    low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
+    low -= 0.1 * high  # 0 is in sight with room below
+    for name, decrement, threshold, style in (
         ("full rotor", cost.full_decrement, cost.full.threshold, FULL),
         (f"{len(cost.nodes)}-mass model", cost.small_decrement, cost.small.threshold, SMALL),
-    )
-    low, high = _limits(np.concatenate((cost.full_decrement, cost.small_decrement)))
-    for name, decrement, threshold, style in models:
-        text = f"{name}, unstable from {threshold * RPM:.0f} rpm" if threshold is not None else name
-        axes.plot(cost.speeds * RPM, np.where(np.isneginf(decrement), low, decrement), **style, label=text)
+    ):
+        words = name if threshold is None else f"{name}, unstable from {threshold * RPM:.0f} rpm"
+        axes.plot(cost.speeds * RPM, np.where(np.isneginf(decrement), low, decrement), **style, label=words)
         if threshold is not None:
-            axes.plot(
-                [threshold * RPM], [0.0], "o", color=style["color"], markeredgecolor="white", ms=9, zorder=6
-            )
-    axes.axhspan(low, 0.0, color=VERMILION, alpha=0.07, linewidth=0, zorder=0)
+            axes.plot([threshold * RPM], [0.0], "o", color=style["color"], ms=9, zorder=6)
     axes.axhline(0.0, color=DARK, linewidth=0.9)
-    note(axes, "below 0: a motion grows", (0.0, 0.0), (6, 6), xycoords="axes fraction", color=DARK)
-    axes.set(xlabel="speed, rpm", ylabel="smallest logarithmic decrement", ylim=(low, high))
+    label = "smallest logarithmic decrement\n(below 0 a motion grows)"
+    axes.set(xlabel="speed, rpm", ylabel=label, ylim=(low, high))
     axes.margins(x=0.01)
     rad_s_above(axes)
     legend_above(axes, 2, borderaxespad=ABOVE_SCALE)
     return axes
-
-
-def _limits(decrements: FloatArray) -> tuple[float, float]:
-    """Limits of the axis: 0 is in sight with room below; far above the usual size nothing is of interest."""
-    known = decrements[np.isfinite(decrements)]
-    far = 20 * float(np.median(np.abs(known))) if known.size else 1.0
-    bottom, top = np.clip([known.min(initial=0.0), known.max(initial=0.0)], -far, far).tolist()
-    span = max(top - bottom, 1e-9)
-    return bottom - 0.14 * span, top + 0.08 * span

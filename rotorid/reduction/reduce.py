@@ -1,11 +1,14 @@
-"""Reduction of a rotor to masses at chosen nodes, beside the rotor itself."""
+"""Reduction of a rotor to masses at chosen nodes, beside the rotor itself.
+
+What errors of the inputs do: compliances, frequencies, shapes and stiffnesses of seals are drawn at random by
+their stated errors, and masses and frequencies computed anew.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,18 +18,16 @@ import fem
 from fem.assembly import ignored_inertia
 from rotorid.base.answer import Answer, Answered, together
 from rotorid.base.arrays import FloatArray
+from rotorid.base.checks import whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
+from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column as Cells
-from rotorid.base.tables import Table, frame
 from rotorid.base.text import counted, error_figures, percent
-from rotorid.reduction.input_errors import InputErrors, Inputs, MassErrors, Shift
 from rotorid.reduction.masses import (
-    BoundedEstimate,
     Normalisation,
     RowWeights,
     Separated,
+    design,
     equivalent_masses,
     like,
     mac,
@@ -34,48 +35,94 @@ from rotorid.reduction.masses import (
     natural_frequencies,
     plane_at_rest,
     separate,
+    solve_many,
 )
+from rotorid.reduction.placement import ALIKE, BADLY
 from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SENSITIVE = 0.1
-"""Where input errors of 1 % move a mass by more than this share, the regression is called ill-conditioned."""
 HEAVY = 1.05
 """Masses that weigh more than this times the rotor are named."""
-ALIKE = 0.9
-"""Below this MAC two shapes are not those of one mode."""
 OFF, APART = 0.1, 0.05
 """Relative errors of a model's frequency, and of a measured one beside the rotor's, that are named."""
+DRAWS = 2000
+"""Of inputs with their errors."""
+NAMES = ("m", "omega")
 _RESIDUAL = "± is one standard deviation from the regression's residuals (model error, not measurement)"
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
-    """How a regression was done.
+class InputErrors:
+    """Relative standard deviations of the inputs of formula (50): 0.013 is 1.3 %. All are independent.
 
     Attributes
     ----------
-    source
-        Whether the modes were computed from the rotor or measured.
-    normalise, rows, nonnegative
-        As in `equivalent_masses`.
+    compliance
+        Scalar, or of α_11, α_12 … α_1n, α_22 …, shape (n (n + 1) / 2,).
+    frequencies
+        Scalar or (k,).
+    shapes
+        Scalar or (n, k). A scalar leaves the ordinates at the first mass exact where shapes are scaled there
+        (normalise="first"): they are 1 by definition.
+    seal_stiffness
+        Scalar or (n,).
+
+    Raises
+    ------
+    ValueError
+        For errors that are negative, not finite, or 1 and more.
     """
 
-    source: Literal["rotor", "measured"]
-    normalise: Normalisation
-    rows: RowWeights
-    nonnegative: bool
+    compliance: ArrayLike = 0.0
+    frequencies: ArrayLike = 0.0
+    shapes: ArrayLike = 0.0
+    seal_stiffness: ArrayLike = 0.0
 
-    def words(self, modes: int) -> str:
-        """Such as "the first 2 measured modes, rows relative"."""
-        kind = "measured " if self.source == "measured" else ""
-        parts = [f"the first {kind}mode" if modes == 1 else f"the first {modes} {kind}modes"]
-        parts += [] if self.normalise == "first" else [f"shapes scaled by {self.normalise}"]
-        parts += [] if self.rows == "equal" else [f"rows {self.rows}"]
-        parts += ["masses not negative"] if self.nonnegative else []
-        return ", ".join(parts)
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = np.array(getattr(self, field.name), dtype=float)
+            if not ((value >= 0) & (value < 1)).all():
+                raise ValueError(
+                    f"errors of {field.name} must be shares from 0 to below 1, such as 0.013 for 1.3 %; "
+                    f"got {value}"
+                )
+            object.__setattr__(self, field.name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class MassErrors(Answered):
+    """What stated errors of the inputs do: one standard deviation, half of what 68 % of the draws span.
+
+    Attributes
+    ----------
+    masses, frequencies
+        kg and rad/s, shape (n,) each; NaN where some of the drawn inputs give no such mode.
+    warnings
+        Masses that are not known even in sign.
+    """
+
+    masses: FloatArray
+    frequencies: FloatArray
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        return plain(
+            {
+                "masses_std_kg": self.masses,
+                "natural_frequencies_std_rad_s": self.frequencies,
+                "warnings": self.warnings,
+            }
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """What the errors do to masses and frequencies."""
+        masses, speeds = (", ".join(map(error_figures, row)) for row in (self.masses, self.frequencies * RPM))
+        words = f"By the stated errors the masses are ± {masses} kg, the frequencies ± {speeds} rpm."
+        return Answer(words, warnings=self.warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +131,14 @@ class Reduction(Answered):
 
     Attributes
     ----------
-    rotor
-        The rotor; None where only its compliance and measured modes are known.
     nodes
         Where the masses stand: node numbers, or labels where there is no rotor.
     modes
         How many modes of the rotor the regression used.
+    source
+        Whether these modes were computed from the rotor or measured.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`.
     masses
         Estimate of the masses, kg, with the scatter of the regression.
     compliance
@@ -100,10 +149,10 @@ class Reduction(Answered):
         Of the n-mass model: rad/s (n,), and at the masses (n, n), scaled to fit the rotor's.
     rotor_frequencies, rotor_shapes
         Of the rotor, computed for its plane at rest or measured: rad/s (j,), and at the masses (n, j).
+    rotor
+        None where only its compliance and measured modes are known.
     rotor_modes
         The computed modes at every node, to draw; None without a rotor.
-    choices
-        How the regression was done: normalisation, row weights, sign of the masses, source of the modes.
     errors
         What stated errors of the inputs do to masses and frequencies; None where none are stated.
     separated
@@ -112,9 +161,12 @@ class Reduction(Answered):
         What a user should know before trusting the model.
     """
 
-    rotor: fem.Rotor | None
     nodes: tuple[int | str, ...]
     modes: int
+    source: Literal["rotor", "measured"]
+    normalise: Normalisation
+    rows: RowWeights
+    nonnegative: bool
     masses: Estimate
     compliance: FloatArray
     seal_stiffness: FloatArray
@@ -122,11 +174,11 @@ class Reduction(Answered):
     shapes: FloatArray
     rotor_frequencies: FloatArray
     rotor_shapes: FloatArray
-    rotor_modes: fem.Modes | None
-    choices: Choices
-    errors: MassErrors | None
-    separated: Separated | None
-    warnings: tuple[str, ...]
+    rotor: fem.Rotor | None = None
+    rotor_modes: fem.Modes | None = None
+    errors: MassErrors | None = None
+    separated: Separated | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def positions(self) -> FloatArray | None:
@@ -146,17 +198,6 @@ class Reduction(Answered):
         return self._padded(np.diag(mac(self.shapes, self.rotor_shapes)))
 
     @property
-    def inputs(self) -> Inputs:
-        """Of formula (50)."""
-        used = self.rotor_frequencies[: self.modes], self.rotor_shapes[:, : self.modes]
-        return Inputs(self.compliance, *used, self.seal_stiffness, self.choices.normalise, self.choices.rows)
-
-    @cached_property
-    def sensitivity(self) -> FloatArray:
-        """Relative standard deviation of each mass per that of compliances and shapes, shape (n,)."""
-        return self.inputs.sensitivity()
-
-    @property
     def equations_of_motion(self) -> fem.Motion:
         """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
 
@@ -164,23 +205,8 @@ class Reduction(Answered):
         surroundings take out is for the user to add, or to estimate, or comes with the supports (`small`).
         """
         K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
-        n = len(self.nodes)
-        names = tuple(f"x{node}" for node in self.nodes)
-        return fem.Motion(np.diag(self.masses.solution), np.zeros((n, n)), (K + K.T) / 2, names, 0.0)
-
-    def what_if(self, changes: Mapping[str, float]) -> Shift:
-        """Changes of masses and frequencies by relative changes of inputs, such as {"alpha12": 0.013}.
-
-        Raises
-        ------
-        ValueError
-            For an input that does not exist (they are `alpha12`, `U31`, `omega1`, `c2` …), or a change
-            that is not finite.
-        """
-        inputs = self.inputs
-        row = inputs.change(changes)
-        changed, now = inputs.recomputed(np.concatenate((row, np.zeros_like(row))))
-        return Shift(*(changed - now))
+        M, names = np.diag(self.masses.solution), tuple(f"x{node}" for node in self.nodes)
+        return fem.Motion(M, np.zeros_like(M), (K + K.T) / 2, names, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
@@ -188,10 +214,12 @@ class Reduction(Answered):
             "nodes": self.nodes,
             "positions_m": self.positions,
             "modes": self.modes,
-            **vars(self.choices),
+            "source": self.source,
+            "normalise": self.normalise,
+            "rows": self.rows,
+            "nonnegative": self.nonnegative,
             "masses_kg": self.masses.solution,
             "masses_std_kg": self.masses.std,
-            "mass_sensitivity": self.sensitivity,
             "compliance_m_per_N": self.compliance,
             "seal_stiffness_N_per_m": self.seal_stiffness,
             "natural_frequencies_rad_s": self.frequencies,
@@ -220,47 +248,62 @@ class Reduction(Answered):
         Masses have node, position and mass; modes have number, frequencies, error and MAC. Cells of the other
         kind are blank.
         """
-        n = len(self.nodes)
-        blank = [None] * n
-        at = () if self.positions is None else (Cells("position_m", [*self.positions, *blank]),)
-        modes = {
-            "mode": range(1, n + 1),
-            "frequency_rad_s": self.frequencies,
-            "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
-            "relative_error": self.relative_error,
-            "mac": self.mac,
-        }
-        columns = (
-            Cells("table", ["masses"] * n + ["modes"] * n),
-            Cells("node", [*self.nodes, *blank]),
-            *at,
-            Cells("mass_kg", [*self.masses.solution, *blank]),
-            *(Cells(name, [*blank, *values]) for name, values in modes.items()),
-        )
+        import pandas as pd
+
+        n, parts = len(self.nodes), {"masses": self._of_masses(), "modes": self._of_modes()}
+        frames = [
+            frame((Column("table", [kind] * n), *(each for each in columns if each.name)))
+            for kind, columns in parts.items()
+        ]
         whole = {"mode": "Int64"} if self.rotor is None else {"mode": "Int64", "node": "Int64"}
-        return frame(Table("masses and modes", columns)).astype(whole)
+        return pd.concat(frames, ignore_index=True).astype(whole)
+
+    def _of_masses(self) -> tuple[Column, ...]:
+        """Node, position and mass; what has no name is printed alone."""
+        positions, std, three = self.positions, self.masses.std, "{:.3f}".format
+        at = () if positions is None else (Column("position_m", positions, three, "at, m"),)
+        spread = () if std is None else (Column("", std, error_figures, "±"),)
+        masses = Column("mass_kg", self.masses.solution, three, "mass, kg")
+        return (Column("node", self.nodes, str), *at, masses, *spread)
+
+    def _of_modes(self) -> tuple[Column, ...]:
+        """Number, both frequencies, error and MAC; what has no name is printed alone."""
+        model, other = self.frequencies, self._padded(self.rotor_frequencies)
+        still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
+        one, four = "{:.1f}".format, "{:.4f}".format
+        return (
+            Column("mode", range(1, len(self.nodes) + 1), str),
+            Column("", model * RPM, one, "model, rpm"),
+            Column("frequency_rad_s", model, four, "rad/s"),
+            Column("", other * RPM, one, "rotor, rpm" if self.source == "rotor" else "measured, rpm"),
+            Column("rotor_frequency_rad_s", other, four, "rad/s"),
+            Column("relative_error", self.relative_error, lambda e: f"{100 * e:+.3f}", "error, %"),
+            Column("mac", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format, "MAC"),
+            *((Column("", still, str),) if any(still) else ()),
+        )
 
     @property
     def answer(self) -> Answer:
         """How well the masses stand for the rotor, the masses, and both frequencies beside each other."""
-        whole = "" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        whole = " kg" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        kind = "measured mode" if self.source == "measured" else "mode"
+        first = f"the first {kind}" if self.modes == 1 else f"the first {self.modes} {kind}s"
         masses = Answer(
-            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from "
-            f"{self.choices.words(self.modes)}, formula (50), together "
-            f"{self.masses.solution.sum():.1f}{whole or ' kg'}.\n"
+            f"{counted(len(self.nodes), 'equivalent mass', 'equivalent masses')} from {first}, formula (50), "
+            f"together {self.masses.solution.sum():.1f}{whole}.\n"
             f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
-            f"{text(self._mass_columns())}\n\n{text(self._mode_columns())}",
+            f"{text(self._of_masses())}\n\n{text(self._of_modes())}",
             self.warnings[::-1],  # of the model as it came out before those of what it is made for
-            (_RESIDUAL,) if self.masses.std is not None else (),
+            () if self.masses.std is None else (_RESIDUAL,),
         )
         more = [] if self.errors is None else [self.errors.answer]
         if (apart := self.separated) is not None:
             a, b = apart.supports
             columns = (
-                Column("node", apart.nodes, str, "mass at node"),
-                Column("a", 100 * apart.fractions[:, 0], "{:.4g}".format, f"% on node {a}"),
-                Column("b", 100 * apart.fractions[:, 1], "{:.4g}".format, f"% on node {b}"),
-                Column("delta", np.diag(apart.delta), "{:.6g}".format, "shaft on rigid supports, m/N"),
+                Column("mass at node", apart.nodes, str),
+                Column(f"% on node {a}", 100 * apart.fractions[:, 0], "{:.4g}".format),
+                Column(f"% on node {b}", 100 * apart.fractions[:, 1], "{:.4g}".format),
+                Column("shaft on rigid supports, m/N", np.diag(apart.delta), "{:.6g}".format),
             )
             words = f"The shaft apart from its supports at nodes {a} and {b}, {apart.span:.6g} m apart."
             more.append(Answer(words, tables=(text(columns),), more="shares of the supports"))
@@ -268,38 +311,16 @@ class Reduction(Answered):
 
     def _judgement(self) -> str:
         """How near the modes are."""
-        errors, macs = np.abs(self.relative_error[: self.modes]), self.mac[: self.modes]
+        k, apart = self.modes, self.relative_error
         if (self.masses.solution <= 0).any():
             return "NO physical model, a mass is not positive"
-        if not np.isfinite(errors).all():
+        if not np.isfinite(apart[:k]).all():
             return "NO model of these modes, not all of them vibrate"
-        whose = "measured" if self.choices.source == "measured" else "rotor's"
-        words = f"Frequencies within {percent(round(errors.max(), 8))} % of the {whose}, MAC {macs.min():.4g}"
-        k = self.modes
-        if k < len(self.nodes) and np.isfinite(self.relative_error[k]):
-            words += f"; mode {k + 1} off by {100 * self.relative_error[k]:+.3g} %"
-        return words
-
-    def _mass_columns(self) -> tuple[Column, ...]:
-        std, positions = self.masses.std, self.positions
-        at = () if positions is None else (Column("at, m", positions, "{:.3f}".format),)
-        spread = () if std is None else (Column("±", std, error_figures),)
-        masses = Column("mass, kg", self.masses.solution, "{:.3f}".format)
-        return (Column("node", self.nodes, str), *at, masses, *spread)
-
-    def _mode_columns(self) -> tuple[Column, ...]:
-        model, other = self.frequencies, self._padded(self.rotor_frequencies)
-        whose = "measured" if self.choices.source == "measured" else "rotor"
-        still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
+        whose, largest = {"rotor": "rotor's"}.get(self.source, "measured"), np.abs(apart[:k]).max()
+        following = [f"; mode {k + 1} off by {100 * e:+.3g} %" for e in apart[k : k + 1] if np.isfinite(e)]
         return (
-            Column("mode", range(1, len(self.nodes) + 1), str),
-            Column("model", model * RPM, "{:.1f}".format, "model, rpm"),
-            Column("rad/s", model, "{:.4f}".format),
-            Column("rotor", other * RPM, "{:.1f}".format, f"{whose}, rpm"),
-            Column("rotor_rad_s", other, "{:.4f}".format, "rad/s"),
-            Column("error", 100 * self.relative_error, "{:+.3f}".format, "error, %"),
-            Column("MAC", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format),
-            *((Column("", still, str),) if any(still) else ()),
+            f"Frequencies within {percent(round(largest, 8))} % of the {whose}, MAC {self.mac[:k].min():.4g}"
+            + "".join(following)
         )
 
     def _padded(self, values: FloatArray) -> FloatArray:
@@ -362,51 +383,40 @@ def reduce(  # noqa: PLR0913
     places = mass_nodes(rotor, nodes)
     n = len(places)
     plane, remarks = plane_at_rest(rotor, speed)
-    if measured is not None and any(s.pedestal is not None and s.pedestal.mass for s in rotor.supports):
+    if measured is not None and any(s.pedestal and s.pedestal.mass for s in rotor.supports):
         raise ValueError(
             "measured modes hold the masses of the pedestals, which formula (50) cannot take apart: give the "
             "pedestals no mass in the rotor file (the equivalent masses then hold it), or use computed modes"
         )
     full = fem.critical_speeds(plane, n)
-    index = np.array(places) - 1
+    shapes = full.shapes[np.array(places) - 1]
     seals, apart = np.zeros(n), None
     if supports_apart:
-        bare, seals = _without_seals(plane, places)
-        apart = separate(bare, places)
-        zero = np.zeros(1)
-        stiffness = [
-            sum(float(s.dynamic_stiffness(zero)[0, 0, 0].real) for s in bare.supports if s.node == node)
-            for node in apart.supports
-        ]
-        alpha = apart.compliance(stiffness)
-    else:
-        alpha = fem.compliance(plane, places)
-    if measured is None:
-        omega, shapes = full.frequencies, full.shapes[index]
-    else:
-        omega, shapes = _modes(measured, n)
-        remarks += _other_modes(omega, full.frequencies, shapes, full.shapes[index], places)
-    source: Literal["rotor", "measured"] = "rotor" if measured is None else "measured"
-    how = Choices(source, normalise, rows, nonnegative)
-    result = _reduced(places, alpha, seals, omega, shapes, modes, how, errors)
-    ours = ignored_inertia(full.rotor)
-    together_kg, total = float(result.masses.solution.sum()), rotor.total_mass
-    heavy = (
-        f"the masses weigh {together_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they stand "
-        "where it hardly moves; use other nodes"
-    )
-    return dataclasses.replace(
-        result,
+        kept = []
+        for support in plane.supports:
+            if support.kind == "seal" and support.node in places and support.plain:
+                seals[places.index(support.node)] += float(support.stiffness)
+            else:
+                kept.append(support)
+        plane = dataclasses.replace(plane, supports=kept)
+        apart = separate(plane, places)
+    alpha = fem.compliance(plane, places)
+    modes_of = full.frequencies, shapes
+    if measured is not None:
+        modes_of = _modes(measured, n)
+        remarks += _other_modes(*modes_of, full.frequencies, shapes)
+    remarks += ignored_inertia(rotor)
+    remarks += [warning for warning in full.warnings if warning not in ignored_inertia(full.rotor)]
+    return _reduced(
+        *(places, alpha, seals, *modes_of, modes, errors),
         rotor=rotor,
         rotor_modes=full,
         separated=apart,
-        warnings=(
-            *remarks,
-            *ignored_inertia(rotor),
-            *(warning for warning in full.warnings if warning not in ours),
-            *result.warnings,
-            *([heavy] if together_kg > HEAVY * total else []),
-        ),
+        warnings=tuple(remarks),
+        source="rotor" if measured is None else "measured",
+        normalise=normalise,
+        rows=rows,
+        nonnegative=nonnegative,
     )
 
 
@@ -448,12 +458,13 @@ def reduce_measured(  # noqa: PLR0913
     alpha = np.asarray(compliance, dtype=float)
     n = len(alpha)
     omega, U = _modes((frequencies, shapes), n)
-    places = tuple(nodes) if nodes is not None else tuple(range(1, n + 1))
+    places = tuple(range(1, n + 1)) if nodes is None else tuple(nodes)
     if len(places) != n or len(set(places)) != n:
         raise ValueError(f"{n} different names of places are needed; got {list(places)}")
     seals = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,)).copy()
-    how = Choices("measured", normalise, rows, nonnegative)
-    return _reduced(places, alpha, seals, omega, U, len(omega) if modes is None else modes, how, errors)
+    used = len(omega) if modes is None else modes
+    how = {"source": "measured", "normalise": normalise, "rows": rows, "nonnegative": nonnegative}
+    return _reduced(places, alpha, seals, omega, U, used, errors, **how)
 
 
 def _reduced(
@@ -463,16 +474,16 @@ def _reduced(
     omega: FloatArray,
     shapes: FloatArray,
     modes: int,
-    choices: Choices,
     errors: InputErrors | None,
+    **others: Any,  # noqa: ANN401
 ) -> Reduction:
-    """The regression and its checks, whatever the inputs come from."""
+    """The regression and its checks, whatever the inputs come from; other fields of the result."""
     n, most = len(places), min(len(places), len(omega))
+    modes = whole(modes, "the number of modes")
     if not 1 <= modes <= most:
         raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
-    used = omega[:modes], shapes[:, :modes]
-    how: dict[str, Any] = {"seal_stiffness": seals, "normalise": choices.normalise, "rows": choices.rows}
-    estimate = equivalent_masses(alpha, *used, **how, nonnegative=choices.nonnegative)
+    how = {key: others[key] for key in ("normalise", "rows", "nonnegative")}
+    estimate = equivalent_masses(alpha, omega[:modes], shapes[:, :modes], seal_stiffness=seals, **how)
     if not estimate.full_rank:
         raise ValueError(
             f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
@@ -483,7 +494,6 @@ def _reduced(
     j = compared.shape[1]
     model[:, :j] = like(model[:, :j], compared)
     result = Reduction(
-        rotor=None,
         nodes=places,
         modes=modes,
         masses=estimate,
@@ -493,112 +503,121 @@ def _reduced(
         shapes=model,
         rotor_frequencies=omega[:n],
         rotor_shapes=compared,
-        rotor_modes=None,
-        choices=choices,
-        errors=None,
-        separated=None,
-        warnings=(),
+        **others,
     )
-    warnings = [*_at_bounds(estimate, errors), *_of_regression(result)]
-    if errors is not None and not _bounded(estimate):
-        result = dataclasses.replace(result, errors=result.inputs.errors(errors))
-    return dataclasses.replace(result, warnings=tuple(warnings))
+    bound = how["nonnegative"] and not estimate.solution.all()
+    drawn = _errors_by_draws(result, errors) if errors is not None and not bound else None
+    warnings = (*result.warnings, *_warnings(result))
+    return dataclasses.replace(result, errors=drawn, warnings=warnings)
 
 
-def _bounded(estimate: Estimate) -> tuple[str, ...]:
-    """Names of masses at the bound 0."""
-    return estimate.at_bounds if isinstance(estimate, BoundedEstimate) else ()
-
-
-def _at_bounds(estimate: Estimate, errors: InputErrors | None) -> list[str]:
-    """What to say of masses at the bound 0."""
-    if not (names := _bounded(estimate)):
-        return []
-    more = "" if errors is None else ", and what the stated errors do was not computed"
-    return [
-        f"at the bound 0, the modes ask for less than nothing there: {', '.join(names)}; no standard "
-        f"deviation is given, those of the others hold this fixed{more}; leave these places out"
-    ]
-
-
-def _of_regression(result: Reduction) -> list[str]:
-    """Masses that are not positive, modes of other shape, an ill-conditioned regression, frequencies off."""
-    warnings = [
-        f"the mass at node {node} is {mass:.4g} kg, not positive: no physical model; use other nodes, more "
-        "modes, or masses that are not negative (nonnegative)"
-        for node, mass in zip(result.nodes, result.masses.solution, strict=True)
-        if mass <= 0 and not result.choices.nonnegative
-    ]
-    if np.isnan(result.frequencies).any():
-        warnings.append("with these masses the model has modes that do not vibrate")
-    warnings += [
-        f"mode {k} of the model does not have the shape of the rotor's (MAC {value:.2f}, below {ALIKE}): "
-        "do not rely on its frequency; use other nodes or more masses"
-        for k, value in enumerate(result.mac[: result.modes], start=1)
-        if not value >= ALIKE
-    ]
-    if (result.sensitivity > SENSITIVE / 0.01).any():
-        moves = ", ".join(f"{x:.0f} %" for x in result.sensitivity)
+def _warnings(result: Reduction) -> list[str]:
+    """Masses that are not positive; or at their bound, too heavy, other modes, a shaky regression."""
+    warnings, masses = [], result.masses
+    pairs = zip(result.nodes, masses.solution, strict=True)
+    wrong = ", ".join(f"{mass:.4g} kg at node {node}" for node, mass in pairs if mass <= 0)
+    if wrong and not result.nonnegative:
+        return [
+            f"a mass is not positive, {wrong}: no physical model; use other nodes, more modes, or "
+            "--nonnegative"
+        ]
+    if wrong:
         warnings.append(
-            f"the regression is ill-conditioned (condition number {result.masses.condition_number:.1f}): "
-            f"errors of 1 % in the compliances and shapes move the masses by {moves}; more modes make them "
-            "firmer"
+            f"at the bound 0, the modes ask for less than nothing there: {wrong}; the standard deviations of "
+            "the others hold this fixed, and those by stated errors are not computed; leave these places out"
         )
-    far = [(k, e) for k, e in enumerate(result.relative_error, start=1) if abs(e) > OFF]
-    if far:
-        which = ", ".join(f"mode {k} by {100 * e:+.1f} %" for k, e in far)
+    total = np.inf if result.rotor is None else result.rotor.total_mass
+    if (together_kg := float(masses.solution.sum())) > HEAVY * total:
         warnings.append(
-            f"frequencies of the model are far off: {which}; use it below them, or more masses or other nodes"
+            f"the masses weigh {together_kg:.4g} kg together, more than the rotor ({total:.4g} kg): they "
+            "stand where it hardly moves; use other nodes"
+        )
+    modes = zip(result.relative_error.tolist(), result.mac.tolist(), strict=True)
+    far = [
+        f"mode {k} by {100 * error:+.1f} %, MAC {shape:.2f}"
+        for k, (error, shape) in enumerate(modes, start=1)
+        if abs(error) > OFF or (k <= result.modes and not shape >= ALIKE)
+    ]
+    if far:
+        warnings.append(
+            f"the model is far off: {'; '.join(far).replace('by +nan %', 'does not vibrate')}; do not rely "
+            "on these frequencies and shapes, use other nodes or more masses"
+        )
+    if masses.condition_number > BADLY:
+        warnings.append(
+            f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): errors of "
+            "1 % in the compliances and shapes can move the masses by up to that many percent; more modes "
+            "make them firmer"
         )
     return warnings
 
 
 def _other_modes(
     omega: FloatArray,
-    rotor_omega: FloatArray,
     measured: FloatArray,
+    rotor_omega: FloatArray,
     computed: FloatArray,
-    places: tuple[int, ...],
 ) -> list[str]:
     """What to say where the measured rotor is not that of the model: frequencies, then shapes."""
-    remarks = [
-        f"the measured frequency {k}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
-        f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
-        for k, (f, g) in enumerate(zip(omega, rotor_omega, strict=False), start=1)
-        if abs(f / g - 1) > APART
-    ]
-    agreement = mac(measured, computed)
-    for k in np.flatnonzero(np.diag(agreement) < ALIKE):
-        best, hint = int(np.argmax(agreement[k])), ""
-        flips = 1.0 - 2.0 * np.eye(len(measured))
-        turned = mac(flips * measured[:, k : k + 1], computed[:, k : k + 1])[:, 0]
-        if agreement[k, best] >= ALIKE:
-            hint = f" but of its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing?"
-        elif turned.max() >= ALIKE:
-            hint = f": is its sign at node {places[int(np.argmax(turned))]} right?"
-        remarks.append(
-            f"the shape of measured mode {k + 1} is not that of the rotor's mode {k + 1} (MAC "
-            f"{agreement[k, k]:.2f}){hint}"
-        )
+    remarks, agreement = [], mac(measured, computed)
+    for k, (f, g) in enumerate(zip(omega.tolist(), rotor_omega.tolist(), strict=False)):
+        if abs(f / g - 1) > APART:
+            remarks.append(
+                f"the measured frequency {k + 1}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
+                f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
+            )
+        if agreement[k, k] < ALIKE:
+            best = int(agreement[k].argmax())
+            remarks.append(
+                f"the shape of measured mode {k + 1} is not that of the rotor's (MAC {agreement[k, k]:.2f}); "
+                f"nearest is its mode {best + 1} (MAC {agreement[k, best]:.2f}): is a mode missing, or a "
+                "sign wrong?"
+            )
     return remarks
 
 
 def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, FloatArray]:
-    """Frequencies and shapes as arrays that fit n masses."""
-    omega, shapes = (np.asarray(part, dtype=float) for part in measured)
-    omega = np.atleast_1d(omega)
+    """Frequencies and shapes as arrays that fit n masses; `design` looks at their numbers."""
+    omega, shapes = np.atleast_1d(np.asarray(measured[0], float)), np.asarray(measured[1], float)
     if shapes.shape != (n, len(omega)):
         raise ValueError(
             f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
         )
-    if not (np.isfinite(omega).all() and np.isfinite(shapes).all()):
-        raise ValueError("frequencies and shapes must be finite numbers")
     return omega, shapes
 
 
-def _without_seals(plane: fem.Rotor, places: tuple[int, ...]) -> tuple[fem.Rotor, FloatArray]:
-    """The plane without its seals at the masses, and their stiffness."""
-    taken = [s for s in plane.supports if s.kind == "seal" and s.node in places and s.plain]
-    stiffness = np.array([sum(float(s.stiffness) for s in taken if s.node == node) for node in places])
-    kept = [s for s in plane.supports if s not in taken]
-    return dataclasses.replace(plane, supports=kept), stiffness
+def _errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
+    """What stated errors do, by recomputed draws; NaN where a mode is lost in some of them."""
+    n, k = len(result.nodes), result.modes
+    i, j = np.triu_indices(n)
+    sizes = {"compliance": (i.size,), "frequencies": (k,), "shapes": (n, k), "seal_stiffness": (n,)}
+    sigma = []
+    for name, shape in sizes.items():
+        given = np.asarray(getattr(stated, name))
+        if given.shape not in ((), shape):
+            raise ValueError(f"errors of {name} must be one number or have shape {shape}; got {given.shape}")
+        full = np.array(np.broadcast_to(given, shape))
+        if name == "shapes" and given.ndim == 0 and result.normalise == "first":
+            full[0] = 0.0
+        sigma.append(full.ravel())
+    parts, ends = np.concatenate(sigma), np.cumsum([*map(len, sigma)])
+    drawn = 1 + np.random.default_rng(0).normal(size=(DRAWS, ends[-1])) * parts
+    a, w, u, c = np.split(drawn, ends[:-1], axis=1)
+    factors = np.ones((DRAWS, n, n))
+    factors[:, i, j] = factors[:, j, i] = a
+    alpha, springs = result.compliance * factors, result.seal_stiffness * c
+    shapes = result.rotor_shapes[:, :k] * u.reshape(-1, n, k)
+    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
+    B, D = design(alpha, result.rotor_frequencies[:k] * w, shapes, seal_stiffness=springs, **how)
+    masses, _ = solve_many(B, D)
+    omega = np.full_like(masses, np.nan)
+    if np.isfinite(masses).all():
+        omega, _ = natural_frequencies(alpha, masses, seal_stiffness=springs)
+    low, high = np.quantile((masses, omega), (0.15866, 0.84134), axis=1)  # NaN where any draw is
+    std, exact = (high - low) / 2, (result.masses.solution, result.frequencies)
+    warnings = [
+        f"the stated errors do not determine {NAMES[row]}{column + 1}: it may be off by as much as it is, or "
+        "drawn masses are not positive"
+        for row, column in np.argwhere(~(std < np.abs(exact)))
+    ]
+    return MassErrors(std[0], std[1], tuple(warnings))

@@ -10,19 +10,26 @@ node (all others held), the equations of `fem.assembly` in the basis T read, per
 
 Supports and pedestals stand at their places and act as in the whole rotor, so that they stay parameters of
 the small model. C is the damping of the surroundings: it does not turn.
+
+A model that keeps its supports: bearings and films are held rigidly while formula (50) gives the masses, as
+if they were simple supports: then the masses are those of the shaft, whatever it runs on, and what the
+formula cannot see, the mass that these supports hold at rest, stands at them. It is shared so that mass and
+centre of mass of the model are the rotor's: with two supports that is one way only, with more the nearest
+to the shares of static condensation, 1ᵀ M T. The model is then that of Craig and Bampton with masses
+instead of modes: exact for what the supports carry, and near to the rotor on supports from soft to stiff.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem import GRAVITY, NodeForce, StateSpace, Whirl, solve
+from fem import GRAVITY, JournalBearing, NodeForce, SqueezeFilm, StateSpace, Whirl, solve
 from fem.assembly import (
     Reduced,
     assemble,
@@ -35,17 +42,22 @@ from fem.assembly import (
 )
 from fem.forces import kind_of
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray, read_only
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.checks import checked_speeds, number
 from rotorid.base.text import counted, listing
-from rotorid.reduction.masses import held, mass_nodes, plane_at_rest
+from rotorid.reduction.condensation import held, static_shapes
+from rotorid.reduction.masses import bending_stiffness, mass_nodes, natural_frequencies, plane_at_rest
 
 LOST = 1e-3
 """Relative rounding error of a static shape."""
+RIGID = 1e7
+"""Stiffness of a rigid support by that of a shaft on two of them."""
 NONE = 1e-12
 """Share of the largest entry below which damping, or a stiffness, is none."""
 INFINITE = 1e13
 """Response times largest stiffness, per unit force: beyond, only rounding is left."""
+POINTS, SAME = 61, 1e-6
+"""Speeds over a range at which whirl is looked at, and relative distance of critical speeds that are one."""
 _ROUNDING = 1e-5  # share of the largest entry that stands in few digits
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -134,6 +146,16 @@ class SmallModel(Answered):
         return tuple(node for node, mass in zip(self.nodes, self.masses, strict=True) if mass > 0)
 
     @property
+    def stations(self) -> dict[str, int]:
+        """None: its nodes have numbers alone."""
+        return {}
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether no support distinguishes a direction."""
+        return all(support.symmetric for support in self.supports)
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the unknowns: x and y of the nodes, `x7` and `y7`, then pedestals, `foot_x1`."""
         stands = [i for i, support in enumerate(self.supports, start=1) if support.pedestal is not None]
@@ -193,7 +215,7 @@ class SmallModel(Answered):
         speed = number(speed, "speed")
         Q, names = self.equations(), self.coordinates
         D, K = (matrix[0] for matrix in Q.at(np.array([speed])))
-        inside = np.array([plane == "both" or name.removeprefix("foot_")[0] == "x" for name in names])
+        inside = np.array([plane == "both" or "y" not in name for name in names])
         across = np.ix_(inside, ~inside)
         if D[across].any() or K[across].any():
             raise ValueError("the planes x and y of this rotor are coupled: take both")
@@ -239,51 +261,90 @@ class SmallModel(Answered):
         ValueError
             For a speed outside the table of a support.
         """
-        omega = checked_speeds(speeds)
-        Q = self.equations(complex_coordinate=None)
+        omega, Q = checked_speeds(speeds), self.equations(complex_coordinate=None)
         # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
         n = Q.size if Q.P.planes == 2 else 2 * Q.size
-        K = np.real(self.equations().at(omega[:1])[1][0]).diagonal()[: len(self.nodes)]
-        massive = self.masses > 0
-        scale = float(np.sqrt(np.median(np.abs(K[massive]) / self.masses[massive])))
-        return solve(Q, omega, n, scale)
+        K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
+        return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
-    def response(self, speeds: ArrayLike) -> ComplexArray:
-        """Response at the masses to unbalance at the masses, as `fem.influence` defines it.
+    def critical_speeds(self, lowest: float, highest: float) -> FloatArray:
+        """Speeds between two, rad/s, ascending, at which a mode whirls once a turn, either way."""
+        speeds = np.linspace(lowest, highest, POINTS)
+        for _ in range(3):  # of lines through two speeds each, the last between near ones
+            gap = np.abs(self.whirl(speeds).values.imag) - speeds[:, None]
+            i, k = np.nonzero((gap[:-1] > 0) != (gap[1:] > 0))
+            part = gap[i, k] / (gap[i, k] - gap[i + 1, k])
+            crossings = (speeds[i] + part * (speeds[i + 1] - speeds[i]))[np.isfinite(part)]
+            speeds = np.union1d(speeds, crossings)
+        crossings = np.sort(crossings)
+        return crossings[np.diff(crossings, prepend=-1.0) > SAME * crossings]
+
+    def deflections(self, speeds: FloatArray, unbalance: Mapping[int, complex]) -> ComplexArray:
+        """Phasors of x, then y of the k nodes under unbalance as in `response`, m, shape (S, 2 k).
+
+        ValueError where the model runs exactly at an undamped critical speed.
+        """
+        Q, k = self.equations(), len(self.nodes)
+        D, K = Q.at(speeds)
+        w, loads = speeds[:, None, None], np.zeros((Q.size, 1), complex)
+        for node, amount in unbalance.items():
+            i = self.nodes.index(self.node(node))
+            loads[[i, k + i], 0] += np.array([1.0, -1j]) * amount
+        try:
+            X = np.linalg.solve(K - w * w * Q.M + 1j * w * D, w * w * loads)
+        except np.linalg.LinAlgError:
+            X = np.full((1, Q.size, 1), np.inf + 0j)
+        size = np.abs(loads).max() * speeds.max() ** 2
+        if not np.abs(X).max() * np.abs(K).max() <= INFINITE * size:
+            raise ValueError(
+                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
+                "infinite; leave out this speed"
+            )
+        return np.asarray(X[:, : 2 * k, 0])
+
+    def response(self, speeds: ArrayLike, unbalance: Mapping[int, complex] | None = None) -> fem.Response:
+        """Synchronous vibration of all nodes, as `fem.unbalance_response` gives that of a rotor.
 
         Parameters
         ----------
         speeds
             rad/s, one or many; tables of supports are read there.
+        unbalance
+            m e e^{iβ} by node, kg·m, β with the rotation; by default the model's own.
 
         Returns
         -------
-        W, m per kg·m, shape (S, 2 n, n): x, then y at the n masses (`massive`) is Re(W U e^{iΩt}) for the
-        unbalance U (kg·m, complex, phase with the rotation) at the mass of the column: f_x is
-        Re(U Ω² e^{iΩt}), f_y Im of it.
+        Its `rotor` is this model.
 
         Raises
         ------
         ValueError
-            For impossible speeds, outside the table of a support, or exactly at an undamped critical speed.
+            For impossible speeds, outside the table of a support, or exactly at an undamped critical speed;
+            without unbalance, and for a model with forces that are not linear.
         """
-        omega, Q = checked_speeds(speeds), self.equations()
-        D, K = Q.at(omega)
-        in_x = np.flatnonzero(self.masses > 0)
-        in_y, n = len(self.nodes) + in_x, in_x.size
-        loads = np.zeros((len(omega), Q.size, n), dtype=complex)
-        loads[:, in_x, np.arange(n)], loads[:, in_y, np.arange(n)] = 1.0, -1j
-        w = omega[:, None, None]
-        try:
-            X = np.linalg.solve(K - w * w * Q.M + 1j * w * D, loads)
-        except np.linalg.LinAlgError:
-            X = np.full_like(loads, np.inf)
-        if not np.abs(X).max() * np.abs(K).max() < INFINITE:
+        if self.forces:
             raise ValueError(
-                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
-                "infinite; leave out this speed"
+                "forces that are not linear act on this model: `rotorid motion` follows it, or `rotorid "
+                "bearings --output` writes it with their linear coefficients"
             )
-        return np.asarray(w * w * X[:, np.concatenate((in_x, in_y))])
+        omega, k = checked_speeds(speeds), len(self.nodes)
+        if not (mounted := dict(self.unbalance if unbalance is None else unbalance)):
+            raise ValueError("no unbalance is given: name at least one node")
+        grows = fem.windows_of(self.whirl(np.unique(np.linspace(omega.min(), omega.max(), POINTS))))
+        windows = tuple(one for one in grows if any(one.first <= w <= one.last for w in omega))
+        bent = ("the bow of the model is left out: `rotorid motion` has it",) * bool(self.bow)
+        warnings = (*self.warnings, *bent, *(window.sentence() for window in windows))
+
+        def at(speeds: FloatArray) -> fem.Response:
+            X = self.deflections(speeds, mounted)
+            x, y = X[:, :k], X[:, k:]
+            F, b, nodes = (x + 1j * y) / 2, (x - 1j * y) / 2, np.array(self.nodes)
+            size = np.abs(F) + np.abs(b)
+            largest = size.max(axis=1), nodes[size.argmax(axis=1)]
+            rotor = cast(fem.Rotor, self)
+            return fem.Response(speeds, F, mounted, rotor, warnings, b, *largest, nodes, at, windows)
+
+        return at(omega)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; the file of the model has the rest."""
@@ -360,25 +421,29 @@ def small_model(
     Inertia of tilting is in the masses as far as they were fitted to modes that know it; none is added.
     """
     places = mass_nodes(rotor, nodes)
-    try:
-        m = np.array(masses, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError("masses must be numbers in kg, one for each node") from None
+    m = np.array(masses, dtype=float)
     if m.shape != (len(places),):
-        raise ValueError(f"{len(places)} nodes need as many masses, not an array of shape {m.shape}")
-    for place, mass in zip(places, m, strict=True):
+        raise ValueError(f"{len(places)} nodes need as many masses, numbers in kg")
+    others = {*(each.node for each in rotor.supports), *(each.node for each in rotor.forces)}
+    model = condense(rotor, (*places, *sorted(others.difference(places))), dict(zip(places, m, strict=True)))
+    damping, n = np.zeros_like(model.stiffness), len(places)
+    damping[:n, :n] = modal(rotor, places, m, modal_damping)
+    return replace(model, damping=damping)
+
+
+def condense(rotor: fem.Rotor, kept: tuple[int, ...], masses: Mapping[int, float]) -> SmallModel:
+    """The small model whose nodes are these, with masses, kg, at some of them."""
+    for place, mass in masses.items():
         if not (np.isfinite(mass) and mass > 0):
+            way = "leave out this node" if mass == 0 else "use other nodes, more modes, or --nonnegative"
             raise ValueError(
                 f"the mass at node {place} is {mass:.4g} kg, not positive: a physical model needs positive "
-                "masses, use other nodes or more modes, or non-negative least squares, and leave out nodes "
-                "without mass"
+                f"masses; {way}"
             )
-    linear = rotor.linear
-    acting = {*(s.node for s in rotor.supports), *(force.node for force in rotor.forces)}
-    kept = (*places, *sorted(acting - set(places)))
-    T = static_shapes(linear, kept)
-    k, n = len(kept), len(places)
-    Q, A = project(both_planes(linear, complex_coordinate=False), T), assemble(linear)
+    linear, k = rotor.linear, len(kept)
+    A = assemble(linear)
+    T = _shaft_shapes(linear, A.shaft, np.array([A.deflection(node) for node in kept], dtype=np.intp))
+    Q = project(both_planes(linear, complex_coordinate=False), T)
     ones = np.zeros((A.size, 1))
     ones[A.deflections] = 1.0
     remarks = [*ignored_inertia(rotor)]
@@ -392,9 +457,9 @@ def small_model(
             "the inertia of tilting sections and discs is in the small model only as far as the masses were "
             "fitted to modes that know it; no moment of inertia is added"
         )
-    model = SmallModel(
+    return SmallModel(
         nodes=kept,
-        masses=np.concatenate((m, np.zeros(k - n))),
+        masses=np.array([masses.get(node, 0.0) for node in kept]),
         weight=GRAVITY * (T.T @ multiply(A.mass, ones)[:, 0]),
         stiffness=_without_rounding(Q.K0[:k, :k], A.shaft[-1, A.deflections]),
         material_damping=_without_rounding(Q.D0[:k, :k], A.material[-1, A.deflections]),
@@ -403,80 +468,50 @@ def small_model(
         forces=rotor.forces,
         warnings=tuple(remarks),
     )
-    ratios = _ratios(modal_damping)
-    at_rest = plane_at_rest(rotor, None)[0].supports
-    return replace(model, damping=_modal(model, at_rest, ratios)) if any(ratios) else model
 
 
 def _without_rounding(matrix: FloatArray, whole: FloatArray) -> FloatArray:
     """Zero where all is rounding of the shaft's entries, as of two nodes, which nothing bends."""
-    return matrix if np.abs(matrix).max() > NONE * np.abs(whole).max() else np.zeros_like(matrix)
+    return matrix * float(np.abs(matrix).max() > NONE * np.abs(whole).max())
 
 
-def static_shapes(rotor: fem.Rotor, kept: tuple[int, ...]) -> FloatArray:
-    """Shapes of the shaft for a unit deflection of each kept node, shape (size, k): K_oo X_o = −K_od."""
-    from scipy.linalg.lapack import dpbtrf, dpbtrs
-
-    if free_motions(rotor, set(kept)):
+def _shaft_shapes(rotor: fem.Rotor, band: FloatArray, at: IndexArray) -> FloatArray:
+    """Shapes of the shaft for a unit deflection of each kept node, at these unknowns, shape (size, k)."""
+    if free_motions(rotor, set(at)):
         raise ValueError(
             "one node, with or without a mass, does not hold the shaft: it can turn about it; give masses or "
             "supports at two nodes at least, or tilting stiffness"
         )
-    A = assemble(rotor)
-    at = np.array([A.deflection(node) for node in kept], dtype=np.intp)
-    unit = np.zeros((A.size, len(kept)))
-    unit[at, np.arange(len(kept))] = 1.0
-    load = -multiply(A.shaft, unit)
-    load[at] = 0.0
-    band = held(A.shaft, at)
-    factor, info = dpbtrf(band)
-    X = dpbtrs(factor, load)[0] if info == 0 else load
-    moved = np.abs(X).max(axis=0) > 0
-    if info != 0 or (rounding_error(band, X[:, moved]) > LOST).any():
+    T, _ = static_shapes(band, at)
+    X = T.copy()
+    X[at] = 0.0
+    if (rounding_error(held(band, at), X[:, X.any(axis=0)]) > LOST).any():
         raise ValueError(
             f"the static shapes of {rotor.n_elements} elements are lost in float64; join neighbouring "
             "elements (50 to 200 are ample for a rotor)"
         )
-    return np.asarray(unit + X)
+    return T
 
 
-def _ratios(modal_damping: Sequence[float]) -> tuple[float, ...]:
-    """Damping ratios of the first modes; ValueError for what is no list of numbers from 0 to below 1."""
-    try:
-        ratios = tuple(float(ratio) for ratio in modal_damping)
-    except (TypeError, ValueError):
+def modal(rotor: fem.Rotor, nodes: Sequence[int], m: FloatArray, ratios: Sequence[float]) -> FloatArray:
+    """Damping matrix (n, n) of given ratios of the first modes of formula (50)'s model, the plane at rest."""
+    zeta = np.array(ratios, dtype=float)
+    if zeta.ndim != 1 or zeta.size > m.size or not ((zeta >= 0) & (zeta < 1)).all():
         raise ValueError(
-            "modal_damping must be a list of damping ratios, one for each of the first modes"
-        ) from None
-    for ratio in ratios:
-        if not 0 <= ratio < 1:
-            raise ValueError(f"a damping ratio is at least 0 and below 1 (0.02 is 2 %), not {ratio}")
-    return ratios
-
-
-def _modal(model: SmallModel, at_rest: Sequence[fem.Support], ratios: tuple[float, ...]) -> FloatArray:
-    """Damping matrix (k, k) of given ratios of the first modes of the plane x on these springs."""
-    from scipy.linalg import eigh
-
-    on = np.flatnonzero(model.masses)
-    if len(ratios) > on.size:
-        raise ValueError(
-            f"{len(ratios)} damping ratios are given, but each plane has {on.size} modes: leave some out"
+            "modal_damping must be a list of damping ratios, one for each of the first modes, from 0 to "
+            f"below 1 (0.02 is 2 %), not {ratios}; each plane has {m.size} modes"
         )
-    springs = [replace(support, tilting_stiffness=0.0) for support in at_rest]
-    still = replace(model, supports=springs, material_damping=_zero(), gyroscopic=_zero())
-    K = still.motion(0.0, "x", condensed=True).K
-    squares, shapes = eigh((K + K.T) / 2, np.diag(model.masses[on]))
-    if squares[0] < -1e-9 * np.abs(squares).max():
+    if not zeta.any():
+        return np.zeros((m.size, m.size))
+    omega, shapes = natural_frequencies(fem.compliance(plane_at_rest(rotor, None)[0], nodes), m)
+    if np.isnan(omega).any():
         raise ValueError(
             "the plane x at rest is pushed aside by a negative stiffness: no damping ratios exist"
         )
-    first = slice(len(ratios))
-    omega = np.sqrt(np.maximum(squares[first], 0.0))
-    momentum = model.masses[on][:, None] * shapes[:, first]  # shapes have φᵀ M φ = 1
-    C = np.zeros_like(model.stiffness)
-    C[np.ix_(on, on)] = (momentum * (2 * np.array(ratios) * omega)) @ momentum.T
-    return C
+    momentum = m[:, None] * shapes
+    sizes = 2 * omega / (shapes * momentum).sum(axis=0)
+    first = momentum[:, : zeta.size]
+    return np.asarray((first * (zeta * sizes[: zeta.size])) @ first.T)
 
 
 def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
@@ -487,30 +522,162 @@ def without_massless(motion: fem.Motion, gyroscopic: FloatArray) -> fem.Motion:
     R = (1; −K_oo⁻¹ K_om) and, for the forces, L = (1, −K_mo K_oo⁻¹): L G R. ValueError where other damping
     acts on a coordinate without mass, or no stiffness holds it.
     """
-    massive = np.diag(motion.M) > 0
+    massive, K, damping = np.diag(motion.M) > 0, motion.K, np.abs(motion.C - gyroscopic)
     on, off = np.flatnonzero(massive), np.flatnonzero(~massive)
-    if not off.size:
-        return motion
-    damping = np.abs(motion.C - gyroscopic)
-    touched = np.maximum(damping[off].max(axis=1), damping[:, off].max(axis=0))
-    present = touched > NONE * max(float(np.abs(motion.C).max()), float(damping.max()))
-    if present.any():
-        name = motion.coordinates[int(off[int(np.argmax(present))])]
+    touched = np.maximum(damping.max(axis=0), damping.max(axis=1))[off]
+    if (bad := off[touched > NONE * max(np.abs(motion.C).max(), damping.max())]).size:
         raise ValueError(
-            f"damping acts on {name!r}, which has no mass: it cannot be condensed into stiffness; keep the "
-            "supports, or take the state space"
+            f"damping acts on {motion.coordinates[bad[0]]!r}, which has no mass: it cannot be condensed into "
+            "stiffness; keep the supports, or take the state space"
         )
-    Koo = motion.K[np.ix_(off, off)]
-    sigma = np.linalg.svd(Koo, compute_uv=False)
-    if sigma[-1] <= NONE * sigma[0]:
+    Koo = K[np.ix_(off, off)]
+    if off.size and np.linalg.cond(Koo) >= 1 / NONE:
         raise ValueError(
             "supports without mass can move without force: they cannot be condensed; give them stiffness"
         )
-    L, R = np.zeros((on.size, massive.size)), np.zeros((massive.size, on.size))
-    L[:, on] = R[on] = np.eye(on.size)
-    R[off] = -np.linalg.solve(Koo, motion.K[np.ix_(off, on)])
-    L[:, off] = -np.linalg.solve(Koo.T, motion.K[np.ix_(on, off)].T).T
-    grid = np.ix_(on, on)
-    K = motion.K[grid] + motion.K[np.ix_(on, off)] @ R[off]
-    C = (motion.C - gyroscopic)[grid] + L @ gyroscopic @ R
-    return fem.Motion(motion.M[grid], C, K, tuple(motion.coordinates[i] for i in on), motion.speed)
+    L, R = np.eye(len(K))[on], np.eye(len(K))[:, on]
+    R[off] = -np.linalg.solve(Koo, K[np.ix_(off, on)])
+    L[:, off] = -np.linalg.solve(Koo.T, K[np.ix_(on, off)].T).T
+    kept = tuple(motion.coordinates[i] for i in on)
+    return fem.Motion(L @ motion.M @ R, L @ motion.C @ R, L @ K @ R, kept, motion.speed)
+
+
+def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
+    """Nodes that hold a rotor: bearings with a stiffness, journal bearings and squeeze films.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+
+    Returns
+    -------
+    Node numbers, ascending.
+    """
+    films = [force.node for force in rotor.forces if isinstance(force, (JournalBearing, SqueezeFilm))]
+    springs = [s.node for s in rotor.supports if s.kind == "bearing" and s.table[0].any()]
+    return tuple(sorted({*films, *springs}))
+
+
+def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
+    """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+
+    Raises
+    ------
+    ValueError
+        If these are fewer than two.
+    """
+    nodes = held_nodes(rotor)
+    if len(nodes) < 2:
+        raise ValueError(
+            "to keep the supports, the masses are found with the shaft held rigidly at its bearings, journal "
+            f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
+        )
+    stiffness = RIGID * bending_stiffness(rotor)
+    tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
+    return replace(
+        rotor,
+        supports=[fem.Support(node, stiffness, tilting_stiffness=tilting[node]) for node in nodes],
+        forces=(),
+    )
+
+
+def check_free(held: Sequence[int], nodes: Sequence[int]) -> None:
+    """Refuse masses where the shaft is held.
+
+    Parameters
+    ----------
+    held, nodes
+        Where it is held, and where masses shall stand.
+
+    Raises
+    ------
+    ValueError
+        For a node that is both.
+    """
+    if both := [node for node in nodes if node in held]:
+        raise ValueError(
+            f"node {both[0]} is held rigidly while the masses are found, so none can be found there: leave "
+            "it out of --nodes; it is kept with its bearing, and with its share of the rotor's mass"
+        )
+
+
+def keep_supports(
+    rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray, *, modal_damping: Sequence[float] = ()
+) -> SmallModel:
+    """Condense a shaft to its masses, supports and forces; nodes of the model ascend.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+    nodes, masses
+        As estimated on `held_rigidly`, n of them.
+    modal_damping
+        Damping ratios of the first modes on rigid supports; of the surroundings, in both planes alike.
+
+    Raises
+    ------
+    ValueError
+        As `small_model`, and for a mass at a node that was held.
+    """
+    rigid = held_nodes(rotor)
+    check_free(rigid, nodes)
+    kept = sorted({*nodes, *(s.node for s in rotor.supports), *(force.node for force in rotor.forces)})
+    model = condense(rotor, tuple(kept), dict(zip(nodes, masses.tolist(), strict=True)))
+    every, z, damping = model.masses.copy(), rotor.positions, np.zeros_like(model.stiffness)
+    at, rest = z[np.array(kept) - 1], np.flatnonzero(np.isin(kept, rigid))
+    shaft = rotor.density * rotor.area * rotor.length * (z[:-1] + z[1:]) / 2
+    moment = float(shaft.sum() + sum(disc.mass * z[disc.node - 1] for disc in rotor.discs))
+    lacking = rotor.total_mass - every.sum(), moment - float(every @ at)
+    every[rest] = _shared(model.weight[rest] / GRAVITY, at[rest], *lacking)
+    if modal_damping:
+        places = [kept.index(node) for node in nodes]
+        damping[np.ix_(places, places)] = modal(held_rigidly(rotor), nodes, masses, modal_damping)
+    model = replace(model, masses=every, damping=damping)
+    return replace(model, warnings=(*model.warnings, *_of_masses(rotor, model)))
+
+
+def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> FloatArray:
+    """Masses of this sum and this first moment about 0, the nearest to `shares`, each a tenth of it at least.
+
+    Where that cannot be, sum and moment are the nearest.
+    """
+    from scipy.optimize import lsq_linear
+
+    first = 1e7  # weight of mass and moment by that of the shares
+    largest = np.abs(shares).max()  # an overhang or a mass nearby may lift what a node carries
+    scale = np.sqrt(np.maximum(shares, 1e-3 * largest))
+    length = float(np.ptp(at))
+    rows = first * np.stack((np.ones_like(at), (at - at.mean()) / length)) * scale
+    wanted = first * np.array([mass, (moment - mass * at.mean()) / length])
+    least = np.maximum(0.1 * shares, 0.01 * largest) / scale
+    solved = lsq_linear(
+        np.vstack((rows, np.eye(len(at)))),
+        np.concatenate((wanted, shares / scale)),
+        bounds=(least, np.inf),
+        method="bvls",
+        tol=1e-14,
+    )
+    return np.asarray(scale * solved.x)
+
+
+def _of_masses(rotor: fem.Rotor, model: SmallModel) -> list[str]:
+    """What is wrong with the masses of a model that keeps its supports, in words."""
+    remarks, total = [], rotor.total_mass
+    if abs(model.masses.sum() / total - 1) > 1e-9:
+        remarks.append(
+            "the masses are too large to leave some for the supports: together "
+            f"{model.masses.sum():.1f} kg of the rotor's {total:.1f} kg; use other nodes or more modes"
+        )
+    if bare := [str(node) for node in model.nodes if node not in model.massive]:
+        remarks.append(
+            f"no mass stands at node {listing(bare, 'and')}, where supports or forces act: the shaft follows "
+            "there without inertia; better let a mass stand there, with --nodes"
+        )
+    return remarks

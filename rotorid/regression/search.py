@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import AnyArray, BoolArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.linear import least_squares
@@ -97,6 +97,19 @@ def drive(
         tried = counted(limit, "evaluation")
         why = "" if ok else f"not converged after {tried}: raise max_iterations or start nearer"
     return x, ok, why
+
+
+def together(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
+    """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
+    last: dict[bytes, tuple[AnyArray, ...]] = {}
+
+    def at(x: FloatArray) -> tuple[AnyArray, ...]:
+        if (key := x.tobytes()) not in last:
+            last.clear()
+            last[key] = both(x)
+        return last[key]
+
+    return lambda x: at(x)[0], lambda x: at(x)[1]
 
 
 def search_from(

@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import rpm
-from rotorid.tables.reader import units
+from rotorid.files import units
 
 if TYPE_CHECKING:
     from balancing import Correction, Mounted, Trials

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table, html
+from rotorid.files import units
 from rotorid.report.document import Document, fixed, significant
-from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.tables.reader import units
+from rotorid.files import units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

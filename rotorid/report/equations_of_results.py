@@ -46,12 +46,12 @@ def _(found: Identification) -> Equations:
     fit, tests = found.linear, found.experiments
     if fit is None:
         raise ValueError("--show equations needs every amplitude of the equations: one is not measured")
-    model, once = fit.model, len({*tests.frequencies.tolist()}) == len(tests)
+    model, once = found.model, len({*tests.frequencies.tolist()}) == len(tests)
     at = [
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
-    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
+    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.used)]
     notes = [
         f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
     ]
@@ -140,19 +140,19 @@ def correction_equations(found: Correction) -> Equations:
 @equations_of.register
 def _(found: Reduction) -> Equations:
     """The rows B m = D of formula (50), mode by mode, as `design` makes them."""
-    n, k, how, seals = len(found.nodes), found.modes, found.choices, found.seal_stiffness
+    n, k, seals = len(found.nodes), found.modes, found.seal_stiffness
     modes = found.rotor_frequencies[:k], found.rotor_shapes[:, :k]
-    B, D = design(found.compliance, *modes, seal_stiffness=seals, normalise=how.normalise, rows=how.rows)
-    relative, gap = how.rows == "relative", "," if n > 9 else ""
+    B, D = design(found.compliance, *modes, seal_stiffness=seals, normalise=found.normalise, rows=found.rows)
+    relative, gap = found.rows == "relative", "," if n > 9 else ""
     units = "B in 1/kg, D without unit" if relative else "B in m/N, D in s²"
     at = ", ".join(map(str, found.nodes))
     notes = [f"{units}, masses in kg; λ = 1/ω² of a mode; m1, m2, … stand at {at}"]
-    if how.nonnegative:
+    if found.nonnegative:
         notes.append("no mass may be below 0: plain least squares of these rows may give another answer")
     rows = []
     for mode, i in np.ndindex(k, n):
         U = [Symbol(f"U{j + 1}{gap}{mode + 1}") for j in range(n)]
-        U[0] = Integer(1) if how.normalise == "first" else U[0]
+        U[0] = Integer(1) if found.normalise == "first" else U[0]
         alpha = [Symbol(f"α{min(i, j) + 1}{gap}{max(i, j) + 1}") for j in range(n)]
         scale = Symbol(f"λ{mode + 1}")
         load = U[i] + sum(alpha[j] * Symbol(f"c{j + 1}") * U[j] for j in np.flatnonzero(seals))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from fem import Rotor
     from rotorid.base.arrays import FloatArray
-    from rotorid.calibration import MeasuredFrequencies, RunReadings, Unknown
+    from rotorid.calibration import RunReadings, Unknown
 
 SPREAD = 0.3
 """Relative, of drawn starting values without a prior."""
@@ -38,10 +38,6 @@ class Problem(Protocol):
     def readings(self) -> Sequence[RunReadings]:
         """Of its runs."""
 
-    @property
-    def frequencies(self) -> Sequence[MeasuredFrequencies]:
-        """Measured beside them."""
-
 
 def draw_start(given: Problem, rng: np.random.Generator) -> dict[str, Any]:
     """χ² of data and priors where the search from one drawn start ends, and the numbers there."""
@@ -50,7 +46,7 @@ def draw_start(given: Problem, rng: np.random.Generator) -> dict[str, Any]:
         first = unknown.first(given.rotor)
         spread = unknown.prior[1] if unknown.prior else SPREAD * abs(first)
         begun.append(replace(unknown, start=first + spread * rng.uniform(-1.0, 1.0)))
-    end = calibrate(given.rotor, begun, given.readings, given.frequencies, side_starts=False)
+    end = calibrate(given.rotor, begun, given.readings, side_starts=False)
     numbers = dict(zip(end.fit.names, end.fit.estimate.solution.tolist(), strict=True))
     return {"converged": end.fit.converged, "chi_square": end.chi_square, **numbers}
 

@@ -80,8 +80,8 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise ValueError("a study needs pyarrow: pip install pyarrow") from error
+    from rotorid.files.input_file import sha256
     from rotorid.study.chunks import read_parts, run_study
-    from rotorid.tables.reader.input_file import sha256
     from rotorid.tables.study_file import read_study
 
     options = options or StudyOptions()
@@ -135,7 +135,7 @@ def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], t
         raise ValueError(f"calibrate.estimate: {taken.pop()!r} is another column of the samples: rename it")
     columns = {"converged": "bool", "chi_square": "double", **dict.fromkeys(labels, "double")}
     files = [*read.files, *given.data_files]
-    return Task(draw_start, given, seed, columns, STARTS), files, tuple(given.assumed)
+    return Task(draw_start, given, seed, columns, STARTS), files, ()
 
 
 @contextmanager

@@ -11,6 +11,13 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from rotorid.files.conventions import Conventions as Conventions
+    from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.problems import InputError as InputError
+    from rotorid.files.problems import Problem as Problem
+    from rotorid.files.problems import TableWarning as TableWarning
+    from rotorid.files.runs import read_trials as read_trials
+    from rotorid.files.table_writing import write_table as write_table
     from rotorid.tables.data.measurements import read_measurements as read_measurements
     from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
@@ -23,10 +30,6 @@ if TYPE_CHECKING:
     from rotorid.tables.models.harmonic_file import read_harmonic_model as read_harmonic_model
     from rotorid.tables.models.ode_file import read_ode_model as read_ode_model
     from rotorid.tables.models.small_model_file import read_small_model as read_small_model
-    from rotorid.tables.reader.problems import InputError as InputError
-    from rotorid.tables.reader.problems import Problem as Problem
-    from rotorid.tables.reader.problems import TableWarning as TableWarning
-    from rotorid.tables.reader.table_writing import write_table as write_table
     from rotorid.tables.rotor.bow_table import read_bow as read_bow
     from rotorid.tables.rotor.rotor_file import read_rotor as read_rotor
     from rotorid.tables.rotor.rotor_file import rotor_files as rotor_files
@@ -35,9 +38,6 @@ if TYPE_CHECKING:
     from rotorid.tables.runs.influence_table import influence_frame as influence_frame
     from rotorid.tables.runs.influence_table import read_influence as read_influence
     from rotorid.tables.runs.influence_table import write_influence as write_influence
-    from rotorid.tables.runs.stated_conventions import Conventions as Conventions
-    from rotorid.tables.runs.stated_conventions import StatedErrors as StatedErrors
-    from rotorid.tables.runs.trials import read_trials as read_trials
 
 _HOME = {
     "read_measurements": "data.measurements",
@@ -52,10 +52,10 @@ _HOME = {
     "read_harmonic_model": "models.harmonic_file",
     "read_ode_model": "models.ode_file",
     "read_small_model": "models.small_model_file",
-    "InputError": "reader.problems",
-    "Problem": "reader.problems",
-    "TableWarning": "reader.problems",
-    "write_table": "reader.table_writing",
+    "InputError": ".files.problems",
+    "Problem": ".files.problems",
+    "TableWarning": ".files.problems",
+    "write_table": ".files.table_writing",
     "read_bow": "rotor.bow_table",
     "read_rotor": "rotor.rotor_file",
     "rotor_files": "rotor.rotor_file",
@@ -64,9 +64,9 @@ _HOME = {
     "influence_frame": "runs.influence_table",
     "read_influence": "runs.influence_table",
     "write_influence": "runs.influence_table",
-    "Conventions": "runs.stated_conventions",
-    "StatedErrors": "runs.stated_conventions",
-    "read_trials": "runs.trials",
+    "Conventions": ".files.conventions",
+    "StatedErrors": ".files.conventions",
+    "read_trials": ".files.runs",
 }
 
 __all__ = [*_HOME]

@@ -12,11 +12,11 @@ import numpy as np
 from balancing import ReadingErrors
 from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
+from rotorid.files import units, value_kinds
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.settings_keys import Key, Kind, Said, take
+from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
 from rotorid.tables.rotor.bearing import NODE
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 

@@ -1,9 +1,12 @@
 """Curves on even steps that move as slowly as the data allow, with their errors.
 
-Data z of a curve, which weigh (c − z)ᵀ G (c − z), G banded: c minimises this and λ Σ w |Δ³c|². The penalty λ
-is the most likely one (restricted maximum likelihood: log|G + λP| − n log λ + N log s² is least), w follows
-how fast the curve moves: near a resonance it is bent more easily. Errors are those of the Bayesian curve
-(Wahba 1983), s² (G + λP)⁻¹, which hold on the average along it.
+Data z of a curve, n values that weigh g each: c minimises Σ g |c − z|² + λ Σ w |Δ³c|². The stiffness λ is the
+most likely one (restricted maximum likelihood: log|G + λP| − n log λ + N log s² is least), w follows how fast
+the curve moves: near a resonance it is bent more easily.
+
+The Bayesian variance s² (G + λP)⁻¹ (Wahba 1983) is that of noise and of bias. Curves of machines are
+smoother than third differences expect, and this λ leaves them hardly any bias: errors are those of the noise
+alone, 5/6 of that variance but for the three numbers of a parabola, which have no bias.
 """
 
 from __future__ import annotations
@@ -23,44 +26,68 @@ each of these the weights w are found again."""
 NEIGHBOURS, EVENING, FEW = 25, 0.1, 0.1
 """w is of so many steps around, with this share of the mean bend added, and this share of what is
 likely by λ: a curve that hardly bends has even ones."""
+BIAS = 1 / 6
+"""Of the Bayesian variance, by third differences."""
 TRACE = 1e-10
 """Of λ, which keeps steps solvable that have no data."""
 
 
 @dataclass(frozen=True, eq=False)
-class Smoothing:
-    """How stiff a curve is, and how noisy its data.
+class Smoothed:
+    """A curve.
 
     Attributes
     ----------
+    curve
+        Real or complex, (n,).
+    weights
+        g of the data, (n,).
     variance
         s²: of data that weigh 1.
     factor
         Of G + λP: Cholesky, lower band (4, n).
     """
 
+    curve: AnyArray
+    weights: FloatArray
     variance: float
     factor: FloatArray
 
     @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariances of each value with itself and the next three, (4, n).
+    def inverse(self) -> FloatArray:
+        """Diagonal of (G + λP)⁻¹, (n,).
 
-        Within the band the inverse follows from the factor, from its end on (Takahashi 1973).
+        Within the band it follows from the factor, from its end on (Takahashi 1973).
         """
-        out, window = np.zeros_like(self.factor), np.zeros((3, 3))
-        for j in range(len(out.T) - 1, -1, -1):
+        out, window = np.zeros(len(self.factor.T)), np.zeros((3, 3))
+        for j in range(len(out) - 1, -1, -1):
             below = self.factor[1:, j] / self.factor[0, j]
             near = -window @ below
-            out[0, j] = 1 / self.factor[0, j] ** 2 - below @ near
-            out[1:, j] = near
+            out[j] = 1 / self.factor[0, j] ** 2 - below @ near
             window[1:, 1:] = window[:-1, :-1].copy()
-            window[0], window[:, 0] = out[:3, j], out[:3, j]
-        return self.variance * out
+            window[0], window[:, 0] = (out[j], *near[:2]), (out[j], *near[:2])
+        return out
 
-    def of_sum(self, row: FloatArray) -> float:
-        """Standard deviation of a sum of the values with these weights, (n,)."""
-        return float(np.sqrt(self.variance * (row @ cho_solve_banded((self.factor, True), row))))
+    @property
+    def shares(self) -> FloatArray:
+        """Of each datum in the curve there, (n,)."""
+        return self.weights * self.inverse
+
+    @property
+    def noise(self) -> float:
+        """Share of the Bayesian variance that is not bias."""
+        return 1 - BIAS * (1 - 3 / max(float(self.shares.sum()), 3.0))
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard deviation of each value, of its real part where it is complex, (n,)."""
+        return np.asarray(np.sqrt(self.variance * self.noise * self.inverse))
+
+    @property
+    def mean_error(self) -> float:
+        """Standard deviation of the mean of all values."""
+        even = np.full(len(self.weights), 1 / len(self.weights))
+        return float(np.sqrt(self.variance * (even @ cho_solve_banded((self.factor, True), even))))
 
 
 def stiffness(penalty: FloatArray) -> FloatArray:
@@ -73,57 +100,43 @@ def stiffness(penalty: FloatArray) -> FloatArray:
     return band
 
 
-def times(band: FloatArray, c: AnyArray) -> AnyArray:
-    """A symmetric matrix, given by its lower band, times vectors (n, …)."""
-    out = (band[0] * c.T).T
-    for below, line in enumerate(band[1:], start=1):
-        out[below:] += (line[:-below] * c[:-below].T).T
-        out[:-below] += (line[:-below] * c[below:].T).T
-    return np.asarray(out)
+def smooth(weights: FloatArray, data: AnyArray) -> Smoothed:
+    """Choose the stiffness of a curve through data (n,) of these weights (n,), 0 where there are none."""
+    n, columns = len(data) - 3, 2 if np.iscomplexobj(data) else 1
+    per, count = float(weights.mean()), max((int(np.count_nonzero(weights)) - 3) * columns, 1)
 
+    def solved(penalty: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        band = stiffness(penalty)
+        band[0] += weights
+        factor = cholesky_banded(band, lower=True)
+        return factor, cho_solve_banded((factor, True), right)
 
-def smooth(gram: FloatArray, right: AnyArray) -> tuple[Smoothing, AnyArray]:
-    """Choose the penalty of one curve, and draw it.
-
-    Parameters
-    ----------
-    gram
-        G, lower band (4, n); its diagonal is 0 where there are no data.
-    right
-        G z, real or complex, (n,).
-    """
-    n, real = len(right) - 3, np.ascontiguousarray(right).view(np.float64).reshape(len(right), -1)
-    per, columns = float(gram[0].mean()), real.shape[1]
-
-    def solved(penalty: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        factor = cholesky_banded(gram + stiffness(penalty), lower=True)
-        return factor, cho_solve_banded((factor, True), y)
-
-    data = solved(np.full(n, TRACE * per), real)[1]
+    real = np.ascontiguousarray(data).view(np.float64).reshape(len(data), -1)
+    bridged = solved(np.full(n, TRACE * per), weights[:, None] * real)[1]
     # parabolas, which no penalty changes, are taken off: stiff penalties would round them
     parabolas = np.linalg.qr(np.vander(np.linspace(-1, 1, n + 3), 3))[0]
-    trend = parabolas @ (parabolas.T @ data)
-    y, left = real - times(gram, trend), data - trend
-    count = max((int(np.count_nonzero(gram[0])) - 3) * columns, 1)
-    tiny = 1e-30 * np.vdot(data, real) + 1e-300
+    trend = parabolas @ (parabolas.T @ bridged)
+    left = bridged - trend
+    y = weights[:, None] * (real - trend)
+    tiny = 1e-30 * np.vdot(bridged, weights[:, None] * bridged) + 1e-300
 
-    def fitted(log: float) -> tuple[float, FloatArray, Smoothing]:
-        """Twice the negative log likelihood, the curve, and how it was made."""
+    def fitted(log: float) -> tuple[float, FloatArray, float, FloatArray]:
+        """Twice the negative log likelihood, the curve, s², the factor."""
         penalty = per * np.exp(log) * w
         factor, c = solved(penalty, y)
-        rest = np.vdot(left - c, times(gram, left - c)) + penalty @ (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
+        rest = weights @ ((left - c) ** 2).sum(axis=1) + penalty @ (np.diff(c, 3, axis=0) ** 2).sum(axis=1)
         variance = float(rest + tiny) / count
         value = columns * (2 * np.log(factor[0]).sum() - n * log) + count * np.log(variance)
-        return float(value), c, Smoothing(variance, factor)
+        return float(value), c, variance, factor
 
     log, w = MIDDLE, np.ones(n)
     for step in STEPS:
         places = log - step, log, log + step
         trials = [fitted(at) for at in places]
-        best = int(np.argmin([value for value, _, _ in trials]))
-        log, (_, c, smoothing) = places[best], trials[best]
+        best = int(np.argmin([trial[0] for trial in trials]))
+        log, (_, c, variance, factor) = places[best], trials[best]
         bend = uniform_filter1d((np.diff(c, 3, axis=0) ** 2).sum(axis=1), NEIGHBOURS, mode="constant")
-        likely = columns * smoothing.variance / (per * np.exp(log))
+        likely = columns * variance / (per * np.exp(log))
         w = 1 / (bend + EVENING * (bend.mean() + FEW * likely) + 1e-300)
         w /= np.exp(np.log(w).mean())
-    return smoothing, np.ascontiguousarray(c + trend).view(right.dtype)[:, 0]
+    return Smoothed(np.ascontiguousarray(c + trend).view(data.dtype)[:, 0], weights, variance, factor)

@@ -9,6 +9,7 @@ has an offset of its own, which is estimated: marks need not be even.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -23,13 +24,12 @@ HYSTERESIS = 0.15
 """Half of the band, over the height of the pulses."""
 SHARP = 0.9
 """Edges from one sample to the next are higher than this share of the pulses."""
-EXTREMES, SCATTER = (0.2, 99.8), (1, 99)
-"""Per cent of the samples between which the levels are, and of the pulses between which sharp edges scatter:
-over a sample, but for an offset of all of them."""
+EXTREMES = (0.2, 99.8)
+"""Per cent of the samples between which the levels are."""
 MOST_LEFT_OUT = 0.3
 """Share of pulses too many; more do not belong to a mark a turn."""
-UNEVEN = 0.015
-"""Turns, and a sample; pulses that scatter by more are of several marks, or of no mark."""
+UNEVEN = 0.005
+"""Turns, and half a sample: pulses that scatter by more are worn, of several marks, or of no mark."""
 RESTING = 0.5
 """Share of the samples that are within the band where the level is no edge but where the signal rests."""
 LEAST_PULSES, LEAST_TURNS = 8, 2
@@ -38,8 +38,9 @@ WINDOW = 25
 SKIPPED, OFF = 4, 0.25
 """At most so many pulses in a row are too many; a period that is off a whole number of usual ones by so much
 is as bad as a pulse too many or a missing one."""
-UNCOUNTED, SILENT = 0.3, 12.5
-"""Where pulses are missing a period is a whole number of usual ones, but for this; not more than so many."""
+NEAR, UNCOUNTED, SILENT = 4, 0.3, 12.5
+"""Where pulses are missing a period is a whole number of usual ones, of so many turns on both sides, but for
+this; not more than so many."""
 LONGEST_MARK = (0.45, 0.55)
 """Between these shares of a turn the mark may be either level."""
 ROUNDS = 3
@@ -69,13 +70,14 @@ class Tacho:
         Standard deviation of a pulse, degrees of a turn (median over the record).
     offset_s
         Standard deviation of all pulses together, that of their mean: sharp edges are somewhere between two
-        samples, and at a speed that goes with the sampling rate no pulse tells more than another.
+        samples, and at a speed that goes with the sampling rate many pulses tell no more than a few: it is
+        that of the widest part of a sample in which there is no edge.
     warnings
         What the user should know.
     angle
         Turns over time, s.
-    errors
-        Standard deviation of the angle, turns, at its knots.
+    errors, widths
+        Standard deviation of the angle, turns, at its knots, and over how many turns it is a mean.
     indexed
         Whether angle 0 is the same in every record: not with several even pulses a turn.
     """
@@ -91,6 +93,7 @@ class Tacho:
     warnings: tuple[str, ...]
     angle: CubicSpline
     errors: FloatArray
+    widths: FloatArray
     indexed: bool
 
     @property
@@ -102,13 +105,18 @@ class Tacho:
         """Turns (whole where the mark passes) at times within the span, s."""
         return np.asarray(self.angle(t))
 
+    def time_at(self, turns: FloatArray) -> FloatArray:
+        """Times of turns, s."""
+        return np.asarray(np.interp(turns, self.turn_at(self.angle.x), self.angle.x))
+
     def speed_at(self, t: FloatArray) -> FloatArray:
         """Turns per s."""
         return np.asarray(self.angle(t, 1))
 
-    def error_at(self, t: FloatArray) -> FloatArray:
-        """Standard deviation, turns."""
-        return np.interp(t, self.angle.x, self.errors)
+    def error_at(self, t: FloatArray, over: FloatArray | float = 0.0) -> FloatArray:
+        """Standard deviation, turns; of the mean over some turns less: squares of widths of means add."""
+        error, width = (np.interp(t, self.angle.x, each) for each in (self.errors, self.widths))
+        return np.asarray(error / (1 + (over / width) ** 2) ** 0.25)
 
 
 def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
@@ -139,32 +147,32 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         )
     every, words = _marks(rising / rate, falling / rate, settings.edge)
     kept, index = _counted(every, pulses, channel.name)
-    times, grid = every[kept], np.arange(index[-1] + 1)
-    lost, kind = np.setdiff1d(grid, index), index % pulses
-    many = np.bincount(kind, minlength=pulses)
-    edges, sampled = np.sort(np.concatenate((rising, falling))) / rate, sharp / (12 * rate**2)
+    times, kind, double = every[kept], index % pulses, np.delete(every, kept)
+    edges = np.sort(np.concatenate((rising, falling))) / rate
     other = edges[np.minimum(np.searchsorted(edges, times, "right"), len(edges) - 1)]
-    angle, errors, offsets, ahead, worn = _angle(times, other, index, pulses, sampled)
-    speed = angle(times, 1)
-    jitter = float(np.sqrt(np.median(sampled * speed**2 + worn)))
-    # the turn begins after the longest gap, of a tooth that is not there, say
+    fit = _fitted(times, other, index, pulses, sharp / (12 * rate**2))
+    speed = fit.angle(times, 1)
+    jitter = float(np.sqrt(np.median(fit.variance)))
+    many = np.bincount(kind, minlength=pulses)
     present = np.flatnonzero(many >= RARE * many.max())
-    marks = present / pulses + offsets[present]
+    # the turn begins after the longest gap, of a tooth that is not there, say
+    marks = present / pulses + fit.offsets[present]
     gaps = np.diff(marks, append=marks[0] + 1)
     second, first = np.sort(np.append(gaps, 0))[-2:]
     clear = EVEN / pulses + CLEARLY * jitter * np.sqrt(2 / many[present].min())
     indexed = pulses == 1 or bool(first - second > clear)
     begin = marks[(gaps.argmax() + 1) % len(marks)] if indexed else 0.0
+    fit.angle.c[-1] -= begin
+    lost = np.setdiff1d(np.arange(index[-1] + 1), index)
     lost = lost[np.isin(lost % pulses, present)]
-    angle.c[-1] -= begin
-    seen = float(np.ptp(np.percentile((ahead / speed)[kind == present[0]], SCATTER)))
-    unseen = sharp * max(0.0, 1 / rate - seen) / np.sqrt(12)
-    if jitter > UNEVEN + np.median(speed) / rate:
+    places = np.sort((fit.ahead / speed * rate)[kind == present[0]] % 1)
+    unseen = sharp * np.diff(places, append=places[0] + 1).max() / rate / np.sqrt(12)
+    if jitter > UNEVEN + np.median(speed) / rate / 2:
         words.append(
             f"the tacho's pulses scatter by {360 * jitter:.2g}° around even turns: are there other marks "
-            f"than {counted(pulses, 'pulse')} a turn (pulses), or is it noise (tacho_level)?"
+            f"than {counted(pulses, 'pulse')} a turn (pulses), is a mark worn, or is it noise (tacho_level)? "
+            f"Along the record phases of 1× are uncertain by ± {360 * np.median(fit.errors):.2g}°"
         )
-    double = np.delete(every, kept)
     damage = (len(lost), "missing, which were bridged"), (len(double), "too many, which were left out")
     if damaged := " and ".join(f"{counted(n, 'pulse')} of the tacho {verb}" for n, verb in damage if n):
         share = 100 * (len(lost) + len(double)) / len(index)
@@ -176,55 +184,66 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         )
     return Tacho(
         times=times,
-        turns=index / pulses + offsets[kind] - begin,
+        turns=index / pulses + fit.offsets[kind] - begin,
         missing=lost / pulses - begin,
         double=double,
         level=level,
         hysteresis=band,
         jitter_deg=360 * jitter,
-        offset_s=float(np.hypot(unseen, np.sqrt(worn / len(times)) / np.median(speed))),
+        offset_s=float(np.hypot(unseen, np.sqrt(fit.worn / len(times)) / np.median(speed))),
         warnings=tuple(words),
-        angle=angle,
-        errors=errors,
+        angle=fit.angle,
+        errors=fit.errors,
+        widths=fit.widths,
         indexed=indexed,
     )
 
 
-def _angle(
-    times: FloatArray, other: FloatArray, index: IntArray, pulses: int, sampled: float
-) -> tuple[CubicSpline, FloatArray, FloatArray, FloatArray, float]:
-    """The angle, its errors, offsets of the pulses of a turn, and what pulses are ahead of it, in turns.
+class _Fit(NamedTuple):
+    """The angle, its errors and widths; offsets of a turn's pulses; pulses less the angle and their variance.
 
-    And the variance of the marks, turns²; `sampled` is that of the times, s², `other` those of the marks'
-    other edges.
+    In turns²; and the variance of worn marks.
+    """
+
+    angle: CubicSpline
+    errors: FloatArray
+    widths: FloatArray
+    offsets: FloatArray
+    ahead: FloatArray
+    variance: FloatArray
+    worn: float
+
+
+def _fitted(times: FloatArray, other: FloatArray, index: IntArray, pulses: int, sampled: float) -> _Fit:
+    """The angle of pulses with these numbers; `sampled` is the variance of their times, s².
+
+    `other` are the marks' other edges, which tell as much, where they keep their distance.
     """
     grid, kind = np.arange(index[-1] + 1), index % pulses
-    trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
-    place, speed = np.interp(grid, index, times), trend.deriv()(times)
-    offsets, angle = np.zeros(pulses), trend
-    variance, gram = np.mean(speed**2) + 0 * speed, np.zeros((4, len(grid)))
-    right = np.zeros(len(grid))
+    many = np.maximum(np.bincount(kind, minlength=pulses), 1)
+    angle = trend = np.polynomial.Polynomial.fit(times, index / pulses, 2)
+    place, offsets = np.interp(grid, index, times), np.zeros(pulses)
+    variance = np.full(len(times), np.mean(trend.deriv()(times) ** 2))
+    weights, data = np.zeros((2, len(grid)))
     for _ in range(ROUNDS):
-        gram[0, index] = 1 / variance
-        ahead = index / pulses + offsets[kind] - trend(times)
-        # the mark's other edge tells as much, where it keeps its distance
         apart = angle(other) - angle(times)
         apart -= np.median(apart)
         usual = np.abs(apart) < WIDE * np.median(np.abs(apart)) + EXACT
         early, late = np.array_split(apart[usual], 2)
         if np.abs(early.mean() - late.mean()) > WIDE * np.std(apart[usual]) / np.sqrt(len(early)):
             usual[:] = False
-        right[index] = (ahead - usual * apart / 2) / variance
-        smoothing, course = smooth(gram, right)
-        angle = CubicSpline(place, course + trend(place))
-        ahead -= course[index]
-        offsets -= np.bincount(kind, ahead, pulses) / np.maximum(np.bincount(kind, minlength=pulses), 1)
+        ahead = index / pulses + offsets[kind] - trend(times)
+        weights[index], data[index] = 1 / variance, ahead - usual * apart / 2
+        curve = smooth(weights, data)
+        angle = CubicSpline(place, curve.curve + trend(place))
+        ahead -= curve.curve[index]
+        offsets -= np.bincount(kind, ahead, pulses) / many
         offsets -= offsets[0]
-        speed = angle(times, 1)
-        scatter = np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean()
-        worn = max(0.0, scatter - sampled * np.mean(speed**2))
-        variance = sampled * speed**2 + worn + EXACT**2
-    return angle, np.sqrt(smoothing.covariance[0]), offsets, ahead, worn
+        edge = sampled * angle(times, 1) ** 2
+        worn = max(0.0, np.minimum(ahead**2, OUTLYING * np.median(ahead**2)).mean() - edge.mean())
+        variance = edge + worn + EXACT**2
+    widths = 1 / (pulses * np.maximum(curve.shares, EXACT))
+    return _Fit(angle, curve.errors, widths, offsets, ahead, variance, worn)
 
 
 def _levels(channel: Channel, settings: TachoSettings) -> tuple[float, float]:
@@ -309,14 +328,20 @@ def _counted(begin: FloatArray, pulses: int, name: str) -> tuple[IntArray, IntAr
             f"{counted(pulses, 'pulse')} a turn do: is that number right, and the tacho_level (where marks "
             "bounce, or differ in height)?"
         )
-    ratio = np.diff(begin[kept]) / usual[kept[:-1]]
-    count = np.maximum(np.rint(ratio), 1)
+    times = begin[kept]
+    apart = np.diff(times)
+    count = np.maximum(np.rint(apart / usual[kept[:-1]]), 1)
+    index = np.append(0, np.cumsum(count)).astype(np.int64)
+    # the usual period beside each, by these numbers: a wheel that lacks a tooth has fewer pulses a turn
+    here = np.arange(len(apart))
+    low, high = np.maximum(here - NEAR * pulses, 0), np.minimum(here + 1 + NEAR * pulses, len(apart))
+    ratio = apart * (index[high] - index[low] - count) / (times[high] - times[low] - apart)
     unclear = (count > 1) & (np.abs(ratio - count) > UNCOUNTED) | (count > SILENT)
     if unclear.any():
         i = int(unclear.argmax())
         raise ValueError(
-            f"the tacho {name!r} is silent from {begin[kept[i]]:.4g} to {begin[kept[i + 1]]:.4g} s, about "
+            f"the tacho {name!r} is silent from {times[i]:.4g} to {times[i + 1]:.4g} s, about "
             f"{ratio[i]:.1f} pulses: turns cannot be counted over this, so that phases before and after "
             "do not belong together; cut the record there"
         )
-    return kept, np.concatenate(([0], np.cumsum(count))).astype(np.int64)
+    return kept, index

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import interp1d
+from scipy.interpolate import CubicSpline, interp1d
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.waveforms.order_tracking import Orders, track_orders
@@ -128,58 +128,45 @@ def _found(
     if record.tacho is None:
         raise ValueError("a tacho channel is needed: without one there are no turns, and no phase")
     tacho = read_tacho(record.tacho, record.rate, settings)
-    words = [*tacho.warnings, *(word for sensor in record.sensors for word in _checked(sensor))]
-    course = tacho.speed_at(np.linspace(*tacho.span, 2 + len(tacho.times)))
+    clipped = [word for sensor in record.sensors for word in _checked(sensor)]
+    means, ends = _means(tacho, settings.pulses), tacho.turn_at(np.array(tacho.span))
+    steady = bool(np.ptp(means) < STEADY * means.mean())
+    course = means if steady else tacho.speed_at(np.linspace(*tacho.span, 2 + len(tacho.times)))
     if max(orders) * course.max() > HIGHEST * record.rate:
         raise ValueError(
             f"{max(orders)}× is {max(orders) * course.max():.4g} Hz at the highest speed, beyond "
             f"{HIGHEST:g} of the {record.rate:.6g} samples a second"
         )
-    means = _means(tacho, settings.pulses)
-    steady = bool(np.ptp(means) < STEADY * means.mean())
     tracked = track_orders(record, tacho, max(orders))
-    first, last = tacho.turn_at(np.array(tacho.span))
+    times = None if speeds is None else np.array([_passed(tacho, course, speed) for speed in speeds])
     if steady:
-        course = np.clip(course, means.min(), means.max())
-    if speeds is not None:
-        times = _passed(tacho, course, speeds)
+        times = np.full(1 if times is None else len(times), np.mean(tacho.span))
+        along, shaft = (
+            tracked.averaged(ends),
+            replace(tacho, angle=CubicSpline(tacho.span, ends), errors=np.zeros(2), widths=np.ones(2)),
+        )
     else:
-        times = np.array([np.mean(tacho.span)]) if steady else _independent(tacho, tracked)
-    turns = tacho.turn_at(times)
-    wide = np.interp(turns, tracked.centres, tracked.width)
-    wanted, speed, drawn = list(orders), tacho.speed_at(times), tacho.error_at(times)
-    edge = np.minimum(turns - first, last - turns) < wide / 2 * (1 - 1e-9)
+        along, shaft, times = tracked, tacho, _independent(tacho, tracked, ends) if times is None else times
+    turns, speed = shaft.turn_at(times), shaft.speed_at(times)
+    wide = np.interp(turns, along.centres, along.width)
     around = np.clip(times + np.multiply.outer((-0.5, 0.5), wide / speed), *tacho.span)
-    rise = np.diff(tacho.speed_at(around), axis=0)[0] / np.diff(around, axis=0)[0]
-    read, change = tracked.curve(turns), tracked.curve(turns, 1) * speed[:, None, None]
-    inside = np.clip(turns, tracked.centres[0], tracked.centres[-1])
-    deviation = interp1d(tracked.centres, tracked.errors[:, wanted], axis=0)(inside)
-    if steady:
-        wide, edge = np.full(len(times), last - first), np.zeros(len(times), dtype=bool)
-        speed = wide / np.ptp(tacho.span)
-        read, change = np.broadcast_to(tracked.mean, read.shape), 0 * read
-        deviation = np.broadcast_to(tracked.mean_errors[wanted], deviation.shape)
-        rise, drawn = 0 * rise, 0 * drawn
-    w = 2 * np.pi * np.multiply.outer(speed, orders)
-    same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
-    direct = np.array([sensor.path.high_pass_rad_s is None for sensor in record.sensors])
-    vectors, radial = read[:, wanted], deviation.copy()
+    rise = np.diff(shaft.speed_at(around), axis=0)[0] / np.diff(around, axis=0)[0]
+    read, change = along.curve(turns), along.curve(turns, 1) * speed[:, None, None]
+    inside, wanted = np.clip(turns, along.centres[0], along.centres[-1]), list(orders)
+    radial = interp1d(along.centres, along.errors[:, wanted], axis=0)(inside)
+    w, vectors = 2 * np.pi * np.multiply.outer(speed, orders), read[:, wanted]
     for c, sensor in enumerate(record.sensors):
         more = 0 if derivative is None or sensor.derivative is None else sensor.derivative - derivative
-        vectors[:, :, c], factor = before_path(
-            response(sensor.path, more),
-            vectors[:, :, c],
-            change[:, wanted, c],
-            w,
-            w * (rise / speed)[:, None],
-        )
+        H, rates = response(sensor.path, more), w * (rise / speed)[:, None]
+        vectors[:, :, c], factor = before_path(H, vectors[:, :, c], change[:, wanted, c], w, rates)
         radial[:, :, c] *= factor
     vectors, radial = vectors.swapaxes(1, 2), radial.swapaxes(1, 2)
-    angle = 2 * np.pi * np.hypot(drawn, tacho.offset_s * speed)
-    tangential = np.hypot(radial, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None])
+    angle = 2 * np.pi * np.hypot(shaft.error_at(times, wide), tacho.offset_s * speed)
+    same = np.array([derivative in (None, sensor.derivative) for sensor in record.sensors])
+    direct = np.array([sensor.path.high_pass_rad_s is None for sensor in record.sensors])
     spans = zip(times, np.maximum(wide, LEAST_TURNS) / speed, strict=True)
     overall = np.array([_overall(record, *each) for each in spans])
-    words += _doubts(record, vectors[:, :, 0], radial[:, :, 0], tracked, tacho.jitter_deg if steady else None)
+    doubts = _doubts(record, vectors[:, :, 0], radial[:, :, 0], tracked, tacho.jitter_deg if steady else None)
     return Vectors(
         run=record.run,
         sensors=tuple(sensor.name for sensor in record.sensors),
@@ -188,15 +175,15 @@ def _found(
         speeds=2 * np.pi * speed,
         vectors=vectors,
         radial=radial,
-        tangential=tangential,
+        tangential=np.hypot(radial, np.abs(vectors) * np.multiply.outer(angle, orders)[:, None]),
         turns=wide,
         overall=np.where(same[:, None], overall, np.nan),
         gap=np.where(same & direct, read[:, 0].real, np.nan),
-        end=edge,
+        end=np.minimum(turns - ends[0], ends[1] - turns) < wide / 2 * (1 - 1e-9),
         steady=steady,
         range=2 * np.pi * np.array([course.min(), course.max()]),
         tacho=tacho,
-        warnings=tuple(words),
+        warnings=(*tacho.warnings, *clipped, *doubts),
     )
 
 
@@ -207,33 +194,27 @@ def _means(tacho: Tacho, pulses: int) -> FloatArray:
     return np.asarray(np.diff(tacho.turns[::step]) / np.diff(tacho.times[::step]))
 
 
-def _independent(tacho: Tacho, tracked: Orders) -> FloatArray:
+def _independent(tacho: Tacho, tracked: Orders, ends: FloatArray) -> FloatArray:
     """Times of vectors that share no turns, the first and the last half their turns from the ends."""
-    first, last = tacho.turn_at(np.array(tacho.span))
-    blocks = np.linspace(first, last, len(tracked.width) + 1)
+    blocks = np.linspace(ends[0], ends[1], len(tracked.width) + 1)
     number = np.append(0.0, np.cumsum(np.diff(blocks) / tracked.width))
     count = max(2, int(number[-1]))
-    turns = np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks)
-    return np.asarray(np.interp(turns, tacho.turn_at(tacho.angle.x), tacho.angle.x))
+    return tacho.time_at(np.interp((np.arange(count) + 0.5) * number[-1] / count, number, blocks))
 
 
-def _passed(tacho: Tacho, course: FloatArray, speeds: FloatArray) -> FloatArray:
-    """Times at which the speed first is each of these, rad/s."""
-    at, times = np.linspace(*tacho.span, len(course)), []
-    for speed in speeds / (2 * np.pi):
-        if not course.min() * (1 - STEADY / 2) <= speed <= course.max() * (1 + STEADY / 2):
-            raise ValueError(
-                f"there is no speed of {speed * 60:.6g} rpm: the record runs from {course.min() * 60:.6g} to "
-                f"{course.max() * 60:.6g} rpm"
-            )
-        above = course >= speed
-        change = np.flatnonzero(above[1:] != above[:-1])
-        if len(change):
-            i = int(change[0])
-            times.append(at[i] + (speed - course[i]) / (course[i + 1] - course[i]) * (at[i + 1] - at[i]))
-        else:
-            times.append(at[np.abs(course - speed).argmin()])
-    return np.array(times)
+def _passed(tacho: Tacho, course: FloatArray, speed: float) -> float:
+    """The time at which the speed first is this, rad/s; of turns per s between which the record runs."""
+    wanted = speed / (2 * np.pi)
+    if not course.min() * (1 - STEADY / 2) <= wanted <= course.max() * (1 + STEADY / 2):
+        raise ValueError(
+            f"there is no speed of {wanted * 60:.6g} rpm: the record runs from {course.min() * 60:.6g} to "
+            f"{course.max() * 60:.6g} rpm"
+        )
+    passed = tacho.angle.derivative().solve(wanted, extrapolate=False)
+    if len(passed):
+        return float(passed[0])
+    times = np.linspace(*tacho.span, len(course))
+    return float(times[np.abs(course - wanted).argmin()])
 
 
 def _overall(record: WaveformRecord, time: float, around: float) -> FloatArray:

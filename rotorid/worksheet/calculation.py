@@ -39,7 +39,7 @@ _read: dict[str, int] = {}
 
 def main() -> None:
     """Answer requests until standard input ends."""
-    from rotorid.tables.reader.input_file import reading
+    from rotorid.files.input_file import reading
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reading.set(_noted)
@@ -59,7 +59,7 @@ def _noted(path: Path) -> None:
 
 
 def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]:
-    from rotorid.tables.reader.problems import InputError
+    from rotorid.files.problems import InputError
 
     try:
         os.chdir(folder)  # each time: another one may have been put in its place
@@ -87,10 +87,10 @@ def _balance(job: str, version: int, kind: str) -> Balance:
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run."""
+    from rotorid.files.problems import Problems
     from rotorid.tables.job.job_data import Overrides
     from rotorid.tables.job.job_from_excel import open_job
     from rotorid.tables.job.job_reading import job_of
-    from rotorid.tables.reader.problems import Problems
 
     problems = Problems()
     written = open_job(path, problems)
@@ -168,8 +168,8 @@ def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, A
 def convention(phase: str, angles: str) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
     from balancing import Labels
+    from rotorid.files.conventions import as_angles, as_phase
     from rotorid.report import conventions_explained as explained
-    from rotorid.tables.runs.stated_conventions import as_angles, as_phase
 
     labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
     title = f"phase {phase}, angles {angles}"
@@ -183,11 +183,11 @@ def rows(name: str, data: str, phase: str) -> dict[str, Any]:
     A file that says that its phases are others than the job's, `phase`, is refused.
     """
     from balancing import Labels
-    from rotorid.tables.reader.grid import show
-    from rotorid.tables.reader.input_file import each_file_once
-    from rotorid.tables.reader.problems import Problems
-    from rotorid.tables.runs.instrument_export import read_runs_grid
-    from rotorid.tables.runs.stated_conventions import Conventions, as_phase
+    from rotorid.files.conventions import Conventions, as_phase
+    from rotorid.files.grid import show
+    from rotorid.files.input_file import each_file_once
+    from rotorid.files.layout import read_runs_grid
+    from rotorid.files.problems import Problems
 
     problems, path = Problems(), Path(name)
     conventions = Conventions(Labels(phase=as_phase(phase)))

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorid.base.text import listing
-from rotorid.tables.job.job_keys import TABLES
-from rotorid.tables.reader.excel_workbook import SUFFIXES, is_workbook
-from rotorid.tables.reader.grid import clean
-from rotorid.tables.reader.input_file import MOST_BYTES, file_content, first_bytes
-from rotorid.tables.reader.problems import InputError
-from rotorid.tables.reader.table_writing import write_files
+from rotorid.files.excel_workbook import SUFFIXES, is_workbook
+from rotorid.files.grid import clean
+from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
+from rotorid.files.problems import InputError
+from rotorid.files.table_writing import write_files
+from rotorid.tables.job.job_keys import named_tables
 from rotorid.worksheet.settings_cells import changed, setting, settings_in
 from rotorid.worksheet.text_cells import KEYS, Cells, TextCells, kept_ids
 from rotorid.worksheet.workbook_cells import WorkbookVersion
@@ -68,8 +68,7 @@ class FilesVersion:
             self.settings = settings_in(self._text)
         except ValueError as error:
             self.read_only = f"{job.name} cannot be read, correct it there: {error}"
-        for key in (*TABLES, "rotor"):
-            name = self.settings.get(key)
+        for key, name in (*named_tables(self.settings).items(), ("rotor", self.settings.get("rotor"))):
             if isinstance(name, str) and name.isprintable():
                 self._open(key, job.parent / name)
 

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     from balancing import Trials
     from rotorid.base.arrays import FloatArray
-    from rotorid.tables.reader.columns import Source, Table
-    from rotorid.tables.reader.grid import Grid
-    from rotorid.tables.reader.settings_keys import Said
-    from rotorid.tables.runs.stated_conventions import Conventions
+    from rotorid.files.columns import Source, Table
+    from rotorid.files.conventions import Conventions
+    from rotorid.files.grid import Grid
+    from rotorid.files.settings_keys import Said
 
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?")
 LEVELS = ("none", "weak", "good")
@@ -150,15 +150,15 @@ def runs_so_far(job: Path) -> RunsSoFar:
     InputError
         If there is no job with a runs table.
     """
+    from rotorid.files.columns import make_table, read_grid
+    from rotorid.files.layout import read_runs_grid
+    from rotorid.files.problems import Problems
+    from rotorid.files.runs import COLUMNS
+    from rotorid.files.settings_keys import take
     from rotorid.tables.job.job_data import Overrides
     from rotorid.tables.job.job_from_excel import open_job
     from rotorid.tables.job.job_keys import JOB
     from rotorid.tables.job.readings import conventions_of
-    from rotorid.tables.reader.columns import make_table, read_grid
-    from rotorid.tables.reader.problems import Problems
-    from rotorid.tables.reader.settings_keys import take
-    from rotorid.tables.runs.instrument_export import read_runs_grid
-    from rotorid.tables.runs.runs_table import COLUMNS
 
     problems = Problems()
     written = open_job(job, problems)
@@ -205,9 +205,9 @@ def _channels(
 ) -> Iterator[Channel]:
     """Each sensor at each speed that can be read by itself."""
     from balancing import reading_of
-    from rotorid.tables.reader.problems import Problems
+    from rotorid.files.problems import Problems
+    from rotorid.files.runs import make_trials
     from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
-    from rotorid.tables.runs.trials import make_trials
 
     def read(part: Grid) -> Trials | None:
         trials = make_trials(part, None, conventions, said["errors"], Problems())
@@ -227,7 +227,7 @@ def _channels(
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:
     """Indices of the finished rows of each speed and sensor."""
-    from rotorid.tables.runs.speed_merging import same_speed
+    from rotorid.files.speeds import same_speed
 
     found: dict[tuple[float, str], list[int]] = {}
     speed, run, sensor = table.numbers("speed"), table.texts("run"), table.texts("sensor")

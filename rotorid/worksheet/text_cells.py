@@ -7,23 +7,22 @@ import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import SequenceMatcher
-from functools import partial
 from pathlib import Path
 
 from rotorid.base.tables import guarded
+from rotorid.files import runs as runs_table
+from rotorid.files import weights as weights_table
+from rotorid.files.columns import REMARKS, column_of
+from rotorid.files.decimal_numbers import decimal_comma, has_decimal_comma
+from rotorid.files.grid import Grid, clean, show
+from rotorid.files.layout import text_from_header
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.text_file import SEP_LINE, decode_as, parse_text
 from rotorid.tables.job.job_keys import READINGS
 from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS
-from rotorid.tables.reader.columns import REMARKS, column_of
-from rotorid.tables.reader.decimal_numbers import decimal_comma, has_decimal_comma
-from rotorid.tables.reader.grid import Grid, clean, show
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.text_file import SEP_LINE, decode_as, parse_text, text_from_header
-from rotorid.tables.runs import runs_table, weights_table
-from rotorid.tables.runs.column_headings import looks_like_header
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""
-IS_HEADER = partial(looks_like_header, named={})
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 _MARKS = {"utf-16-le": codecs.BOM_UTF16_LE, "utf-16-be": codecs.BOM_UTF16_BE}
 
@@ -130,7 +129,7 @@ class TextCells(Cells):
         parts = re.split(r"(\r\n|\n|\r)", text)
         self.lines, self._ends = parts[::2], [*parts[1::2], ""]
         first = 1 if SEP_LINE.fullmatch(self.lines[0].strip(" \ufeff")) else 0
-        shaped = text_from_header(text, IS_HEADER) if table in READINGS else text
+        shaped = text_from_header(text, {}) if table in READINGS else text
         grid = None if len(problems) else parse_text(path.name, shaped, problems, may_be_empty=True)
         self.separator = "," if grid is None else grid.separator
         self._width = 0 if grid is None else len(self._split(grid.header_row + first - 1))

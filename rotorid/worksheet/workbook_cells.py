@@ -15,17 +15,18 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import now
+from rotorid.files.columns import sheet_source
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma
+from rotorid.files.excel_pages import Line, header_row, keep_cells, put
+from rotorid.files.excel_workbook import find_sheet, sheets_in
+from rotorid.files.grid import Cell, Row, clean, make_grid, show
+from rotorid.files.layout import rows_from_header
+from rotorid.files.problems import InputError, Problems
 from rotorid.tables.job.job_from_excel import NAMED, OPTIONAL, SETTINGS, job_in_sheets, key_parts
 from rotorid.tables.job.job_keys import CELLS, READINGS
 from rotorid.tables.job.workbook_sheets import dotted_key, number_cell, setting_cell
-from rotorid.tables.reader.columns import sheet_source
-from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma
-from rotorid.tables.reader.excel_pages import Line, header_row, put, sized
-from rotorid.tables.reader.excel_workbook import find_sheet, sheets_in
-from rotorid.tables.reader.grid import Cell, Row, clean, from_header, make_grid, show
-from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.worksheet.settings_cells import setting, with_setting
-from rotorid.worksheet.text_cells import IS_HEADER, KEYS, Cells, is_text
+from rotorid.worksheet.text_cells import KEYS, Cells, is_text
 
 _LOST = re.compile(
     r"xl/(charts|media|embeddings|activeX|ctrlProps|slicers|drawings/d|externalL|vba|threaded)"
@@ -43,7 +44,7 @@ class SheetCells(Cells):
         for number, cells in rows:
             self._cells[number - 1] = [getattr(cell, "text", show(cell)) for cell in cells]
         self.lines = [repr(cells) for cells in self._cells]
-        shaped = from_header(list(rows), IS_HEADER) if table in READINGS else rows
+        shaped = rows_from_header(rows, {}) if table in READINGS else rows
         self.fill(table, make_grid(name, shaped, "", problems, may_be_empty=True), problems, 0)
 
     def cells(self, index: int) -> list[str]:
@@ -174,12 +175,7 @@ class WorkbookVersion:
         """The workbook, if it is not as it was."""
         if "_book" not in vars(self):
             return {}
-        for sheet in self._book.worksheets:
-            for cell in (cell for row in sheet.iter_rows() for cell in row):
-                if cell.comment is not None:  # openpyxl does not read its size
-                    sized(cell.comment)
-                if isinstance(cell.value, float):  # nor would it write 17 digits
-                    put(cell, cell.value, sheet.title)
+        keep_cells(self._book)
         self._book.properties.modified = now().replace(tzinfo=None)
         return {self.job: workbook_bytes(self._book)}
 

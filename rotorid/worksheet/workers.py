@@ -22,7 +22,7 @@ class Refused(ValueError):
     Attributes
     ----------
     problems
-        As `tables.reader.problems.Problem` has them, with their text.
+        As `files.problems.Problem` has them, with their text.
     """
 
     def __init__(self, sentence: str, problems: list[dict[str, Any]]) -> None:

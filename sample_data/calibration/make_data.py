@@ -1,7 +1,6 @@
 """Write the data of this folder: `python make_data.py`. The machine is the compressor with other numbers.
 
-The seeds are fixed: the same numbers on every run. What the machine really is stands in MACHINE and TURNED;
-the critical speeds are those of `../rotor23.csv` on SUPPORTS.
+The seeds are fixed: the same numbers on every run. What the machine really is stands in MACHINE and TURNED.
 """
 
 from __future__ import annotations
@@ -40,8 +39,6 @@ IMPELLERS = tuple(f"impeller {k}" for k in range(1, 6))
 SPEEDS = np.array([3000.0, 4000.0, 5000.0, 6500.0])
 TRIAL = {"impeller 1": (2000.0, 0.0), "impeller 5": (2000.0, 90.0)}  # g·mm, degrees
 AMPLITUDE, PHASE, RUN = 0.01, np.radians(1.0), 0.02
-SUPPORTS = {"bearing[1].stiffness": 6e7, "bearing[2].stiffness": 8e7}
-CRITICAL = 0.002
 
 
 def main() -> None:
@@ -67,7 +64,6 @@ def main() -> None:
     rows = [f"trial,{plane},{mass:g},{angle:g}" for plane, (mass, angle) in TRIAL.items()]
     text = "\n".join(["run,plane,unbalance_g_mm,angle_deg", *rows])
     (HERE / "weights.csv").write_text(text + "\n", encoding="utf-8")
-    write_critical_speeds()
 
 
 def write(file: str, runs: dict[str, np.ndarray]) -> None:
@@ -79,16 +75,6 @@ def write(file: str, runs: dict[str, np.ndarray]) -> None:
                 lag = -np.degrees(np.angle(z)) % 360
                 lines.append(f"{run},{speed:.0f},{sensor},{abs(z):.3g},{lag:.1f}")
     (HERE / file).write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def write_critical_speeds() -> None:
-    """The first three of the other rotor, as read from a run-up."""
-    rotor = with_parameters(read_rotor(HERE.parent / "rotor23.csv"), SUPPORTS)
-    speeds = fem.critical_speeds(rotor, 3).frequencies * 30 / np.pi
-    speeds = speeds * (1 + CRITICAL * np.random.default_rng(8).standard_normal(3))
-    rows = [f"{mode},{speed:.0f},{100 * CRITICAL:g}" for mode, speed in enumerate(speeds, start=1)]
-    text = "\n".join(["mode,critical_speed_rpm,std_percent", *rows])
-    (HERE / "critical.csv").write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -126,7 +126,7 @@ def two_planes(ratio, seed=0):
 @pytest.mark.parametrize("ratio", [1.0, 0.6 + 0.5j])
 def test_what_two_planes_do_together_is_determined_and_told_first(ratio):
     told, inside = 0, 0
-    for seed in range(40):
+    for seed in range(50):
         trials, D = two_planes(ratio, seed)
         c = correct(estimate_influence(trials), refuse=False)
         if not c.combination:
@@ -134,7 +134,6 @@ def test_what_two_planes_do_together_is_determined_and_told_first(ratio):
         told += 1
         first = c.sentence().replace("Static", "static").replace("Planes", "planes")
         assert c.combination in first
-        assert c.combination in c.to_dict()["notes"]
         assert ("static part" in c.combination) == (ratio == 1)
         assert not any("act alike" in words for words in c.warnings)
         # the statement by its printed numbers, against the truth

@@ -61,7 +61,7 @@ def test_where_weights_fight_what_is_proposed_is_better():
         if W.shape[-1] == 1:
             continue
         c = correct(estimate_influence(trials), refuse=False)
-        if c.decision.word == "mount":
+        if c.decision.word in ("mount", "determined in part"):
             continue
         ours.append(left(W, Y0, c.planes, c.decision.choices[0]))
         theirs.append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
@@ -83,7 +83,8 @@ def test_weak_trial_weights_are_told_from_good_ones():
             c = correct(estimate_influence(trials), method="least-squares")
         except UndeterminedError:
             continue
-        found[c.decision.word].append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
+        word = "mount" if c.decision.word == "determined in part" else c.decision.word
+        found[word].append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
     assert min(len(each) for each in found.values()) > 11
     assert np.mean(np.array(found["mount"]) < 1) == 1
     assert np.median(found["do not mount"]) > 2 * np.median(found["mount"])
@@ -109,7 +110,7 @@ def test_limits_leave_choices_and_trial_weights_out():
     assert any("repeat the trial run of plane 'A' with" in w for w in free)
     limits = Limits(np.array([0.05, 0.05]) * GRAM, np.full((1, 5), np.inf), ((), ()))
     bound = replace(inputs, limits=limits)
-    assert not bound.fewer()
+    assert not bound.fewer
     assert any(
         "leave plane 'A' out: a clear trial weight would be larger than its largest" in w
         for w in remedies(bound)
@@ -203,7 +204,14 @@ def test_no_answer_calls_planes_not_determined_and_mounts_their_weights():
         trials, W, _ = simulated(rng, alike=(0.05, 0.1, 0.3)[i % 3])
         if W.shape[-1] > 1:
             c = correct(estimate_influence(trials), refuse=False)
-            open_ = any("weights are not determined" in w for w in c.warnings)
-            assert not (open_ and c.decision.word == "mount")
+            assert not any("act alike" in w for w in c.warnings), "the judgement says it"
+            if c.decision.word == "mount":
+                assert "not determined" not in c.sentence()
+                assert not c.combination
+            elif c.decision.word == "determined in part":
+                assert "Mount" not in c.sentence()
+                assert c.decision.instead
+                assert c.sentence().index("With these weights: rms ") < c.sentence().index("Instead: ")
+                assert c.check_rms < 0.9 * rms(c.before)
             words.append(c.decision.word)
-    assert len(set(words)) > 1
+    assert set(words) == {"mount", "determined in part", "do not mount"}

@@ -40,7 +40,7 @@ def _estimates(folder, units, data="data.csv", words="estimate of {}"):
     model, readings, truth = exercise(folder, data)
     fit = linear_fit(model, readings)
     values = dict(zip(fit.words, fit.system.values, strict=True))
-    values |= dict(zip(model.parameters, fit.values, strict=True))
+    values |= dict(zip(model.parameters, fit.recovery.values, strict=True))
     numbers = {words.format(f"{n}{units.get(n, '')}"): value for n, value in values.items()}
     return numbers, lambda *names: 100 * max(abs(values[n] / truth[n] - 1) for n in names)
 
@@ -73,7 +73,7 @@ def section_1_8():
     re_1, im_1, re_2, im_2 = (float(book[source, quantity].printed) for quantity in amplitudes)
     signals = {"S": np.array([complex(re_1, im_1), complex(re_2, im_2)]), "F": np.ones(2, dtype=complex)}
     tests = Experiments(("1", "2"), np.array([1.0, 2.0]), signals, np.zeros(2, dtype=bool))
-    K, Y = build_rows(exercise("task_6_1")[0], tests).real_rows()
+    K, Y, *_ = build_rows(exercise("task_6_1")[0], tests)
     numbers = {f"K({i + 1},{j + 1})": x for (i, j), x in np.ndenumerate(K)} | parts("Y({})", Y)
     found, worst = _estimates("section_1_8", {})
     return below(source, amplitudes | numbers | found | {"largest error, %": worst("T1", "T2")})

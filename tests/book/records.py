@@ -73,7 +73,7 @@ def _iterations(model, record):
 def _normal_equations(problem, theta, x):
     """[Q] (2.25) to (2.28): M and Y of M θ = Y, from the equations linearised about a trajectory (31, 2)."""
     record = problem.records[0]
-    table, _ = linear_solutions(problem.model, theta, record, x, x, "sequential-heun")
+    table = linear_solutions(problem.model, theta, record, x, "sequential-heun")
     seen = C @ table
     F = seen[..., 1:].reshape(-1, 3)
     y = np.column_stack(list(record.outputs.values())) - seen[..., 0]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 import fem
-from balancing import Labels, ReadingErrors, RunScatter, Trials, UndeterminedError, compare_check
+from balancing import Labels, ReadingErrors, Region, RunScatter, Trials, UndeterminedError, compare_check
 from fem import receptance_with_derivatives
 from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters
@@ -32,7 +32,6 @@ from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
-from rotorid.regression import stretch
 from rotorid.tables import Conventions, Job
 
 ComplexArray = NDArray[np.complex128]
@@ -88,9 +87,9 @@ class Outcome(NamedTuple):
 
     `left_exact` is what the exact model would leave from the same reading, `left_believed` the uncalibrated
     one. Of the numbers: errors over deviations (NaN at a bound), those that the data tell more of than was
-    known before, and dᵀ C⁻¹ d of all; of the weights dᵀ C⁻¹ d; of a check run: whether each reading is within
-    its region, and whether all are, jointly. `chance` is that of a larger χ², `told` that a trial run is
-    needed.
+    known before, and dᵀ C⁻¹ d of all; whether the joint region of the weights holds the true ones; of a check
+    run: whether each reading is within its region, and whether all are, jointly. `chance` is that of a larger
+    χ², `told` that a trial run is needed.
     """
 
     left: float
@@ -99,7 +98,7 @@ class Outcome(NamedTuple):
     numbers: FloatArray
     seen: NDArray[np.bool_]
     joint: float
-    weights: float
+    inside: bool
     readings: NDArray[np.bool_]
     check: bool
     chance: float
@@ -110,11 +109,6 @@ class Outcome(NamedTuple):
     def good(self) -> bool:
         """Whether the shot is as good as wanted."""
         return self.left <= max(GOOD, NEAR * self.left_exact)
-
-    @property
-    def inside(self) -> bool:
-        """Whether the joint region of the weights holds the true ones."""
-        return self.weights < chdtri(4, 0.05)
 
 
 def compressor(_: Random) -> Machine:
@@ -282,7 +276,7 @@ def one_machine(
             nothing,
             nothing > 0,
             np.inf,
-            np.inf,
+            False,
             nothing > 0,
             False,
             found.chance,
@@ -317,9 +311,9 @@ def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor)
         left(truth.W),
         left(believed.W),
         d / np.where(free, found.std, np.nan),
-        found.to_frame()["data_share"].to_numpy() > 0.5,
+        found.data_share > 0.5,
         distance(d[free], found.covariance[np.ix_(free, free)]),
-        distance(stretch(other.weights + U), other.covariance),
+        Region.of(other.draws, other.weights).holds(-U),
         check.distance.ravel() ** 2 < chdtri(2, 0.05),
         bool(check.explained),
         found.chance,

@@ -108,7 +108,7 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
             values[i], deviations, factor = found.values, found.std, found.coverage_factor
         else:
             fit = linear_fit(case.model, data)
-            values[i] = fit.values
+            values[i] = fit.recovery.values
             deviations = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
             factor = coverage_factor(None if stated else fit.estimate.dof)
         inside[i] = np.abs(values[i] - truth) <= factor * deviations

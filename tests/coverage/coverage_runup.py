@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import wofz
 
 from balancing import Labels
-from rotorid.identify.modes_readings import Readings
-from rotorid.identify.run_up import fit_sweep
+from rotorid.identify.modes import fit_sweep
+from rotorid.identify.modes_result import Readings
 
 RPM = np.pi / 30
 ACCELERATIONS = (20.0, 60.0, 180.0, -60.0)
@@ -108,11 +108,11 @@ def one_rotor(random: np.random.Generator, rate: float) -> Outcome:
     rotor = draw_rotor(random)
     truth = np.concatenate((rotor.omega, rotor.zeta))
     modes = fit_sweep(draw_sweep(random, rotor, rate * RPM))
-    found, std = modes.fit.fit.estimate.solution, modes.fit.fit.std
+    found, std = modes.fit.estimate.solution, modes.fit.std
     if len(found) != len(truth) or std is None or modes.steady is None:
-        return Outcome(np.full(4, np.nan), np.full(4, np.nan), modes.fit.warnings)
+        return Outcome(np.full(4, np.nan), np.full(4, np.nan), modes.warnings)
     steady = modes.steady.fit.estimate.solution / truth - 1
-    return Outcome((found - truth) / std, steady, modes.fit.warnings)
+    return Outcome((found - truth) / std, steady, modes.warnings)
 
 
 def simulate(rotors: int, seed: int, rate: float) -> list[Outcome]:

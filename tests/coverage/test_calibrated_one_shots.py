@@ -80,7 +80,7 @@ def test_a_third_bearing_is_recognised():
 
 def test_errors_between_runs_that_nobody_states_are_noticed(monkeypatch):
     whole = example.trials
-    monkeypatch.setattr("trials", lambda *given: replace(whole(*given), run_errors=None))
+    monkeypatch.setattr(example, "trials", lambda *given: replace(whole(*given), run_errors=None))
     found = simulated("four speeds", names=None if FULL else ["compressor"])
     n = sum(len(one.numbers) for one in found)
     off = sum(one.joint for one in found) / n > 1 + DEVIATIONS * np.sqrt(2 / n)

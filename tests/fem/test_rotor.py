@@ -12,7 +12,6 @@ from cases import each_of
 from fem_rotors import rotor23
 
 import fem
-from rotorid.commands.one_shot import lack_at
 
 TABLE = fem.Support(3, [1e7, ((2e7, 1e6), (-1e6, 3e7))], [0.0, 1e4], name="journal", speeds=[100.0, 300.0])
 
@@ -21,9 +20,7 @@ FOUND = fem.Calibration(
     ("bearing[1].kxx", "bearing[2].kxx", "probe[DE].angle"),
     [1.2e7, 1.1e7, 1.02],
     A @ A.T,
-    [100.0, 200.0],
-    ("DE", "NDE"),
-    [[0.01, 0.02], [0.04, 0.03]],
+    0.03,
 )
 
 
@@ -294,16 +291,6 @@ def test_principal_columns_give_the_covariance_in_as_many_directions_as_it_has()
     assert replace(FOUND, covariance=np.zeros((3, 3))).columns().shape == (3, 0)
 
 
-def test_lack_of_fit_elsewhere_is_that_of_the_nearest_speed_and_the_worst_sensor():
-    np.testing.assert_array_equal(
-        lack_at(FOUND, np.array([0.0, 149.0, 151.0, 1e4]), ("NDE", "top")),
-        [[0.02, 0.02], [0.02, 0.02], [0.03, 0.04], [0.03, 0.04]],
-    )
-    nothing = replace(FOUND, speeds=[], sensors=(), lack_of_fit=np.zeros((0, 0)))
-    np.testing.assert_array_equal(lack_at(nothing, np.array([5.0]), ("DE", "NDE")), np.zeros((1, 2)))
-    assert lack_at(FOUND, np.array([5.0, 6.0]), ()).shape == (2, 0)
-
-
 def test_a_rotor_keeps_its_calibration_and_stays_equal():
     rotor = fem.Rotor([0.1], 0.05, supports=[fem.Support(1, 1e7)], stations={"DE": 1})
     calibrated = replace(rotor, calibration=FOUND)
@@ -319,14 +306,13 @@ def test_a_rotor_keeps_its_calibration_and_stays_equal():
     [
         ({"values": [1.0]}, r"values must be finite and of the shape \(3,\)"),
         ({"covariance": np.eye(2)}, r"covariance must be finite and of the shape \(3, 3\)"),
-        ({"lack_of_fit": [[0.1, 0.1]]}, r"lack_of_fit must be finite and of the shape \(2, 2\)"),
-        ({"lack_of_fit": [[0.1, -0.1], [0, 0]]}, "not negative"),
+        ({"lack_of_fit": np.nan}, "lack_of_fit finite"),
+        ({"lack_of_fit": -0.1}, "not negative"),
         ({"values": [1.0, np.nan, 1.0]}, "values must be finite"),
         ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
         ({"covariance": np.diag([1.0, -1.0, 1.0])}, "negative in any direction"),
         ({"covariance": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "negative in any direction"),
         ({"names": ("disc.scale",) * 3}, "one of its names comes twice"),
-        ({"sensors": ("DE", "DE")}, "one of its sensors comes twice"),
     ],
 )
 def test_what_is_no_calibration_is_refused(wrong, words):

@@ -40,7 +40,7 @@ def test_another_dress_is_the_same_answer(runs):
 
 @pytest.mark.parametrize("fault", ["a row is dropped", "a number is misread", "a traceback"])
 def test_a_defect_would_be_found(runs, monkeypatch, fault):
-    from rotorid.tables.reader import columns, text_file
+    from rotorid.files import columns, text_file
 
     make_grid, parse_number = text_file.make_grid, columns.parse_number
     if fault == "a row is dropped":  # those of labels that begin with #, as it once was

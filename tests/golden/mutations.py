@@ -87,7 +87,7 @@ MUTATIONS = (
     Mutation(
         "the unit mil",
         "calibrate-rk4 type",
-        "rotorid/tables/reader/units.py",
+        "rotorid/files/units.py",
         '"mil": (254.0, 1e7)',
         '"mil": (254.0, 1e6)',
     ),

@@ -32,7 +32,6 @@ TABLES = {
     "key of [calibration]": calibration_keys.CALIBRATION,
     "key of [[calibration.parameter]]": calibration_keys.PARAMETER,
     "key of [[calibration.data]]": calibration_keys.DATA,
-    "key of [[calibration.compared]]": calibration_keys.COMPARED,
     "key of a small model": small_model_file.SMALL_MODEL,
     "key of [[unbalance]]": small_model_file.UNBALANCE,
     "key of [[bow]]": small_model_file.BOW,

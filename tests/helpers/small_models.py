@@ -36,9 +36,9 @@ def compare_stability(pair: Pair, highest: float, **how: Any) -> reduction.Stabi
     return reduction.compare_stability(*pair, highest, **how)
 
 
-def stability_threshold(pair: Pair, highest: float, **how: Any) -> fem.Stability:
+def stability_threshold(pair: Pair, highest: float, lowest: float = 0.0, steps: int = 40) -> fem.Stability:
     """Of the small model."""
-    return reduction.stability_threshold(pair.small, highest, **how)
+    return fem.threshold_of(pair.small.whirl(fem.range_of_speeds(lowest, highest, steps)))
 
 
 def whirl_of(pair: Pair, speeds: np.ndarray) -> fem.Whirl:

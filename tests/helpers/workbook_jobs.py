@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import datetime
 import io
+import json
+import re
+import tomllib
 from collections.abc import Mapping
 
 import numpy as np
 import openpyxl
 from tables_data import RUNS
 
+from rotorid.files.grid import Shown
+from rotorid.tables.job.job_keys import TABLES
 from rotorid.tables.job.workbook_template import template_bytes
 
 SAMPLES = (
@@ -32,7 +39,7 @@ PARTS = {
     "limits": (
         'angles = "against rotation"\n'
         "[planes.1]\nmax_mass_oz = 0.7\nforbidden_deg = [[-30.5, 20], [300, 340]]\n"
-        "[planes.2]\nmax_mass_g = 3\nuse = false\nforbidden_deg = [1e-5, 7]\n"
+        "[planes.2]\nmax_mass_g = 3\nuse = false\nforbidden_deg = [[1e-5, 7]]\n"
         '[sensors.A]\nlimit = { "1000" = 4.5 }\nweight = 2\n[sensors.B]\nlimit = 6\n'
     ),
     "machine": 'machine = "007"\nmachine_type = "fan-132"\ndate = 2026-03-17\n',
@@ -133,3 +140,76 @@ def rows(table, **renamed):
     """Rows of a table by column."""
     names = [renamed.get(name, name) for name in table[0]]
     return [dict(zip(names, row, strict=True)) for row in table[1:]]
+
+
+def as_workbook(job, target):
+    """A job file with its tables as the workbook that says the same, with numbers as numbers."""
+    data = tomllib.loads(job.read_text(encoding="utf-8"))
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    book.properties.creator = "rotorid"
+    for key in TABLES:
+        if isinstance(data.get(key), str):
+            _append(book.create_sheet(key), _cells(job.parent / data.pop(key)))
+    for sheet, key in (("planes", "plane"), ("sensors", "sensor")):
+        named = data.pop(sheet, {})
+        columns = list(dict.fromkeys(column for own in named.values() for column in own))
+        lines = [[_cell(own.get(column)) for column in columns] for own in named.values()]
+        rows = [[name, *line] for name, line in zip(named, lines, strict=True)]
+        _append(book.create_sheet(sheet), [[key, *columns], *rows])
+    settings = [[".".join(parts), _cell(value)] for parts, value in _flat(data, ())]
+    _append(book.create_sheet("settings"), [["key", "value"], *settings])
+    book.save(target)
+    return target
+
+
+def _append(sheet, lines):
+    for number, line in enumerate(lines, start=1):
+        for place, value in enumerate(line, start=1):
+            if value not in ("", None):
+                cell = sheet.cell(number, place)
+                cell.value = value
+                if isinstance(value, float):
+                    cell.value, cell.data_type = repr(float(value)), "n"  # all digits
+                if isinstance(value, Shown) and re.fullmatch(r"-?[0-9]+[.][0-9]+", value.text):
+                    cell.number_format = "0." + "0" * len(value.text.partition(".")[2])
+
+
+def _cells(path):
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    comments = [[line] for line in lines if line.startswith("#")]
+    header, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
+    texts = [name in ("run", "sensor", "plane", "repeat") for name in header]
+    numbers = (
+        [cell if text else _number(cell) for cell, text in zip(row, texts, strict=False)] for row in rows
+    )
+    return [*comments, header, *numbers]
+
+
+def _number(cell):
+    try:
+        return Shown(float(cell), cell)
+    except ValueError:
+        return cell
+
+
+def _flat(data, above):
+    for key, value in data.items():
+        part = json.dumps(key) if set(key) & set(".\"'#") else key
+        if isinstance(value, dict) and (above or key != "speed_weights"):
+            yield from _flat(value, (*above, part))
+        else:
+            yield (*above, part), value
+
+
+def _cell(value):
+    """A value of a job file as a cell holds it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {entry}" for key, entry in value.items())
+    if isinstance(value, list) and isinstance(value[0], list):
+        return "; ".join(f"{first:f} to {last:f}" for first, last in value)
+    if isinstance(value, list):
+        return "; ".join(map(str, value))
+    return str(value) if isinstance(value, datetime.date) else value

@@ -8,7 +8,9 @@ import tomllib
 import numpy as np
 import openpyxl
 import pytest
+from openpyxl.packaging.custom import IntProperty
 from scipy.io import loadmat
+from workbook_jobs import as_workbook
 
 import balancing
 import rotorid
@@ -73,8 +75,11 @@ def test_state_spaces(cli, tmp_path, ending):
 def test_workbooks(cli, tmp_path):
     path = tmp_path / "job.xlsx"
     assert cli("balance", JOB, "--output", path).code == 0
-    book = openpyxl.load_workbook(path)
-    assert book.custom_doc_props["schema_version"].value == SCHEMA_VERSION
+    made = openpyxl.load_workbook(path).custom_doc_props
+    assert made["schema_version"].value == SCHEMA_VERSION
+    book = openpyxl.load_workbook(as_workbook(JOB, path))
+    book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
+    book.save(path)
     assert cli("balance", path).code == 0
     book.custom_doc_props["schema_version"].value = 2
     book.save(path)

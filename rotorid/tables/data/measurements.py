@@ -17,14 +17,14 @@ from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, make_table, read_grid
+from rotorid.files.conventions import FULL_TURN
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
-from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
-from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
@@ -146,9 +146,14 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
     """Read displacements at any points: as `read_measurements`, with any names and without a model.
 
     Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
+    A UFF file (`.uff`, `.unv`) has frequency responses: displacements under a force of 1 N.
     """
     from rotorid.identify.amplitudes import Experiments
 
+    if Path(path).suffix.lower() in (".uff", ".unv"):
+        from rotorid.tables.data.frequency_responses import read_responses
+
+        return replace(read_responses(Path(path)), errors=errors)
     problems = Problems()
     grid = problems.need(read_grid(path, "measurements", problems, first=True))
     names = tuple(dict.fromkeys(found[1] for name in grid.header if (found := _AMPLITUDE.fullmatch(name))))

@@ -12,11 +12,11 @@ import numpy as np
 from fem import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit, one_of, ratio
 from rotorid.tables.data.repeated_readings import FREQUENCIES
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, one_of, ratio
 from rotorid.tables.rotor.unbalance_table import node_at
 
 Node = int | str

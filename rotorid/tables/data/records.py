@@ -14,21 +14,15 @@ from rotorid.base import result
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
-from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
-from rotorid.tables.reader.grid import Cell, Grid
-from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.units import Unit, UnitError, one_of
+from rotorid.files.columns import Column, Table, make_table, read_grid
+from rotorid.files.grid import Cell, Grid
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.units import TIME, Unit, UnitError, one_of
 
 if TYPE_CHECKING:
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
 
-TIME = {
-    "s": Unit("s", "time"),
-    "ms": Unit("ms", "time", 1.0, 1e3),
-    "us": Unit("us", "time", 1.0, 1e6),
-    "min": Unit("min", "time", 60.0),
-}
 MISSING = {"nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 STD = "_std"
 """At the end of the name of a column: standard deviations of the samples of an output."""

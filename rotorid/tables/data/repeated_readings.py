@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.text import counted
-from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.problems import TableWarning
+from rotorid.files.columns import Table
+from rotorid.files.problems import TableWarning
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors, Experiments

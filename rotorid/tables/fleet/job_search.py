@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotorid.files.excel_workbook import is_workbook
+from rotorid.files.input_file import file_content
+from rotorid.files.problems import InputError, Problem, Problems
+from rotorid.files.toml_file import read_toml
 from rotorid.tables.job.job_from_excel import SETTINGS
 from rotorid.tables.job.job_keys import TABLES
-from rotorid.tables.reader.excel_workbook import is_workbook
-from rotorid.tables.reader.input_file import file_content
-from rotorid.tables.reader.problems import InputError, Problem, Problems
-from rotorid.tables.reader.toml_file import read_toml
 
 _OF_A_JOB = {*TABLES, "key_phasor", "speed_weights"}
 """Keys that only jobs have."""

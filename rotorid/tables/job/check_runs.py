@@ -8,18 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from balancing import Trials
+from balancing import Holes, Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Source, source_name
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials
+from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.files.weights import read_weights
 from rotorid.tables.job.job_planes import Planes
 from rotorid.tables.job.readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.slow_roll import subtract_slow_roll
-from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
-from rotorid.tables.runs.trials import make_trials
+
+IN_HOLE = 1e-3
+"""Relative distance of a weight from the hole that it is in."""
 
 
 def read_check(
@@ -67,6 +71,30 @@ def read_check(
         return check
     check = subtract_slow_roll(check, readings.slow_roll)
     return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))
+
+
+def holes_taken(
+    weights: Source, check: Trials, readings: Readings, holes: Mapping[str, Holes]
+) -> dict[str, Holes]:
+    """The holes with what stands in them since the last check run, where the job does not say what is taken.
+
+    A plane whose weights are not all in its holes, or fill all of them, stays as it is.
+    """
+    read = read_weights(weights, check.runs, readings.conventions, Problems())
+    rows = () if read is None else read.rows
+    out = dict(holes)
+    for plane, free in holes.items():
+        mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
+        if not len(mounted) or free.taken.any():
+            continue
+        unit = np.exp(1j * free.angles)
+        hole = np.argmax((unit.conj() * mounted[:, None]).real, axis=1)
+        taken = np.zeros(len(unit))
+        np.add.at(taken, hole, np.abs(mounted))
+        off = np.abs(mounted - np.abs(mounted) * unit[hole])
+        if (off <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
+            out[plane] = replace(free, taken=taken)
+    return out
 
 
 def _speeds(

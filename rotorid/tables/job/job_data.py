@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as_phase, check_angles
+from rotorid.files.conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
     from balancing import Mounted
@@ -69,6 +69,8 @@ class Job:
         Check runs, in the units and at the speeds of the job, or None.
     check_mounted
         Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
+    check_of_weights
+        Whether these were the weights, although there are holes for pieces.
     check_pieces
         The pieces that `check.weights` are then, by `rotorid.commands.after_check`; None: others.
     rotor
@@ -108,6 +110,7 @@ class Job:
     left_out: tuple[str, ...] = ()
     check: Trials | None = None
     check_mounted: bool = False
+    check_of_weights: bool = False
     check_pieces: Mounted | None = None
     rotor: Rotor | None = None
     plane_nodes: Mapping[str, int] = field(default_factory=dict)

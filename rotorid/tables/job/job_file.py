@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotorid.base.text import counted
+from rotorid.files.conventions import resolve_angles
+from rotorid.files.problems import Problems
+from rotorid.files.toml_file import Section
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_from_excel import open_job
 from rotorid.tables.job.job_reading import job_of
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.runs.stated_conventions import resolve_angles
 
 __all__ = ["Job", "job_from_files", "read_job"]
 

@@ -6,20 +6,19 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
+from rotorid.files.layout import rows_from_header
+from rotorid.files.problems import Problems
+from rotorid.files.toml_file import Section, read_toml
 from rotorid.tables.job.job_keys import CELLS, PLANE, READINGS, SENSOR, TABLES
-from rotorid.tables.reader.columns import REMARKS, sheet_source
-from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma, parse_number
-from rotorid.tables.reader.excel_workbook import is_workbook, read_workbook
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, from_header, is_comment, make_grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.runs.column_headings import looks_like_header
 
 NAMED = {"planes": ("plane", PLANE), "sensors": ("sensor", SENSOR)}
 """Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""
@@ -31,7 +30,6 @@ OPTIONAL = "note (a blank value: not stated)"
 _NUMBER_LIKE = re.compile(r"[+-]?[0-9.,][0-9.,' ’]*(?:[eE][+-]?[0-9]+)?")
 
 Place = tuple[str, int, str]
-Item = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,21 +46,12 @@ class WrittenJob:
         Cells of the sheets of `TABLES` that are there.
     where
         Sheet, row and column of each setting, by its dotted key.
-    remarks
-        Cells of columns for remarks, by sheet and plane, sensor or setting.
-    comments
-        Comment lines of the sheets `SETTINGS`.
-    notes
-        Rows of the sheets for remarks.
     """
 
     path: Path
     settings: dict[str, Any] = field(default_factory=dict)
     tables: dict[str, Grid] = field(default_factory=dict)
     where: dict[str, Place] = field(default_factory=dict)
-    remarks: dict[Item, dict[str, Cell]] = field(default_factory=dict)
-    comments: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    notes: dict[str, Sequence[Row]] = field(default_factory=dict)
 
     def top(self, problems: Problems) -> Section:
         """All settings; a file that is named in place of a sheet is a problem."""
@@ -114,8 +103,8 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         if title is None or not (name in TABLES[:2] or _holds_cells(sheets[title])):
             continue
         source, rows = sheet_source(path, title), sheets[title]
-        if name in READINGS:
-            rows = from_header(list(rows), partial(looks_like_header, named={}))
+        if name in (*READINGS, "weights", "check_weights"):
+            rows = rows_from_header(rows, {}, weights=name not in READINGS)
         if name == "runs" and _is_a_form(rows):
             expected = "readings below the header, one row per run, speed and sensor: none are filled in yet"
             problems.add(source, None, None, None, expected)
@@ -126,8 +115,6 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
             grids[name] = grid
     job = WrittenJob(path)
     job.tables.update({name: grid for name, grid in grids.items() if name in TABLES})
-    job.comments.update({name: grid.comments for name, grid in grids.items() if name in SETTINGS})
-    job.notes.update({title: rows for title, rows in sheets.items() if is_notes(title)})
     if "settings" in grids:
         _read_settings(grids["settings"], job, problems)
     for name in NAMED:
@@ -215,7 +202,6 @@ def _read_settings(grid: Grid, job: WrittenJob, problems: Problems) -> None:
             expected = f"each setting once (row {job.where[name][1]} has it too)"
         else:
             job.where[name] = place
-            _note(grid, cells, ("settings", name), job)
             if not _put(job, parts, value, place):
                 expected = f"no parts of {name.rpartition('.')[0]}, which has a value of its own"
         if expected:
@@ -260,12 +246,6 @@ def _value(key: str, cell: Cell, *, comma: bool) -> Cell | bool:
         return BadCell(cell, str(error))
 
 
-def _note(grid: Grid, cells: Sequence[Cell], item: Item, job: WrittenJob) -> None:
-    for name, cell in zip(grid.header, cells, strict=True):
-        if _is_remark(name) and cell != "":
-            job.remarks.setdefault(item, {})[name] = cell
-
-
 def _put(job: WrittenJob, parts: Sequence[str], value: object, place: Place) -> bool:
     """Store a value under its dotted key; false where a part of the key holds a value already."""
     inner: Any = job.settings
@@ -303,7 +283,6 @@ def _read_named(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> 
         if not isinstance(named, dict):  # a setting of this name; the job refuses it
             return
         section = named.setdefault(item, {})
-        _note(grid, cells, (sheet, item), job)
         for i in columns:
             column, cell = grid.header[i], cells[i]
             if cell == "":

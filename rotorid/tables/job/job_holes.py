@@ -14,9 +14,9 @@ import numpy as np
 
 from balancing import Holes, Labels, Limits, from_list
 from rotorid.base.suggestions import did_you_mean
+from rotorid.files.settings_keys import Said
+from rotorid.files.weights_with_units import in_job_units, other_kind
 from rotorid.tables.job.job_keys import FORBIDDEN, HOLES, SAME_DEG
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.reader.weights_with_units import in_job_units, other_kind
 
 
 def read_holes(
@@ -55,22 +55,32 @@ def read_holes(
 
 def _angles(plane: Said) -> dict[str, float]:
     """Angle of each hole by its name, "1", "2", … unless the job says another; none with a problem."""
-    section, count, listed, names = plane.section, plane["holes"], plane["holes_deg"], plane["hole_names"]
+    section, names = plane.section, plane["hole_names"]
     if "holes_deg" in section and "holes" in section:
         section.complain("holes", "either holes, equally spaced, or holes_deg, their angles, not both")
         return {}
     if "first_hole_deg" in section and "holes" not in section:
         section.complain("first_hole_deg", "the number of equally spaced holes too, holes = 12")
-    degrees = listed or ()
-    if count is not None:
-        degrees = tuple(plane["first_hole_deg"] + 360.0 * k / count for k in range(count))
+    degrees = _degrees(plane)
     if names is not None and degrees and len(names) != len(degrees):
         expected = f"a name for each of the {len(degrees)} holes, not {len(names)} names"
         section.complain("hole_names", expected)
         return {}
     if names is None and "hole_names" in section:
         return {}
-    return dict(zip(names or map(str, range(1, len(degrees) + 1)), degrees, strict=False))
+    return hole_angles(plane)
+
+
+def hole_angles(plane: Said) -> dict[str, float]:
+    """Angle of each hole of a plane by its name, degrees as the job counts; none where there are no holes."""
+    degrees = _degrees(plane)
+    return dict(zip(plane["hole_names"] or map(str, range(1, len(degrees) + 1)), degrees, strict=False))
+
+
+def _degrees(plane: Said) -> tuple[float, ...]:
+    if plane["holes"] is None:
+        return tuple(plane["holes_deg"] or ())
+    return tuple(plane["first_hole_deg"] + 360.0 * k / plane["holes"] for k in range(plane["holes"]))
 
 
 def _fits_together(plane: Said, names: Sequence[str]) -> bool:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.settings_keys import Key, Kind
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
-from rotorid.tables.runs.stated_conventions import (
+from rotorid.files import units, value_kinds
+from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
     PHASES,
@@ -21,9 +18,14 @@ from rotorid.tables.runs.stated_conventions import (
     VIEWS,
     StatedErrors,
 )
+from rotorid.files.settings_keys import Key, Kind
+from rotorid.files.toml_file import Section
+from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Keys of a job file that name tables; the sheets of a workbook that are such tables."""
+WEIGHTS = "weights"
+"""In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
 READINGS = ("runs", "check", "slow_roll")
 """Those that are runs tables."""
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
@@ -37,6 +39,14 @@ _DEG = "angles of the holes in degrees, such as holes_deg = [0, 30, 75]"
 _AVAILABLE = "weights of which each can be mounted, such as available_g = [5, 10, 20]"
 _TAKEN = 'weights that are in holes already, by number or name of the hole, such as { "3" = 10 }'
 _STOCK = "how many there are of each available weight, such as stock = [4, 4, 2]"
+
+
+def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
+    named = {key: settings.get(key) for key in TABLES}
+    if named["check_weights"] == WEIGHTS:
+        del named["check_weights"]
+    return {key: name for key, name in named.items() if isinstance(name, str)}
 
 
 def _arcs(section: Section, key: str) -> tuple[Pair, ...] | None:
@@ -219,6 +229,16 @@ def _file(section: Section, key: str) -> str | None:
     return name
 
 
+def _files(section: Section, key: str) -> str | tuple[str, ...] | None:
+    value = section.take(key)
+    if not isinstance(value, list):
+        return _file(section, key)
+    if not value or not all(isinstance(name, str) and name.strip() and name.isprintable() for name in value):
+        section.complain(key, 'the names of files, one a run: ["as found.csv", "trial.csv"]')
+        return None
+    return tuple(name.strip() for name in value)
+
+
 def _errors(section: Section, key: str) -> StatedErrors | None:
     said = _STATED.read(section, key)
     if said is None or said.section.refused:
@@ -266,6 +286,9 @@ _NAMES = Kind(
 )
 _PLACE = Kind(_place, {"type": ["integer", "string"]}, "a number, or a name")
 FILE = Kind(_file, TEXT.schema, cell="name")
+FILES = Kind(
+    _files, {"anyOf": [TEXT.schema, {"type": "array", "items": TEXT.schema, "minItems": 1}]}, cell="name"
+)
 FORBIDDEN = Key(
     "forbidden_deg",
     _ARCS,
@@ -385,7 +408,11 @@ COLUMNS = (
     Key("repeat", TEXT, "of repeated readings"),
 )
 JOB = (
-    Key("runs", FILE, "the runs table, relative to the job file"),
+    Key(
+        "runs",
+        FILES,
+        "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
+    ),
     Key("weights", FILE, "the weights table"),
     Key("influence", FILE, "stored coefficients instead of trial runs, or beside them"),
     Key("rotor", FILE, "a rotor table or file: coefficients are computed"),
@@ -394,7 +421,7 @@ JOB = (
         "check_weights",
         FILE,
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
-        "where there are holes, else the weights",
+        'where there are holes, else the weights; `"weights"`: these, although there are holes',
     ),
     Key(
         "slow_roll",
@@ -438,6 +465,7 @@ JOB = (
         f"speeds of different runs that differ by less count as one, default {DEFAULT_TOLERANCE:g}",
         default=DEFAULT_TOLERANCE,
     ),
+    Key("speed_rpm", ABOVE_ZERO, "the speed of runs tables without a column of speeds", units.SPEED),
     Key(
         "errors",
         replace(_STATED, read=_errors),

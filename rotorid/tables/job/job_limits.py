@@ -11,14 +11,14 @@ import numpy as np
 
 from balancing import Labels, Limits, Trials
 from rotorid.base.arrays import FloatArray
+from rotorid.files import units
+from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.settings_keys import Quantity, Said
+from rotorid.files.speeds import nearest_speed, show_speeds
+from rotorid.files.toml_file import Section
+from rotorid.files.weights_with_units import in_job_units, other_kind
 from rotorid.tables.job.job_keys import FORBIDDEN
 from rotorid.tables.job.job_planes import Planes
-from rotorid.tables.reader import units
-from rotorid.tables.reader.decimal_numbers import parse_number
-from rotorid.tables.reader.settings_keys import Quantity, Said
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.weights_with_units import in_job_units, other_kind
-from rotorid.tables.runs.speed_merging import nearest_speed, show_speeds
 
 if TYPE_CHECKING:
     from rotorid.tables.job.job_data import Job

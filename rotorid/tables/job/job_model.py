@@ -11,8 +11,8 @@ from balancing import Labels
 from fem import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.settings_keys import Said
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.settings_keys import Said
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -10,11 +10,11 @@ import numpy as np
 from balancing import Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Said
 from rotorid.tables.job.job_model import Model
 from rotorid.tables.job.readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,8 @@ def _complain_about_names(said: Said, key: str, known: Sequence[str], problems: 
     for name in said[key]:
         if name not in known:
             expected = f"one of the job's {key}, {listing(known, 'and')}{did_you_mean(name, known)}"
+            if key == "planes":
+                expected += f" (no trial weight in plane {name!r}: is a row of the weights table missing?)"
             source, row, column = said.section.place(f"{key}.{name}")
             problems.add(source, row, column, name, expected)
 

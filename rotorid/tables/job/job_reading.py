@@ -6,20 +6,21 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from balancing import Labels
+from rotorid.files.columns import Source
+from rotorid.files.layout import files_of_runs
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import take
+from rotorid.files.toml_file import Section
 from rotorid.tables.job.assumed_conventions import with_assumed
-from rotorid.tables.job.check_runs import read_check
+from rotorid.tables.job.check_runs import holes_taken, read_check
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_holes import read_holes
-from rotorid.tables.job.job_keys import JOB, TABLES
+from rotorid.tables.job.job_keys import JOB, TABLES, WEIGHTS, named_tables
 from rotorid.tables.job.job_limits import read_limits
 from rotorid.tables.job.job_model import read_model
 from rotorid.tables.job.job_planes import read_planes
 from rotorid.tables.job.job_waveforms import with_vectors
 from rotorid.tables.job.readings import read_readings
-from rotorid.tables.reader.columns import Source
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import take
-from rotorid.tables.reader.toml_file import Section
 
 
 def job_of(
@@ -47,8 +48,13 @@ def job_of(
     """
     said = take(top, JOB)
     folder = Path() if path is None else path.parent
-    named = {key: folder / said[key] for key in TABLES if isinstance(said[key], str)}
+    named = {key: folder / name for key, name in named_tables({key: said[key] for key in TABLES}).items()}
     tables: dict[str, Source] = {**named, **sheets}
+    runs = said["runs"]
+    files = tuple(folder / name for name in runs) if isinstance(runs, tuple) else ()
+    files = files or files_of_runs(tables.get("runs"))
+    if files:
+        tables["runs"] = files
     if overrides.waveforms is not None:
         tables["runs"] = Path(overrides.waveforms)
     overrides, records = with_vectors(tables, overrides, said["phase"], problems)
@@ -65,8 +71,11 @@ def job_of(
     check = None
     if "check" in tables:
         check = read_check(tables, readings, planes, problems)
+    if check is not None and "check_weights" in tables:
+        holes = holes_taken(tables["check_weights"], check, readings, holes)
     problems.stop()
     first = [tables.get(key) for key in ("runs", "weights", "influence")]
+    records = (*files, *records)
     more = [tables.get(key) for key in ("check", "check_weights", "slow_roll")]
     read = [path, *first, *model.files, *more]
     phasor = said["key_phasor"]["angle_deg"] if said["key_phasor"] else 0.0
@@ -83,6 +92,7 @@ def job_of(
             left_out=planes.left_out,
             check=check,
             check_mounted=check is not None and "check_weights" in tables,
+            check_of_weights=said["check_weights"] == WEIGHTS and "check_weights" not in tables,
             rotor=model.rotor,
             plane_nodes=model.plane_nodes,
             sensor_places=model.sensor_places,

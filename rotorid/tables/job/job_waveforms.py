@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from rotorid.files.columns import Source
+from rotorid.files.problems import Problems
 from rotorid.tables.job.job_data import Overrides
-from rotorid.tables.reader.columns import Source
-from rotorid.tables.reader.problems import Problems
 
 
 def with_vectors(

@@ -8,13 +8,8 @@ from typing import cast
 
 from balancing import Influence, Labels, Trials
 from rotorid.base.text import listing
-from rotorid.tables.job.job_data import Overrides
-from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
-from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
-from rotorid.tables.runs.stated_conventions import (
+from rotorid.files.columns import Source, source_name
+from rotorid.files.conventions import (
     ANGLES,
     ROTATIONS,
     Angles,
@@ -27,7 +22,14 @@ from rotorid.tables.runs.stated_conventions import (
     as_phase,
     resolve_angles,
 )
-from rotorid.tables.runs.trials import make_trials
+from rotorid.files.layout import stated_phase
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials
+from rotorid.files.settings_keys import Said
+from rotorid.tables.job.job_data import Overrides
+from rotorid.tables.job.job_holes import hole_angles
+from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
+from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,8 @@ def read_readings(
         errors = replace(errors or StatedErrors(), **others)
     if "runs" not in tables:
         return None
+    if (overrides.phase or said["phase"]) is None:
+        overrides = replace(overrides, phase=stated_phase(tables["runs"], said["columns"]))
     # what is wrong with the planes must not hide what is wrong with the tables
     own = problems.apart({source_name(table) for table in tables.values()})
     found, name = None, ""
@@ -113,7 +117,16 @@ def conventions_of(said: Said, overrides: Overrides, stored: Mapping[str, str]) 
         clock=clock,
     )
     unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
-    return Conventions(labels, said["speed_tolerance_percent"], unstated, said["columns"])
+    speed = said["speed_rpm"]
+    return Conventions(
+        labels,
+        said["speed_tolerance_percent"],
+        unstated,
+        said["columns"],
+        None if speed is None else (speed.unit.name, speed.value),
+        {name: holes for name, plane in said["planes"].items() if (holes := hole_angles(plane))},
+        frozenset(name for name, plane in said["planes"].items() if plane["remove"]),
+    )
 
 
 def _complain_about_tables(said: Said, tables: Mapping[str, Source]) -> None:

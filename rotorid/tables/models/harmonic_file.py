@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.settings_keys import Key, Kind, take
+from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import ExpressionError, parse_equation
 from rotorid.tables.models.ode_file import read_time_form
 from rotorid.tables.models.shared_keys import (
@@ -26,9 +29,6 @@ from rotorid.tables.models.shared_keys import (
     unlike_a_name,
 )
 from rotorid.tables.models.small_model_file import equation_data
-from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.settings_keys import Key, Kind, take
-from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors

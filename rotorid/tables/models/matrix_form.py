@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rotorid.files.settings_keys import Key, Kind, Said
+from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import is_name
-from rotorid.tables.reader.settings_keys import Key, Kind, Said
-from rotorid.tables.reader.toml_file import Section
 
 Matrix = list[list[float | str]]
 

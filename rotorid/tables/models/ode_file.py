@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, Kind, Said, take
+from rotorid.files.toml_file import Section
+from rotorid.files.value_kinds import FLAG, number, table
 from rotorid.identify import expressions
 from rotorid.identify.expressions import LARGEST, ExpressionError
 from rotorid.tables.models.matrix_form import MATRICES, Matrices, has_matrices, matrices_of
@@ -26,10 +30,6 @@ from rotorid.tables.models.shared_keys import (
     unlike_a_name,
 )
 from rotorid.tables.models.small_model_file import equation_data
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors

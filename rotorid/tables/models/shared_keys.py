@@ -7,11 +7,11 @@ from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING
 
 from rotorid.base.suggestions import did_you_mean
+from rotorid.files import value_kinds
+from rotorid.files.decimal_numbers import LARGEST
+from rotorid.files.settings_keys import Key, Kind, Said, take
+from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import is_name
-from rotorid.tables.reader import value_kinds
-from rotorid.tables.reader.decimal_numbers import LARGEST
-from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
-from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors

@@ -18,13 +18,13 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.files import units
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.settings_keys import Key, Kind, take
+from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.value_kinds import TURN, each, number, plain_number
 from rotorid.reduction import SmallModel
 from rotorid.tables.models.model_writing import ode_model_bytes
-from rotorid.tables.reader import units
-from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.settings_keys import Key, Kind, take
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.value_kinds import TURN, each, number, plain_number
 from rotorid.tables.rotor.bearing import KEYS_OF, NODE, read_support
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, force_tables, read_force
 from rotorid.tables.rotor.rotor_writing import bearing_table_bytes, support_table

@@ -14,13 +14,13 @@ from fem import KINDS, Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find, names
 from rotorid.base.text import listing
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, Kind, take
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.units import one_of
-from rotorid.tables.reader.value_kinds import TEXT, choice, number, plain_number
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, Kind, take
+from rotorid.files.toml_file import Section
+from rotorid.files.units import one_of
+from rotorid.files.value_kinds import TEXT, choice, number, plain_number
 
 SCALARS = {"stiffness": "stiffness_N_per_m", "damping": "damping_N_s_per_m"}
 ENTRIES = {
@@ -56,10 +56,11 @@ PAIR = Kind(_one_or_two, {"anyOf": [_NUMBER, _TWO]}, "a number, or [x, y]")
 
 
 def _coefficient_keys(quantity: str, motion: str) -> Iterator[Key]:
-    yield Key(SCALARS[quantity], number(), f"{quantity}, the same in all directions")
+    of = units.STIFFNESS if quantity == "stiffness" else units.DAMPING
+    yield Key(SCALARS[quantity], number(), f"{quantity}, the same in all directions", of, si=True)
     for short, full in ENTRIES[quantity].items():
         yield Key(short, number(), f"`{full}` in short")
-        yield Key(full, number(), f"force in {short[1]} against a {motion} in {short[2]}")
+        yield Key(full, number(), f"force in {short[1]} against a {motion} in {short[2]}", of, si=True)
 
 
 _PLACE = (
@@ -69,9 +70,9 @@ _PLACE = (
 )
 _STAND = (
     Key("kind", choice(names(KINDS)), "one of the kinds, where it is another one", default=KINDS[0].name),
-    Key(PEDESTAL[0], number(0.0), "mass of what it stands on", default=0.0),
-    Key(PEDESTAL[1], PAIR, "its stiffness; one number, or two for x and y", default=0.0),
-    Key(PEDESTAL[2], PAIR, "its damping; one number, or two for x and y", default=0.0),
+    Key(PEDESTAL[0], number(0.0), "mass of what it stands on", units.MASS, 0.0, si=True),
+    Key(PEDESTAL[1], PAIR, "its stiffness; one number, or two for x and y", units.STIFFNESS, 0.0, si=True),
+    Key(PEDESTAL[2], PAIR, "its damping; one number, or two for x and y", units.DAMPING, 0.0, si=True),
 )
 _COEFFICIENTS = (
     *_coefficient_keys("stiffness", "displacement"),

@@ -8,13 +8,13 @@ import numpy as np
 
 from fem import Rotor
 from rotorid.base.complex_numbers import polar
+from rotorid.files import units
+from rotorid.files.columns import Column, read_table
+from rotorid.files.conventions import FULL_TURN
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of
 from rotorid.reduction import SmallModel
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
 from rotorid.tables.rotor.unbalance_table import node_at
-from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 COLUMNS = (
     Column("node"),

@@ -9,9 +9,9 @@ import numpy as np
 from fem import Calibration, Rotor
 from fem.parameters import expand
 from rotorid.base.text import counted
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, Said
-from rotorid.tables.reader.value_kinds import FLAG, TEXT, each, number, numbers
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, Said
+from rotorid.files.value_kinds import FLAG, TEXT, each, number, numbers
 
 PARAMETER = (
     Key("name", TEXT, "which of the rotor's numbers, such as `bearing[1].kxx.scale`", required="its name"),
@@ -27,28 +27,22 @@ DATA = (
     Key("file", TEXT, "name of a file that it was made from", required="its name"),
     Key("sha256", TEXT, "hash of its content", required="its hash"),
 )
-COMPARED = (
-    Key("sensor", TEXT, "name", required="its name"),
-    Key(
-        "lack_of_fit",
-        numbers("relative errors such as [0.02, 0.05]", "0.02; 0.05"),
-        "what the model leaves of a coefficient, one relative standard deviation, at each of the speeds",
-        required="a number for each speed",
-    ),
-)
 CALIBRATION = (
     Key("needs_trial_run", FLAG, "whether the data contradict the model", default=False),
-    Key("speeds_rad_s", numbers("speeds such as [300, 350]", "300; 350"), "speeds compared", default=()),
+    Key(
+        "lack_of_fit",
+        number(0.0),
+        "what the model leaves of a coefficient, one relative standard deviation",
+        default=0.0,
+    ),
     Key("parameter", each(PARAMETER), "what was fitted", default=()),
-    Key("compared", each(COMPARED), "a sensor, and how well the model agrees", default=()),
     Key("data", each(DATA), "a file that it was made from, which must not count twice", default=()),
 )
 
 
 def read_calibration(said: Said, rotor: Rotor, problems: Problems) -> Calibration:
     """What `[calibration]` says of a rotor; raises `InputError` with its problems."""
-    parameters, compared = said["parameter"], said["compared"]
-    n, speeds = len(parameters), said["speeds_rad_s"]
+    parameters, n = said["parameter"], len(said["parameter"])
     for one in parameters:
         try:
             single = expand(rotor, one["name"]) == (one["name"],)
@@ -59,10 +53,6 @@ def read_calibration(said: Said, rotor: Rotor, problems: Problems) -> Calibratio
                 one.section.complain("name", "a single parameter, without [*]")
         if one["correlation"] and len(one["correlation"]) != n:
             one.section.complain("correlation", f"{counted(n, 'number')}, one for each parameter")
-    for one in compared:
-        if len(one["lack_of_fit"]) != len(speeds):
-            expected = f"{counted(len(speeds), 'number')}, one for each of speeds_rad_s"
-            one.section.complain("lack_of_fit", expected)
     problems.stop()
     std = np.array([one["std"] for one in parameters])
     R = [one["correlation"] or row for one, row in zip(parameters, np.eye(n), strict=True)]
@@ -71,9 +61,7 @@ def read_calibration(said: Said, rotor: Rotor, problems: Problems) -> Calibratio
             tuple(one["name"] for one in parameters),
             np.array([one["value"] for one in parameters]),
             np.reshape(R, (n, n)) * np.outer(std, std),
-            np.array(speeds),
-            tuple(one["sensor"] for one in compared),
-            np.array([one["lack_of_fit"] for one in compared]).T,
+            said["lack_of_fit"],
             said["needs_trial_run"],
             {one["file"]: one["sha256"] for one in said["data"]},
         )
@@ -88,11 +76,10 @@ def calibration_table(found: Calibration) -> dict[str, Any]:
     R = np.where(np.abs(found.correlation) < 1e-20, 0.0, found.correlation)
     np.fill_diagonal(R, 1.0)
     table: dict[str, Any] = {"needs_trial_run": found.needs_trial_run}
-    if found.speeds.size:
-        table["speeds_rad_s"] = found.speeds.tolist()
+    if found.lack_of_fit:
+        table["lack_of_fit"] = found.lack_of_fit
     for key, keys, columns in (
         ("parameter", PARAMETER, (found.names, found.values.tolist(), found.std.tolist(), R.tolist())),
-        ("compared", COMPARED, (found.sensors, found.lack_of_fit.T.tolist())),
         ("data", DATA, (found.data.keys(), found.data.values())),
     ):
         names = [one.name for one in keys]

@@ -9,11 +9,11 @@ from typing import Any, get_args
 from fem import JournalBearing, MuszynskaSeal, NodeForce, Stop
 from fem.forces import FORCES, Film, kind_of
 from rotorid.base.registry import find
-from rotorid.tables.reader import units
-from rotorid.tables.reader.settings_keys import Key, Kind, Quantity, take
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.units import Unit
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, choice, number
+from rotorid.files import units
+from rotorid.files.settings_keys import Key, Kind, Quantity, take
+from rotorid.files.toml_file import Section
+from rotorid.files.units import Unit
+from rotorid.files.value_kinds import ABOVE_ZERO, choice, number
 from rotorid.tables.rotor.bearing import NAME, NODE
 from rotorid.tables.rotor.rotor_plausibility import warn_of_force
 

@@ -11,10 +11,11 @@ from typing import Any
 from fem import KINDS, STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.forces import FORCES
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Key, take
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
+from rotorid.files import units
+from rotorid.files.problems import Problems
+from rotorid.files.settings_keys import Key, take
+from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
 from rotorid.tables.rotor.calibration_keys import CALIBRATION, read_calibration
 from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, read_force
@@ -32,8 +33,8 @@ def _material(section: Section) -> Material:
 _SIZE = number(0.0)
 RATIO = "Poisson's ratio; where it is given, shear is counted unless `[model] shear = false`"
 MATERIAL = (
-    Key("youngs_modulus_Pa", ABOVE_ZERO, "Young's modulus", default=STEEL_MODULUS),
-    Key("density_kg_per_m3", _SIZE, "density", default=STEEL_DENSITY),
+    Key("youngs_modulus_Pa", ABOVE_ZERO, "Young's modulus", units.MODULUS, STEEL_MODULUS, si=True),
+    Key("density_kg_per_m3", _SIZE, "density", units.DENSITY, STEEL_DENSITY, si=True),
     Key("poisson_ratio", number(-1.0 + 1e-9, 0.5), RATIO, default=STEEL_POISSON),
     Key("material_damping_s", _SIZE, "loss per stress rate: the stress is E (ε + τ dε/dt)", default=0.0),
 )
@@ -50,13 +51,13 @@ STATION = (
 DISC = (
     Key("node", NODE, "the node, a number from 1, or a station"),
     Key("name", NAME, "a name", default=""),
-    Key("mass_kg", _SIZE, "mass; with moments of inertia or alone"),
-    Key("polar_inertia_kg_m2", _SIZE, "about the shaft's line"),
-    Key("diametral_inertia_kg_m2", _SIZE, "across it"),
-    Key("width_m", ABOVE_ZERO, "of a disc by geometry, with `outer_diameter_m`"),
-    Key("outer_diameter_m", ABOVE_ZERO, "of a disc by geometry"),
-    Key("inner_diameter_m", _SIZE, "bore of a disc by geometry; default: none"),
-    Key("density_kg_per_m3", _SIZE, "of a disc by geometry; default: the material's"),
+    Key("mass_kg", _SIZE, "mass; with moments of inertia or alone", units.MASS, si=True),
+    Key("polar_inertia_kg_m2", _SIZE, "about the shaft's line", units.INERTIA, si=True),
+    Key("diametral_inertia_kg_m2", _SIZE, "across it", units.INERTIA, si=True),
+    Key("width_m", ABOVE_ZERO, "of a disc by geometry, with `outer_diameter_m`", units.LENGTH, si=True),
+    Key("outer_diameter_m", ABOVE_ZERO, "of a disc by geometry", units.LENGTH, si=True),
+    Key("inner_diameter_m", _SIZE, "bore of a disc by geometry; default: none", units.LENGTH, si=True),
+    Key("density_kg_per_m3", _SIZE, "of a disc by geometry; default: the material's", units.DENSITY, si=True),
 )
 INERTIA, _GEOMETRY = ([key.name for key in part] for part in (DISC[2:5], DISC[5:]))
 ROTOR = (
@@ -124,7 +125,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
     data = problems.need(read_toml(path, problems))
     if "shaft" not in data and "masses_kg" in data:
-        expected = "a rotor file; this is a small model, for `rotorid motion`, `bearings`, `fit` and such"
+        expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
         problems.add(str(path), None, "shaft", None, expected)
         problems.stop()
     said = take(Section(str(path), data, problems), ROTOR)

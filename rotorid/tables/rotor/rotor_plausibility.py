@@ -14,8 +14,8 @@ from fem.forces import ShortFilm
 from rotorid.base.arrays import BoolArray
 from rotorid.base.checks import attachment
 from rotorid.base.text import counted
-from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.problems import TableWarning
+from rotorid.files.columns import Table
+from rotorid.files.problems import TableWarning
 
 _GRAVITY = 9.81
 _SAG = 10.0  # m: of a rotor on its bearings, which then swings below 0.2 Hz

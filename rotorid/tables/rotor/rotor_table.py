@@ -22,10 +22,10 @@ from fem import (
     too_short,
 )
 from rotorid.base.arrays import FloatArray
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of
 from rotorid.tables.rotor.rotor_plausibility import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)

@@ -13,9 +13,9 @@ from rotorid.base.registry import names
 from rotorid.base.tables import Value, csv_bytes
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
-from rotorid.tables.reader.problems import InputError, Problem
-from rotorid.tables.reader.table_writing import write_files
+from rotorid.files.decimal_numbers import LARGEST, SMALLEST
+from rotorid.files.problems import InputError, Problem
+from rotorid.files.table_writing import write_files
 from rotorid.tables.rotor.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
 from rotorid.tables.rotor.calibration_keys import calibration_table
 from rotorid.tables.rotor.node_forces import force_tables
@@ -142,7 +142,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         material,
         *document.get("disc", ()),
         *(section for kind in (*names(KINDS), *forces) for section in document.get(kind, ())),
-        *(row for key in ("parameter", "reading", "compared") for row in found.get(key, ())),
+        *found.get("parameter", ()),
     ):
         _check_sizes(section)
     try:

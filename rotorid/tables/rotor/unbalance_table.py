@@ -10,12 +10,12 @@ from fem import Rotor
 from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files import units
+from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.conventions import FULL_TURN
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of
 from rotorid.reduction import SmallModel
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 COLUMNS = (
     Column("plane", required=False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, cast, get_args
 
 import numpy as np
@@ -14,11 +14,11 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import ErrorSource, Origin
-from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit
-from rotorid.tables.runs.stated_conventions import ANGLES, PHASES, StatedErrors
+from rotorid.files.columns import Table
+from rotorid.files.conventions import ANGLES, PHASES, StatedErrors
+from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit
 
 _ALLOWED = {"phase": PHASES, "angles": ANGLES}
 _CONVENTION = re.compile(r"(phase|angles)\s*=\s*(.*)")
@@ -36,23 +36,12 @@ ERRORS_MEANING = (
 )
 BASELINE_MEANING = "rows of (baseline): the vibration without weights, in the unit of the vibration"
 _SIZES = ("amplitude_percent", "phase_deg", "floor")
-_DEGREES = ("reading_degrees_of_freedom", "degrees_of_freedom")
-"""Of a reading's errors; older tables have those of the coefficients besides, the second."""
-_RUN = ("run_percent", "run_weights_percent")
-"""Own, common at a speed, common to the run: one number alone is both halves of the variance."""
-_OLD = ("run_floor", "run_share", "run_interval", "run_case", "run_merged")
-"""Of older tables, passed over."""
+_DEGREES, _RUN = "reading_degrees_of_freedom", "run_percent"
 _PARTS = ("own", "common", "weights", "unbalance")
 """Sizes of `RunErrors`, in their order."""
-_KEYS: dict[str, tuple[int, ...] | tuple[str, ...]] = {
-    **dict.fromkeys(_SIZES, (1,)),
-    "source": tuple(word for word in get_args(ErrorSource) if word != "unknown"),
-    **dict.fromkeys(_DEGREES, (1,)),
-    **dict.fromkeys(_RUN, (1, 3)),
-    "run_source": get_args(Origin),
-    "runs": ("{}",),
-}
-"""What may stand at each key: so many numbers, one of some words, or JSON."""
+_NUMBERS = (*_SIZES, _DEGREES, _RUN)
+_SOURCES = tuple(word for word in get_args(ErrorSource) if word != "unknown")
+_KEYS = (*_NUMBERS, "source", "runs")
 _ERRORS = re.compile(r"errors?\s*[.:=].*", re.IGNORECASE)
 _STATEMENT = re.compile(r"errors\.(\w+)\s*=\s*(.*)")
 
@@ -89,43 +78,45 @@ def read_conventions(source: str, comments: Sequence[str], problems: Problems) -
 def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
     """Errors of a reading from comment lines such as `# errors.phase_deg = 2`, or what is unknown."""
     before, scale = len(problems), vibration.scale
-    numbers: dict[str, list[float]] = {}
-    words: dict[str, str] = {}
-    run, first = RunErrors(np.zeros((1, len(_PARTS))), np.ones(1), "none"), ""
+    numbers: dict[str, float] = {}
+    run, source, first = RunErrors(np.zeros((1, len(_PARTS))), np.ones(1), "none"), "", ""
+    seen: set[str] = set()
     for number, comment in enumerate(table.comments):
         if _ERRORS.fullmatch(comment) is None:
             continue
         statement = _STATEMENT.fullmatch(comment)
         key, text = statement.groups() if statement else ("", "")
         first = first or comment
-        if key in _OLD:
-            continue
         try:
             if key not in _KEYS:
                 hint = did_you_mean(key, _KEYS)
                 raise NotANumber(f"# errors.KEY = VALUE with one of the keys {listing(_KEYS)}{hint}")
-            if key in numbers or key in words:
+            if key in seen:
                 raise NotANumber(f"errors.{key} once")
+            seen.add(key)
             if key == "runs":
-                words[key], run = text, _runs(text, scale)
-            elif isinstance(_KEYS[key][0], str):
-                words[key] = _word(text, key)
+                run = _runs(text, scale)
+            elif key in _NUMBERS:
+                numbers[key] = _size(text, above_zero=key == _DEGREES)
+            elif text in _SOURCES:
+                source = text
             else:
-                numbers[key] = _numbers(text, key)
+                raise NotANumber(f"one of {listing(map(repr, _SOURCES))}{did_you_mean(text, _SOURCES)}")
         except NotANumber as reason:
             problems.add(table.source, _row(table, number), None, f"# {comment}", str(reason))
-    if len(problems) > before or not (numbers or words):
+    if len(problems) > before or not seen:
         return Errors(Reading(), run)
-    if "runs" not in words and any(key in numbers for key in _RUN):
-        run = RunErrors(_few(numbers), np.ones(1), cast("Origin", words.get("run_source", "stated")))
-    sizes = {key: numbers[key][0] for key in _SIZES if key in numbers}
+    if _RUN in numbers and "runs" not in seen:
+        half = numbers[_RUN] / 100 / np.sqrt(2)
+        run = RunErrors(np.array([[half, half, 0.0, 0.0]]), np.ones(1), "stated")
+    sizes = {key: numbers[key] for key in _SIZES if key in numbers}
     if not any(sizes.values()):
         expected = f"an error of a reading above 0 with it: # errors.{listing(_SIZES)}"
         problems.add(table.source, _row(table, table.comments.index(first)), None, f"# {first}", expected)
         return Errors(Reading(), run)
     reading = StatedErrors(**sizes).in_si(Labels(vibration_scale=scale))
-    dof = next((numbers[key][0] for key in _DEGREES if key in numbers), np.inf)
-    return Errors(Reading(reading, cast("ErrorSource", words.get("source", "stated")), dof=dof), run)
+    dof = numbers.get(_DEGREES, np.inf)
+    return Errors(Reading(reading, cast("ErrorSource", source or "stated"), dof=dof), run)
 
 
 def _runs(text: str, scale: float) -> RunErrors:
@@ -149,30 +140,11 @@ def _runs(text: str, scale: float) -> RunErrors:
     return RunErrors(columns.T, probability, value["source"], float(single[0]) / scale, float(single[1]))
 
 
-def _few(numbers: Mapping[str, list[float]]) -> FloatArray:
-    """Sizes (1, 4) from few numbers in percent."""
-    row, weights = (np.array(numbers.get(key, [0.0])) / 100 for key in _RUN)
-    own, common = (row[0], np.hypot(*row[1:])) if len(row) == 3 else (row[0] / np.sqrt(2),) * 2
-    return np.array([[own, common, np.sqrt(np.sum(weights**2)), 0.0]])
-
-
-def _numbers(text: str, key: str) -> list[float]:
-    values = [parse_number(word) for word in text.split()]
-    if len(values) not in _KEYS[key]:
-        counts = listing(map(str, _KEYS[key]))
-        raise NotANumber("one number" if counts == "1" else f"{counts} numbers with spaces between them")
-    if min(values) < 0:
-        raise NotANumber("a number of 0 or more")
-    if key in _DEGREES and not values[0]:
-        raise NotANumber("a number above 0")
-    return values
-
-
-def _word(text: str, key: str) -> str:
-    known = [str(word) for word in _KEYS[key]]
-    if text not in known:
-        raise NotANumber(f"one of {listing(map(repr, known))}{did_you_mean(text, known)}")
-    return text
+def _size(text: str, *, above_zero: bool) -> float:
+    value = parse_number(text.strip())
+    if value < 0 or (above_zero and not value):
+        raise NotANumber("a number above 0" if above_zero else "a number of 0 or more")
+    return value
 
 
 def _row(table: Table, number: int) -> int | None:
@@ -206,7 +178,7 @@ def error_comments(influence: Influence, labels: Labels) -> tuple[str, ...]:
         sizes = 100 * errors.amplitude, float(np.degrees(errors.phase)), errors.floor * scale
         lines += [f"errors.{key} = {value!r}" for key, value in zip(_SIZES, sizes, strict=True) if value]
         lines += [f"errors.source = {reading.source}"] if reading.source != "unknown" else []
-        lines += [f"errors.{_DEGREES[0]} = {float(reading.dof)!r}"] if np.isfinite(reading.dof) else []
+        lines += [f"errors.{_DEGREES} = {float(reading.dof)!r}"] if np.isfinite(reading.dof) else []
     if reading.errors is not None and run.origin != "none":
         likely = run.probability > 1e-4
         percent = zip(_PARTS, 100 * run.sizes[likely].T, strict=True)

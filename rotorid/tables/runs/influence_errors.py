@@ -9,8 +9,7 @@ with, in the unit of the vibration, and its correlations with them.
 What readings have in common stands in pairs of columns `common_1_re`, `common_1_im`, `common_2_re`, …: an
 error moves every coefficient by its column, as a complex share of the root mean square of the two standard
 deviations, times one real number of variance 1 for all rows. Without the rows of `(baseline)` a later run has
-errors of its own only; without the columns `common_…` readings count as independent. Older tables have
-`common_run_1_re`, … (times a complex number for all rows) and `common_speed_1_re`, … (one for each speed).
+errors of its own only; without the columns `common_…` readings count as independent.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ import numpy as np
 
 from balancing import Influence, Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.files.columns import Column, Table
+from rotorid.files.decimal_numbers import SMALLEST
+from rotorid.files.grid import Grid, show
+from rotorid.files.problems import Problems
+from rotorid.files.units import Unit, UnitError, UnitReader, ratio, spelt
 from rotorid.regression import stretch, unstretch
-from rotorid.tables.reader.columns import Column, Table
-from rotorid.tables.reader.decimal_numbers import SMALLEST
-from rotorid.tables.reader.grid import Grid, show
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, UnitError, UnitReader, ratio, spelt
 
 PARTS = ("re", "im")
 BASELINE = "(baseline)"
 """In the column of the plane: the vibration without weights."""
-_COMMON = re.compile(r"common(_run|_speed)?_\d+_(re|im)")
+_COMMON = re.compile(r"common_\d+_(re|im)")
 _NOTHING = 1e-14
 _ROUNDING = 1e-9
 _INDEFINITE = 1e-6
@@ -138,9 +137,7 @@ def _read_common(table: Table, places: IndexArray, sign: int) -> ComplexArray:
         for part, unit in zip(PARTS, (1, 1j * sign), strict=True):
             if f"{name}_{part}" in table:
                 column += unit * table.numbers(f"{name}_{part}")[places]
-        if name.startswith("common_speed"):
-            column = np.eye(len(places))[:, :, None, None] * column
-        out += [column] if re.match(r"common_\d", name) else [column, 1j * column]
+        out.append(column)
     return np.concatenate(out)
 
 

@@ -1,7 +1,12 @@
-"""Influence tables: stored coefficients, one row per speed × sensor × plane."""
+"""Influence tables: stored coefficients, one row per speed × sensor × plane.
+
+Instruments and handbooks print the reciprocal for one plane and one sensor, S = 1/W: the weight, and its
+angle, with which the reading is 1 at the phase 0. A vibration Y is corrected by −S Y.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -10,14 +15,20 @@ import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Trials
 from fem import label
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.table_writing import table_bytes, write_bytes
-from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table, make_table, read_grid
+from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.grid import Grid
+from rotorid.files.headings import read_headings, read_unit, readable
+from rotorid.files.layout import vector_in
+from rotorid.files.problems import Problems
+from rotorid.files.runs import PHASE, SPEED
+from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.files.table_writing import table_bytes, write_bytes
+from rotorid.files.units import Unit, UnitError
 from rotorid.tables.runs.influence_comments import (
     PHASE_MEANING,
     check_notes,
@@ -26,9 +37,6 @@ from rotorid.tables.runs.influence_comments import (
     read_errors,
 )
 from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
-from rotorid.tables.runs.runs_table import PHASE, SPEED
-from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
-from rotorid.tables.runs.stated_conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,6 +46,8 @@ if TYPE_CHECKING:
     from fem import SensorLike
 
 _GAPS_NAMED = 100
+_NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
+_RECIPROCAL = "weight per vibration"
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
@@ -79,8 +89,42 @@ def _split(name: str) -> tuple[Unit, Unit]:
 
 
 def _influence_unit(name: str) -> Unit:
-    vibration, weight = _split(name)
-    return Unit(name, "influence", vibration.multiply * weight.divide, vibration.divide * weight.multiply)
+    halves = _reciprocal(f"influence_{name}")
+    one, other = _split(name) if halves is None else halves
+    kind = "influence" if halves is None else _RECIPROCAL
+    return Unit(name, kind, one.multiply * other.divide, one.divide * other.multiply)
+
+
+def _reciprocal(name: str) -> tuple[Unit, Unit] | None:
+    """Units of the weight and of the vibration from `influence_g_per_in_s` or `Sensitivity (oz/mil)`."""
+    match = _NAMED.fullmatch(name)
+    text = "" if match is None else re.sub("[ _]per[ _]", "/", match[1])
+    for sign in re.finditer("/", text):
+        above, below = text[: sign.start()], text[sign.end() :].strip("()")
+        if above and below and readable("mass", above) and readable("amplitude", below):
+            weight, vibration = read_unit("mass", above)[0], read_unit("amplitude", below)[0]
+            if vibration not in units.WEIGHT:
+                return units.WEIGHT[weight], units.VIBRATION[vibration]
+    return None
+
+
+def _tidied(grid: Grid) -> Grid:
+    """A table of weights per vibration with the columns influence_<unit> and phase_deg."""
+    named = {k: halves for k, name in enumerate(grid.header) if (halves := _reciprocal(name)) is not None}
+    if len(named) != 1:
+        return grid
+    [(at, (weight, vibration))] = named.items()
+    header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(grid.header)]
+    header[at] = f"influence_{weight.name}_per_{vibration.name}"
+    vectors = [vector_in(cells[at]) for _, cells in grid.rows]
+    rows = grid.rows
+    if "phase_deg" not in header and all(vectors):
+        header.append("phase_deg")
+        rows = tuple(
+            (number, (*cells[:at], vector[0].strip(), *cells[at + 1 :], vector[1].rstrip("° ")))
+            for (number, cells), vector in zip(rows, filter(None, vectors), strict=True)
+        )
+    return replace(grid, header=tuple(header), rows=rows)
 
 
 COLUMNS = (
@@ -98,7 +142,9 @@ def read_influence(
     """Read stored influence coefficients.
 
     The phase of a coefficient is the phase reading that a weight at angle 0 causes; whether it leads or lags
-    stands in a comment line `# phase = lag`, or else in `phase`.
+    stands in a comment line `# phase = lag`, or else in `phase`. Weights per vibration of one plane and one
+    sensor (`influence_g_per_in_s`, `Sensitivity (oz/mil)`, cells such as `45.9 @ 309°`) are the reciprocal:
+    `phase_deg` is the angle of the weight with which the reading has phase 0.
 
     Parameters
     ----------
@@ -132,11 +178,55 @@ def load_influence(
     """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
     before = len(problems)
     grid = read_grid(source, "influence", problems)
+    grid = None if grid is None else _tidied(grid)
     columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
     table = None if grid is None else make_table(grid, columns, problems)
     if table is None:
         return None
     said = read_conventions(table.source, table.comments, problems)
+    where = _places(table, problems)
+    if where is None or len(problems) > before:
+        return None
+    speeds, sensors, planes, places = where
+    size, angle = table.numbers("influence"), table.numbers("phase")
+    written = Labels(
+        phase=as_phase(said.get("phase") or phase or "lead"),
+        angles=as_angles(said.get("angles") or angles or "with rotation"),
+    )
+    name = table.unit("influence").name
+    vibration, weight = (_reciprocal(f"influence_{name}") or ())[::-1] or _split(name)
+    known = read_covariance(table, places, planes, written, problems)
+    errors = read_errors(table, vibration, problems)
+    if len(problems) > before:
+        return None
+    labels = Labels(
+        vibration_unit=vibration.name,
+        vibration_scale=vibration.scale,
+        weight_unit=weight.name,
+        weight_scale=weight.scale,
+        phase=phase or as_phase(said.get("phase", "lead")),
+        angles=angles or as_angles(said.get("angles", "with rotation")),
+    )
+    reciprocal = table.unit("influence").kind == _RECIPROCAL
+    values = 1.0 / written.weight_from(size, angle) if reciprocal else written.vibration_from(size, angle)
+    theta, own, common = _whole(values[places], known, planes, weight.scale)
+    influence = Influence(
+        speeds=np.array(speeds),
+        sensors=sensors,
+        planes=tuple(name for name in planes if name != BASELINE),
+        W=theta[..., 1:],
+        baseline=theta[..., 0],
+        errors=Gaussian(own, common, errors.reading, errors.run),
+        labels=labels,
+    )
+    return Stored(influence, said)
+
+
+def _places(
+    table: Table, problems: Problems
+) -> tuple[list[float], tuple[str, ...], tuple[str, ...], IntArray] | None:
+    """Speeds, sensors and planes, and the row of each coefficient (S, C, P); None and problems."""
+    before = len(problems)
     speed, size, angle = (table.numbers(stem) for stem in ("speed", "influence", "phase"))
     table.must_be("speed", speed > 0, "a speed above 0")
     table.must_be("influence", size >= 0, "a coefficient of 0 or more")
@@ -145,6 +235,11 @@ def load_influence(
     sensors = tuple(dict.fromkeys(name for name in sensor if name))
     planes = tuple(sorted({name: 0 for name in plane if name}, key=lambda name: name != BASELINE))
     speeds = sorted({float(value) for value in speed if value > 0})
+    if table.unit("influence").kind == _RECIPROCAL:
+        table.must_be("influence", size > 0, "a weight above 0")
+        if len(sensors) > 1 or len(planes) > 1 or len(table.fields) > len(COLUMNS):
+            expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
+            table.in_header(table.fields["influence"].name, expected)
     at = [{value: k for k, value in enumerate(values)} for values in (speeds, sensors, planes)]
     seen: dict[tuple[int, int, int], int] = {}
     for i in range(len(table)):
@@ -169,35 +264,10 @@ def load_influence(
             table.as_whole("plane", expected)
     if len(problems) > before:
         return None
-    written = Labels(phase=as_phase(said.get("phase") or phase or "lead"))
     places = np.empty((len(speeds), len(sensors), len(planes)), dtype=np.intp)
     for key, i in seen.items():
         places[key] = i
-    vibration, weight = _split(table.unit("influence").name)
-    known = read_covariance(table, places, planes, written, problems)
-    errors = read_errors(table, vibration, problems)
-    if len(problems) > before:
-        return None
-    labels = Labels(
-        vibration_unit=vibration.name,
-        vibration_scale=vibration.scale,
-        weight_unit=weight.name,
-        weight_scale=weight.scale,
-        phase=phase or as_phase(said.get("phase", "lead")),
-        angles=angles or as_angles(said.get("angles", "with rotation")),
-    )
-    values = written.vibration_from(size, angle)
-    theta, own, common = _whole(values[places], known, planes, weight.scale)
-    influence = Influence(
-        speeds=np.array(speeds),
-        sensors=sensors,
-        planes=tuple(name for name in planes if name != BASELINE),
-        W=theta[..., 1:],
-        baseline=theta[..., 0],
-        errors=Gaussian(own, common, errors.reading, errors.run),
-        labels=labels,
-    )
-    return Stored(influence, said)
+    return speeds, sensors, planes, places
 
 
 def _whole(

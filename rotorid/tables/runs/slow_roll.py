@@ -23,13 +23,13 @@ from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.settings_keys import Said
-from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
-from rotorid.tables.runs.stated_conventions import Conventions
-from rotorid.tables.runs.trials import make_trials
+from rotorid.files import units
+from rotorid.files.columns import Source, source_name
+from rotorid.files.conventions import Conventions
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials
+from rotorid.files.settings_keys import Said
+from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""

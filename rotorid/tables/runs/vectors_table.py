@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.complex_numbers import turned
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
-from rotorid.identify.modes_readings import Readings
-from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, make_table, read_grid
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs import runs_table
+from rotorid.files import runs as runs_table
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table
+from rotorid.files.conventions import Conventions
+from rotorid.files.grid import Grid
+from rotorid.files.layout import read_runs_grid
+from rotorid.files.problems import Problems
+from rotorid.files.units import one_of
+from rotorid.identify.modes_result import Readings
 from rotorid.tables.runs.slow_roll import make_slow_roll
-from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
 COLUMNS = (
-    *(column for column in runs_table.COLUMNS if column.required),
+    *(column for column in runs_table.COLUMNS if column.stem not in ("repeat", "time_s")),
     Column("time", one_of(units.TIME), ("time_s",), required=False),
-    Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
-    Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
-_BESIDE = re.compile(r"(order\d+_|overall|gap|turns).*")
-"""Columns that say nothing about the vectors of order 1."""
 _SAME = 1e-9
 
 
@@ -40,6 +35,8 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
     `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
     one standard deviation. Vectors of one time were read at one speed; without times a speed stands once.
+    The table may have any layout of a runs table, such as columns for each sensor; without a column `run` it
+    is one run, named as the file.
 
     Raises
     ------
@@ -47,25 +44,16 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
         With all problems of the file.
     """
     problems = Problems()
-    grid = problems.need(read_grid(source, "vectors", problems, first=True))
-    header = tuple("note" if _BESIDE.fullmatch(name) else name for name in grid.header)
-    table = problems.need(make_table(replace(grid, header=header), COLUMNS, problems))
-    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
-    allowed = np.abs(table.numbers("phase")) <= FULL_TURN
-    table.must_be("phase", allowed, "a phase from -360 to 360 degrees")
-    for stem, other in (("amplitude_std", "phase_std"), ("phase_std", "amplitude_std")):
-        table.must_be(stem, table.numbers(stem) > 0, "a standard deviation above 0: nothing is read exactly")
-        if stem in table and other not in table and not len(problems):
-            table.in_header(other, f"a column {other} with its unit, as there is {table.fields[stem].name}")
-    if "amplitude_std" in table and table.unit("amplitude_std").kind != table.unit("amplitude").kind:
-        table.in_header(table.fields["amplitude_std"].name, "a unit that converts to that of the amplitudes")
+    files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
+    conventions = Conventions(Labels(phase=phase))
+    grid = problems.need(read_runs_grid(files, conventions, problems, first=True))
+    table = problems.need(runs_table.readings_table(grid, problems, COLUMNS))
     _complain_about_twins(table)
     problems.stop()
     unit = table.unit("amplitude")
     labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
     vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
-    covariances = _covariances(table, vectors) if "amplitude_std" in table else None
+    covariances = runs_table.covariances(table, vectors) if "amplitude_std" in table else None
     runs = np.array(table.texts("run"))
     return tuple(
         _sweep(table, np.flatnonzero(runs == run), vectors, covariances, labels)
@@ -92,14 +80,6 @@ def _complain_about_twins(table: Table) -> None:
         if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)
-
-
-def _covariances(table: Table, vectors: ComplexArray) -> FloatArray:
-    """Of real and imaginary parts, (rows, 2, 2)."""
-    size = np.abs(vectors)
-    along, across = table.numbers("amplitude_std") ** 2, (size * table.numbers("phase_std")) ** 2
-    # where there is nothing, no direction is another
-    return turned(vectors, along, np.where(size > 0, across, along))
 
 
 def _sweep(

@@ -56,10 +56,10 @@ def read_uff(path: Path) -> Sampled:
         raise refusal(path, "a time response (function type 1) in a dataset 58")
     channels = [one["data"][: one["num_pts"]] for one in sets]
     clocks = [(one["abscissa_min"], one["abscissa_inc"]) for one in sets]
-    return sampled(path, dict(zip(_names(sets), channels, strict=True)), _common_rate(path, clocks))
+    return sampled(path, dict(zip(names_of_sets(sets), channels, strict=True)), _common_rate(path, clocks))
 
 
-def _names(sets: list[dict[str, Any]]) -> list[str]:
+def names_of_sets(sets: list[dict[str, Any]]) -> list[str]:
     """First lines where they tell the sets apart; else nodes with directions; else numbers."""
     lines = [one["id1"].strip() for one in sets]
     nodes = [f"{one['rsp_node']}{_DIRECTIONS.get(one['rsp_dir'], '')}" for one in sets]

@@ -13,9 +13,8 @@ import numpy as np
 
 from rotorid.base.arrays import AnyArray
 from rotorid.base.text import listing
-from rotorid.tables.data.records import TIME
-from rotorid.tables.reader.problems import InputError, Problem, printable
-from rotorid.tables.reader.units import Unit, spelt
+from rotorid.files.problems import InputError, Problem, printable
+from rotorid.files.units import TIME, Unit, spelt
 
 LARGEST_SHIFT = 0.3
 """Of a time from its place, in steps: times may be rounded; a missing sample shifts one by 0.5 or more."""

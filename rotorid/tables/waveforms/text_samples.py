@@ -13,13 +13,12 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.tables.data.records import TIME
-from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma, parse_number
-from rotorid.tables.reader.input_file import first_bytes
-from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.text_file import decode
-from rotorid.tables.reader.units import spelt
-from rotorid.tables.reader.value_kinds import plain_number
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.files.input_file import first_bytes
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import decode
+from rotorid.files.units import TIME, spelt
+from rotorid.files.value_kinds import plain_number
 from rotorid.tables.waveforms.sampled_file import Sampled, refusal, sampled
 
 HEAD = 65_536

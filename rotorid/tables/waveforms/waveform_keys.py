@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import get_args
 
 from rotorid.base.text import listing
-from rotorid.tables.reader import units, value_kinds
-from rotorid.tables.reader.settings_keys import Key, Kind
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.value_kinds import ABOVE_ZERO, TEXT, number
-from rotorid.tables.runs.stated_conventions import PHASES
+from rotorid.files import units, value_kinds
+from rotorid.files.conventions import PHASES
+from rotorid.files.settings_keys import Key, Kind
+from rotorid.files.toml_file import Section
+from rotorid.files.value_kinds import ABOVE_ZERO, TEXT, number
 from rotorid.waveforms.record import Edge
 
 _FREQUENCY = {name: units.SPEED[name] for name in ("Hz", "rad_s")}

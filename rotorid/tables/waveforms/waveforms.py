@@ -14,12 +14,12 @@ from balancing import Labels
 from rotorid.base.arrays import AnyArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.input_file import first_bytes
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.settings_keys import Said, take
-from rotorid.tables.reader.text_file import readable
-from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.units import VIBRATION, Unit, spelt
+from rotorid.files.input_file import first_bytes
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.settings_keys import Said, take
+from rotorid.files.text_file import readable
+from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.units import VIBRATION, Unit, spelt
 from rotorid.tables.waveforms.array_files import read_mat, read_npz
 from rotorid.tables.waveforms.instrument_files import read_tdms, read_uff, read_wav
 from rotorid.tables.waveforms.sampled_file import Sampled, refusal

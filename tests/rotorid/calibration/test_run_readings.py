@@ -130,7 +130,7 @@ def test_whitening_is_that_of_one_joint_covariance(free, scatter):
         left = np.linalg.solve(C, both)
         x = x - both @ np.linalg.solve(both.T @ left, left.T @ x)
     residual = rows.residual(W)[0]
-    assert residual.size == data.size == x.size
+    assert residual.size == x.size
     assert residual @ residual == pytest.approx(x @ np.linalg.solve(C, x), rel=1e-6)
     assert rows.stated
 

@@ -10,6 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 from tables_data import write_csv
+from workbook_jobs import as_workbook
 
 from rotorid.samples import sample_data
 
@@ -217,7 +218,8 @@ def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
     assert "<strong>If lag or against:</strong>" in page.read_text(encoding="utf-8")
     sheets = openpyxl.load_workbook(book)
     assert sheets["results other readings"].max_row == 4
-    assert cli("balance", book, "--json").json["conventions"]["assumed"] == ["phase", "angles"]
+    own = as_workbook(job, tmp_path / "job.xlsx")
+    assert cli("balance", own, "--json").json["conventions"]["assumed"] == ["phase", "angles"]
 
 
 def test_computed_coefficients(cli, tmp_path):

@@ -11,8 +11,8 @@ import sys
 
 import pytest
 
+from rotorid.files.table_writing import write_files
 from rotorid.samples import sample_data
-from rotorid.tables.reader.table_writing import write_files
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"

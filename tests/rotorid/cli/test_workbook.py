@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from rotorid.samples import sample_data
-from rotorid.tables import read_influence, write_influence
+from rotorid.tables import read_influence
 
 DATA = sample_data()
 TURBO = DATA / "turbo_job"
@@ -28,7 +28,7 @@ def test_the_sheets_of_results(cli, tmp_path):
         "results", "results summary", "results residuals", "results add to mounted",
         "results mounted residuals", "results holes", "results influence",
     ]  # fmt: skip
-    assert book.sheetnames == ["runs", "weights", "planes", "sensors", "settings", *results]
+    assert book.sheetnames == results
     assert book.active.title == "results"
     corrections = pd.read_excel(sheet, sheet_name="results", comment="#")
     assert corrections["plane"].tolist() == ["left", "middle", "right"]
@@ -62,39 +62,6 @@ def test_the_influence_coefficients_of_the_results_are_a_table(cli, tmp_path):
     ours, saved = read_influence(tmp_path / "only.xlsx"), read_influence(stored)
     np.testing.assert_allclose(ours.W, saved.W, rtol=1e-14)  # the deleting program keeps 16 digits
     assert ours.sensors == saved.sensors
-
-
-def test_stored_coefficients_are_embedded(cli, tmp_path):
-    runs, stored = tmp_path / "runs.csv", tmp_path / "influence.csv"
-    assert cli("balance", TURBO / "job.toml", "--save-influence", stored).code == 0
-    lines = (TURBO / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-    runs.write_text(
-        "".join(line for line in lines if line.startswith(("run,", "baseline"))), encoding="utf-8"
-    )
-    write_influence(stored, read_influence(stored), ["machine 7, summer"])
-    sheet = tmp_path / "sheet.xlsx"
-    first = cli("balance", runs, "--influence", stored, "--output", sheet, "--json")
-    stored.unlink()
-    runs.unlink()
-    assert answer(cli("balance", sheet, "--json")) == answer(first)
-    comments = [row[0] for row in openpyxl.load_workbook(sheet)["influence"].iter_rows(values_only=True)]
-    assert "# machine 7, summer" in comments
-
-
-def test_what_cannot_be_kept_writes_nothing(cli, tmp_path):
-    for name in ("runs", "weights"):
-        (tmp_path / f"{name}.csv").write_bytes((TURBO / f"{name}.csv").read_bytes())
-    job, sheet, picture = tmp_path / "job.toml", tmp_path / "sheet.xlsx", tmp_path / "p.png"
-    job.write_text(
-        'runs = "runs.csv"\nweights = "weights.csv"\n[planes.left]\nholes = 2\nhole_names = ["A;B", "C"]\n'
-    )
-    assert cli("balance", job).code == 0
-    outcome = cli("balance", job, "--output", sheet, "--plot", picture)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert "this job cannot be kept in a workbook" in outcome.err
-    assert "Traceback" not in outcome.err
-    assert not sheet.exists()
-    assert not picture.exists()
 
 
 def test_the_form(cli, tmp_path):

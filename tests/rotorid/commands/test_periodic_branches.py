@@ -86,7 +86,7 @@ def test_on_linear_supports_it_is_the_response():
     """The compressor on its table of bearings; the rotor is reduced here, which costs a thousandth."""
     folder = sample_data() / "compressor"
     given = PeriodicOptions(speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30")
-    found = periodic(folder / "rotor.toml", given).result.readings
+    found = periodic(folder / "rotor.toml", given).result
     (branch,) = found.motion.branches
     speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
     options = ResponseOptions(speeds=speeds, sensors="2,12:30")

@@ -1,6 +1,7 @@
 """response: readings, orbits, forces, peaks, tables of unbalance, errors from a calibration."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,10 @@ import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import ResponseOptions, response
+from rotorid.reduction import small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_unbalance
+from rotorid.tables.models.small_model_file import small_model_bytes
 
 RPM = np.pi / 30
 OK_SPEEDS = ("--speeds", "100:200:50")
@@ -125,6 +128,92 @@ def test_amplitudes_have_their_errors(calibrated):
     std = spread(read_rotor(calibrated), amplitudes)
     np.testing.assert_allclose(found.document["amplitude_std_m"], std.T, rtol=1e-4)
     np.testing.assert_allclose(found.to_frame()["amplitude_std_m"], std.ravel(), rtol=1e-4)
+    assert [*found.tables[-1].headings][:3] == ["sensor", "largest reading, µm peak", "±"]
+    for k, row in enumerate(found.document["largest"]):
+
+        def highest(rotor, at=row["speed_rad_s"]):
+            return np.abs(fem.unbalance_response(rotor, {12: 1e-3}, at).readings([(2, 45.0), 12])[0])
+
+        assert row["amplitude_std_m"] == pytest.approx(spread(read_rotor(calibrated), highest)[k], rel=1e-4)
+        assert found.tables[-1].columns[2].values[k] == pytest.approx(1e6 * row["amplitude_std_m"])
+
+
+def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
+    """Two discs on a massless shaft are their own small model: all numbers but the nodes' are the rotor's."""
+    rotor = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        density=0.0,
+        discs=[fem.Disc(4, 30.0), fem.Disc(8, 20.0)],
+        supports=[
+            fem.Support(1, ((2e7, 3e6), (-2e6, 5e7)), ((2e3, 1e2), (50.0, 3e3)), name="A"),
+            fem.Support(11, 5e7, 3e3, name="B"),
+        ],
+    )
+    small, whole = tmp_path / "small.toml", tmp_path / "rotor.toml"
+    write_rotor(whole, rotor)
+    model = small_model(rotor, (4, 8), (30.0, 20.0))
+    small.write_bytes(small_model_bytes(model))
+    table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]])
+    how = (
+        "--unbalance",
+        table,
+        "--speeds",
+        "100:6000:50rpm",
+        "--sensors",
+        "4,8:90,11",
+        "--operating",
+        "2500:3000rpm",
+    )
+    mine, theirs = (cli("response", file, *how, "--json").json for file in (small, whole))
+    assert set(mine) == set(theirs)
+    np.testing.assert_allclose(mine["amplitude_m"], theirs["amplitude_m"], rtol=1e-7)
+    turned = np.subtract(mine["phase_deg"], theirs["phase_deg"]) + 180.0
+    np.testing.assert_allclose(turned % 360.0, 180.0, atol=1e-5)
+    assert mine["vibration_limit"] == pytest.approx(theirs["vibration_limit"], rel=1e-6)
+    for force in ("force_x_N", "force_y_N", "largest_N"):
+        np.testing.assert_allclose(mine["bearing_forces"][force], theirs["bearing_forces"][force], rtol=1e-5)
+    for one, other in zip(mine["peaks"], theirs["peaks"], strict=True):
+        for key in ("speed_rad_s", "amplitude", "amplification_factor", "separation_margin_percent"):
+            assert one[key] == pytest.approx(other[key], rel=1e-6) if other[key] else one[key] is None, key
+    assert len(mine["peaks"]) >= 3
+    made = [tmp_path / name for name in ("p.png", "r.html", "t.csv")]
+    cli("response", small, *how, "--plot", made[0], "--report", made[1], "--output", made[2])
+    assert all(path.stat().st_size > 1000 for path in made)
+
+
+def test_an_undamped_small_model_has_one_row_for_each_critical_speed(cli, tmp_path):
+    """Its peaks are infinite: forward and backward whirl coincide, and all sensors show the same speeds."""
+    rotor = read_rotor(sample_data() / "rotor23.csv")
+    small = tmp_path / "small.toml"
+    small.write_bytes(small_model_bytes(small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0))))
+    table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [12, 1000, 0]])
+    outcome = cli(
+        "response", small, "--unbalance", table, "--speeds", "500:9000:10rpm", "--sensors", "7,12,18"
+    )
+    assert outcome.out.startswith("2 critical speeds at 851 speeds")
+    assert "practically undamped peaks" in outcome.out
+    criticals = small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0)).critical_speeds(50.0, 900.0)
+    for speed in criticals:
+        assert f"{speed / RPM:.2f}" in outcome.out
+
+
+def test_unbalance_of_a_small_model(cli, tmp_path):
+    rotor = fem.Rotor([0.5, 0.5], 0.05, density=0.0, discs=[fem.Disc(2, 30.0)],
+                      supports=[fem.Support(1, 1e7, 2e3), fem.Support(3, 1e7, 2e3)])  # fmt: skip
+    small = tmp_path / "small.toml"
+    how = ("response", small, "--speeds", "50:150:10", "--unbalance")
+    model = small_model(rotor, (2,), (30.0,))
+    small.write_bytes(small_model_bytes(model))
+    assert "no unbalance is given" in cli(*how, "own").err
+    assert "journals of a rotor" in cli(*how, "api").err
+    small.write_bytes(small_model_bytes(replace(model, unbalance={2: 1e-4})))
+    document = cli(*how, "own", "--json").json
+    k, m, w = 1 / (1 / 2e7 + 1 / model.stiffness[0, 0]), 30.0, 100.0
+    assert document["sensors"] == [2, 1, 3]
+    amplitude = document["amplitude_m"][0][5]
+    assert amplitude == pytest.approx(1e-4 * w**2 / abs(k - m * w**2), rel=1e-2)
+    assert "--view shape draws a rotor" in cli(*how, "own", "--view", "shape").err
 
 
 COMPRESSOR = sample_data() / "compressor"

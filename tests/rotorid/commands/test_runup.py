@@ -10,7 +10,6 @@ from rotorid.base.rpm import RPM
 from rotorid.commands import RunUpOptions, runup
 from rotorid.samples import sample_data
 from rotorid.tables import read_modes, read_rotor
-from rotorid.tables.data.frequency_table import read_frequencies
 from rotorid.tables.runs.vectors_table import read_vectors
 
 
@@ -112,7 +111,7 @@ def test_of_several_runs_one_is_chosen(cli, rotor_and_sweep, tmp_path):
 
 
 def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
-    """By `reduce` and `calibrate`, as critical speeds and not as frequencies at rest."""
+    """By `reduce`, as critical speeds and not as frequencies at rest."""
     _, sweep = rotor_and_sweep
     path, output = table(tmp_path / "v.csv", [replace(sweep, sensors=("7", "18"))]), tmp_path / "modes.csv"
     assert cli("runup", path, "--output", output).code == 0
@@ -120,9 +119,6 @@ def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
     modes = read_modes(output, rotor)
     assert modes.critical
     assert modes.nodes == (7, 18)
-    data = read_frequencies(output, rotor).data
-    assert not data.rest
-    np.testing.assert_allclose(data.frequencies, modes.frequencies)
     reduced = cli("reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json")
     assert reduced.code == 0
 

@@ -1,7 +1,9 @@
 """`rotorid.commands.unbalance`: from Python as from the command line."""
 
+import pytest
 from documents import same
 
+from rotorid import read_rotor
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.samples import sample_data
 
@@ -15,3 +17,28 @@ def test_from_python_as_from_the_command_line(cli):
     assert found.provenance["inputs"] == printed["provenance"]["inputs"]
     given = printed["provenance"]["options"]
     assert set(given) == set(found.provenance["options"]) == {"stations"}
+
+
+@pytest.mark.parametrize("stations", [[6, 12, 19], [12], [4, 6, 8, 10, 12, 14, 16, 18, 19, 20]])
+def test_the_picture_shows_the_rotor_under_the_stations_and_whole_regions(stations):
+    """Figure 3 of [S]: a line joins the vector of each station with its place in the drawing of the rotor."""
+    outcome = unbalance(JOB, UnbalanceOptions(stations=stations))
+    figure = outcome.figure()
+    figure.canvas.draw()
+    above, below = figure.axes
+    assert (below.get_xlabel(), below.get_ylabel()) == ("position, m", "radius, mm")
+    rotor = read_rotor(JOB.with_name("rotor.csv"))
+    joins = figure.artists
+    assert len(joins) == len(stations)
+    for join, tick, node in zip(joins, above.get_xticks(), stations, strict=True):
+        (start, top), (end, bottom) = join.xy1, join.xy2
+        assert (start, end) == (pytest.approx(tick), pytest.approx(rotor.positions[node - 1]))
+        assert above.get_ylim()[0] == top
+        assert below.get_ylim()[1] == bottom
+    inside = above.get_window_extent()
+    regions = [line for line in above.get_lines() if len(line.get_xdata()) > 2]
+    assert len(regions) == len(stations)
+    for line in regions:
+        x, y = above.transData.transform(line.get_xydata()).T
+        assert inside.x0 <= x.min() <= x.max() <= inside.x1
+        assert inside.y0 <= y.min() <= y.max() <= inside.y1

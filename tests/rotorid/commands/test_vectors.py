@@ -8,8 +8,8 @@ import pytest
 from scipy.io import wavfile
 
 from rotorid.commands import BalanceOptions, VectorsOptions, balance, vectors
+from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
-from rotorid.tables.reader.problems import InputError
 
 SAMPLE = sample_data() / "waveforms"
 RATE = 2048

@@ -8,6 +8,7 @@ import openpyxl
 import pandas as pd
 import pytest
 from cases import each_of
+from workbook_jobs import as_workbook
 
 from balancing import estimate_influence
 from rotorid.fleet.adding import FleetAddOptions, fleet_add
@@ -201,11 +202,11 @@ def test_the_bare_rotor_is_that_of_the_job_also_where_no_corrections_are_found(t
     assert store.table("outcomes")["before"].to_numpy() == pytest.approx(found, rel=0.06)
 
 
-def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path, cli):
+def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path):
     book = tmp_path / "tree" / "own" / "job.xlsx"
     book.parent.mkdir(parents=True)
     source = sample_data() / "turbo_job"
-    assert cli("balance", source / "checked.toml", "--output", book).code == 0
+    as_workbook(source / "checked.toml", book)
     made = openpyxl.load_workbook(book)
     for key, value in (("machine", 4711), ("date", datetime.date(2026, 3, 17)), ("machine_type", "pump")):
         made["settings"].append([key, value])

@@ -63,7 +63,7 @@ def test_a_misfit_is_told_before_what_is_determined():
         {"x": "v", "v": "-k*x/m - 0.4*v"},
         initial={"x": 1.0, "v": 0.0},
         outputs={"x": "x"},
-        estimate={"k": 30.0, "m": 1.0},
+        estimate={"k": 150.0, "m": 1.0},
     )
     found = fit(model, swinging(0), starts=1)
     assert found.summary().startswith("NO intervals: the model leaves")

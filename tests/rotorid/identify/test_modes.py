@@ -10,7 +10,7 @@ from rotorid.base.tables import csv
 from rotorid.commands import ModesOptions, modes
 from rotorid.identify.answers import SteadyAnswers
 from rotorid.identify.modes import fit_modes
-from rotorid.identify.modes_readings import Readings
+from rotorid.identify.modes_result import Readings
 from rotorid.samples import sample_data
 from rotorid.tables.data.modes_table import read_modes
 

@@ -1,6 +1,7 @@
 """Output error: exact derivatives, exact data, missing readings, free vibration."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,17 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.identify import identify
-from rotorid.identify.amplitude_residuals import compare
-from rotorid.identify.amplitudes import AmplitudeErrors
+from rotorid.identify.amplitudes import AmplitudeErrors, compare
 from rotorid.identify.amplitudes import experiments as gather
 from rotorid.identify.equations import harmonic_model
-from rotorid.identify.fit_amplitudes import Options
 from rotorid.identify.fit_amplitudes import output_error as fit_from
 
 
 def output_error(model, data, start, bounds=None, loss="linear"):
     """The fit from one start."""
-    return fit_from(model, data, np.array(start), Options(bounds or {}, loss, {}, {}, 0.0))
+    fit, comparison, *_ = fit_from(compare(model, data), np.array(start), bounds=bounds, loss=loss)
+    return SimpleNamespace(fit=fit, comparison=comparison)
 
 
 EVERYTHING = ("c1", "c", "c2", "a1", "a", "a2")
@@ -67,8 +67,8 @@ def test_the_jacobian_of_forced_amplitudes_is_exact(seed):
     data = simulate(model, truth, w, inputs, STATED, rng, stated=STATED)
     comparison = compare(model, data)
     x = truth * (1 + 0.05 * rng.standard_normal(len(truth)))
-    J = comparison.jacobian(x)
-    expected = numeric_jacobian(comparison.residual, x)
+    J = comparison.residuals(x)[1]
+    expected = numeric_jacobian(lambda theta: comparison.residuals(theta)[0], x)
     np.testing.assert_allclose(J * x, expected * x, atol=1e-6 * np.abs(expected * x).max())
 
 
@@ -80,8 +80,8 @@ def test_the_jacobian_of_products_of_parameters_is_exact():
     x = np.array([9.0, 0.6, 0.7])
     data = simulate(model, np.array([10, 0.5, 0.8]), np.array([1.0, 2.0, 3.0]), {"f": 1.0})
     comparison = compare(model, data)
-    expected = numeric_jacobian(comparison.residual, x)
-    np.testing.assert_allclose(comparison.jacobian(x), expected, atol=1e-8 * np.abs(expected).max())
+    expected = numeric_jacobian(lambda theta: comparison.residuals(theta)[0], x)
+    np.testing.assert_allclose(comparison.residuals(x)[1], expected, atol=1e-8 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("estimate", [("c1", "c2", "c3"), ("c1", "c2", "c3", "m2", "m3")])
@@ -89,9 +89,9 @@ def test_the_jacobian_of_natural_modes_is_exact(estimate):
     model, truth, w, shapes = chain3(estimate)
     comparison = compare(model, vibrations(model, w, shapes))
     x = truth * (1 + 0.02 * np.sin(np.arange(len(truth))))
-    expected = numeric_jacobian(comparison.residual, x)
+    expected = numeric_jacobian(lambda theta: comparison.residuals(theta)[0], x)
     np.testing.assert_allclose(
-        comparison.jacobian(x) * x, expected * x, atol=1e-7 * np.abs(expected * x).max()
+        comparison.residuals(x)[1] * x, expected * x, atol=1e-7 * np.abs(expected * x).max()
     )
 
 
@@ -112,9 +112,8 @@ def test_exact_readings_give_the_truth(case, stated):
     assert found.fit.estimate.errors_stated == (stated is not None)
     comparison = found.comparison
     assert comparison.left_out == ()
-    assert comparison.warnings == ()
-    assert len(comparison.experiment) == 2 * len(w) * len(model.outputs)
-    assert comparison.left(found.fit.values) < 1e-9
+    assert len(found.fit.estimate.residuals) == 2 * len(w) * len(model.outputs)
+    assert np.abs(found.fit.estimate.residuals).max() < 1e-7
 
 
 def test_a_start_by_name_and_none_at_all():
@@ -148,7 +147,7 @@ def test_missing_amplitudes_are_left_out_and_named():
         "experiment 2: X2 not measured",
         "experiment 5: left out, for not every input is known",
     )
-    assert len(found.comparison.experiment) == 2 * 7
+    assert len(found.fit.estimate.residuals) == 2 * 7
     predicted = identify(model, data).predicted["X2"]
     assert np.isfinite(predicted[1])
     assert np.isnan(predicted[4])
@@ -169,7 +168,7 @@ def test_free_vibration_finds_the_springs():
     predicted, frequencies = found.comparison.predict(found.fit.values)
     np.testing.assert_allclose(frequencies, w, rtol=1e-10)
     np.testing.assert_allclose(predicted[:, 2].real, shapes[:, 2], rtol=1e-8)
-    assert found.comparison.experiment.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    assert len(found.fit.estimate.residuals) == 9
 
 
 def test_two_modes_without_one_amplitude_are_enough():
@@ -268,9 +267,11 @@ def test_bad_requests_are_refused_in_words():
         output_error(square, data, truth)
 
 
-def test_an_exact_phase_is_warned_about():
+def test_no_phase_is_exact():
     model, truth, w, inputs = task51()
     data = simulate(model, truth, w, inputs, stated=AmplitudeErrors(relative=0.02))
     found = output_error(model, data, truth)
-    assert "one direction" in found.comparison.warnings[0]
+    assert 1 / np.linalg.svd(found.comparison.whiten)[1][:, 0, 0] == pytest.approx(
+        0.01 * 0.02 * np.abs(data.signals["X"]), rel=1e-3
+    )
     np.testing.assert_allclose(found.fit.values, truth, rtol=1e-8)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rotorid.identify import Identification, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.recovery import System, recover
+from rotorid.identify.linear_start import System, recover
 
 TRUTH = {"T0": 1.0, "T1": 0.5, "T2": 0.8, "zeta": 0.3, "K": 10.0, "c": 1e5, "b": 1e4, "delta": 0.5}
 
@@ -29,12 +29,13 @@ def exact(equation, known, estimate, frequencies, errors=None, digits=None, **op
 def test_the_order_of_solutions_does_not_hang_on_rounding(last_digit, monkeypatch):
     """T0 of both solutions is the same but for rounding: the larger T1 comes first."""
     names = ("T0", "T1", "T2")
-    exponents = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]])
-    matrix = np.array([[1.0, 0, 0, 0], [0, 1, 1, 0], [0, 0, 0, 1]])
-    system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None, 0 * matrix)
+    exponents = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]])
+    matrix = np.array([[0.0, 1, 0, 0, 0], [0, 0, 1, 1, 0], [0, 0, 0, 0, 1]])
+    below = np.tile(np.eye(5)[0], (3, 1))
+    system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None, below)
     starts = [np.array([1.0 + last_digit, 0.5, 0.8]), np.array([1.0, 0.8, 0.5])]
-    monkeypatch.setattr("rotorid.identify.recovery._candidates", lambda *_: (starts, True))
-    monkeypatch.setattr("rotorid.identify.recovery._refined", lambda _system, start, *_: start)
+    monkeypatch.setattr("rotorid.identify.linear_start._candidates", lambda *_: starts)
+    monkeypatch.setattr("rotorid.identify.linear_start._refined", lambda _system, start, *_: start)
     assert [solution[1] for solution in recover(system).solutions] == [0.8, 0.5]
 
 
@@ -125,9 +126,10 @@ def test_what_stands_alone_is_known_even_without_a_real_solution():
 
 
 def system(names, monomials, values, covariance=None):
-    exponents = np.array(monomials, dtype=float)
-    one = np.eye(len(monomials))
-    return System(tuple(names), exponents, one, np.array(values, dtype=float), covariance, 0 * one)
+    exponents = np.array([0 * np.array(monomials[0]), *monomials], dtype=float)
+    one = np.eye(len(exponents))
+    below = np.tile(one[0], (len(monomials), 1))
+    return System(tuple(names), exponents, one[1:], np.array(values, dtype=float), covariance, below)
 
 
 def test_ratios_are_found_although_their_parts_are_open():
@@ -153,7 +155,14 @@ def test_units_of_a_combination_change_nothing(unit):
     plain, scale = recover(inputs), np.array([unit, 1.0, 1.0])
     stated = covariance * np.outer(scale, scale)
     other = recover(
-        System(inputs.names, inputs.exponents, np.diag(scale), values * scale, stated, inputs.below)
+        System(
+            inputs.names,
+            inputs.exponents,
+            scale[:, None] * inputs.matrix,
+            values * scale,
+            stated,
+            inputs.below,
+        )
     )
     np.testing.assert_allclose(other.values, plain.values, rtol=1e-9)
     np.testing.assert_allclose(other.gain * scale, plain.gain, rtol=1e-6, atol=1e-9)
@@ -173,17 +182,37 @@ def test_gain_is_the_derivative_of_the_recovery():
         np.testing.assert_allclose(found.gain[:, i], (up - down) / 2e-6, rtol=1e-6, atol=1e-8)
 
 
-def test_a_system_that_cannot_be_reduced_is_searched_and_says_so():
-    # x² + y², x² + x·y + y³: no unknown is linear
-    exponents = np.array([[2, 0], [0, 2], [1, 1], [0, 3]], dtype=float)
-    matrix = np.array([[1.0, 1, 0, 0], [1.0, 0, 1, 1]])
-    truth = np.array([1.5, 0.5])
-    values = matrix @ np.prod(truth**exponents, axis=1)
-    found = recover(System(("x", "y"), exponents, matrix, values, None, 0 * matrix))
-    assert any(np.allclose(s, truth, rtol=1e-9) for s in found.solutions)
-    for s in found.solutions:
-        np.testing.assert_allclose(matrix @ np.prod(s**exponents, axis=1), values, rtol=1e-9)
-    assert not found.complete
+def test_linked_unknowns_are_solved_for_together():
+    # x³ + y³, x² + x·y + y²: no unknown is linear
+    exponents = np.array([[0, 0], [3, 0], [0, 3], [2, 0], [1, 1], [0, 2]], dtype=float)
+    matrix, below = np.array([[0.0, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1]]), np.tile(np.eye(6)[0], (2, 1))
+    values = matrix @ np.prod(np.array([1.5, 0.5]) ** exponents, axis=1)
+    solutions = recover(System(("x", "y"), exponents, matrix, values, None, below)).solutions
+    assert len(solutions) == 4
+    for one in solutions:
+        np.testing.assert_allclose(matrix @ np.prod(one**exponents, axis=1), values, rtol=1e-12)
+    assert any(np.allclose(one, [1.5, 0.5], rtol=1e-12) for one in solutions)
+
+
+def test_three_time_constants_can_be_exchanged():
+    model = harmonic_model(["(T1*p + 1)*(T2*p + 1)*(T3*p + 1)*X = F"], estimate=["T1", "T2", "T3"])
+    w, load = np.array([1.0, 3.0, 6.0]), {"F": np.ones(3, dtype=complex)}
+    found = identify(
+        model, experiments(model, w, {**load, **model.predict(np.array([0.9, 0.4, 0.1]), w, load)})
+    )
+    assert len(found.solutions) == 6
+    assert all(np.allclose(sorted(s.values()), [0.1, 0.4, 0.9], rtol=1e-7) for s in found.solutions)
+    assert found.unidentifiable[0].startswith("T1, T2 and T3 can be exchanged")
+
+
+def test_what_takes_many_steps_is_left_to_a_search():
+    equation = "((x**3 + y**3 + z**3)*p**3 + (x**4 + y**4 + z**4)*p**2 + (x**3 - y*z**2 + x)*p + 3)*X = F"
+    model = harmonic_model([equation], estimate=["x", "y", "z"])
+    w, truth = np.array([0.4, 0.9, 1.6]), np.array([1.5, 0.5, 0.9])
+    load = {"F": np.ones(3, dtype=complex)}
+    answer = identify(model, experiments(model, w, {**load, **model.predict(truth, w, load)}))
+    assert any(np.allclose([*s.values()], truth, rtol=1e-8) for s in answer.solutions)
+    assert "found by a search" in answer.warnings[0]
 
 
 @given(st.integers(0, 100_000), st.integers(1, 4), st.integers(0, 2))

@@ -86,13 +86,6 @@ def test_amplitudes_stand_over_frequency_in_the_units_of_the_table(two_units):
     np.testing.assert_allclose(ends - phases[:, 1:], np.tile([-6.0, 6.0], (4, 1)))
 
 
-def test_deviations_are_percent_of_the_model(two_units):
-    ((gaps, ends), _) = points(named(figure_identification(two_units), "measured")[0])
-    measured, fitted = (np.abs(one["X"]) for one in (two_units.experiments.signals, two_units.predicted))
-    np.testing.assert_allclose(gaps[:, 1], 100 * (measured / fitted - 1), atol=1e-9)
-    np.testing.assert_allclose(ends[:, 1] - gaps[:, 1], 10 * measured / fitted, rtol=1e-9)
-
-
 def test_intervals_of_unlike_parameters_are_percent_of_their_own_values():
     result = result_of("section_1_7")
     axes = next(
@@ -107,10 +100,11 @@ def test_free_vibrations_draw_measured_and_fitted_shapes():
     for options in ({}, {"loss": "soft_l1"}):
         result = result_of("task_7_1", **options)
         axes = first(result)
+        (legend,) = axes.figure.legends
         points, line, *_ = axes.get_lines()
         np.testing.assert_allclose(points.get_ydata(), [1, 1.3461538, 1.9230769], atol=1e-6)
         np.testing.assert_allclose(line.get_ydata(), points.get_ydata(), atol=0.01)
-        assert "(model 12.2" in axes.get_legend().get_texts()[0].get_text()
+        assert "(model 12.2" in legend.get_texts()[0].get_text()
 
 
 def test_units_are_kept_by_repeated_readings_and_by_a_choice_of_experiments(tmp_path, two_units):

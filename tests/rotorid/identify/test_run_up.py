@@ -8,17 +8,17 @@ from run_ups import drawn
 
 from balancing import Labels
 from rotorid.base.rpm import RPM
-from rotorid.identify.modes_readings import Readings
-from rotorid.identify.run_up import (
+from rotorid.identify.modes import (
     constant_vectors,
     fit_sweep,
     slow_vectors,
     vectors_when_passing,
 )
+from rotorid.identify.modes_result import Readings
 
 
 def found(modes):
-    return modes.fit.fit.estimate.solution
+    return modes.fit.estimate.solution
 
 
 def truth(rotor):
@@ -35,15 +35,15 @@ def test_exact_vectors_give_the_exact_modes(rate, first):
     np.testing.assert_allclose(found(modes)[2:], rotor.zeta, rtol=1e-6 if abs(rate) < 200 else 3e-6)
     off = modes.steady.fit.estimate.solution[:2] / rotor.omega - 1
     assert (np.sign(off) == np.sign(rate)).all()
-    run_out, _ = constant_vectors(modes.fit)
+    run_out, _ = constant_vectors(modes)
     np.testing.assert_allclose(run_out, rotor.run_out, atol=1e-3 * np.abs(rotor.run_out).max())
 
 
 def test_without_stated_errors_the_residuals_tell_them():
     rotor, sweep = drawn()
     modes = fit_sweep(replace(sweep, covariances=None))
-    assert modes.fit.same == "size everywhere"
-    assert (np.abs(found(modes) - truth(rotor)) < 4 * modes.fit.fit.std).all()
+    assert modes.same == "size everywhere"
+    assert (np.abs(found(modes) - truth(rotor)) < 4 * modes.fit.std).all()
 
 
 def test_times_may_be_unknown():
@@ -60,15 +60,15 @@ def test_vectors_that_lack_are_left_out():
     vectors[::9, 0] = np.nan
     covariances[::9, 0] = np.nan
     modes = fit_sweep(replace(sweep, vectors=vectors, covariances=covariances))
-    assert (np.abs(found(modes) - truth(rotor)) < 4 * modes.fit.fit.std).all()
-    assert modes.fit.warnings == ()
+    assert (np.abs(found(modes) - truth(rotor)) < 4 * modes.fit.std).all()
+    assert modes.warnings == ()
 
 
 def test_a_band_chooses_a_mode():
     rotor, sweep = drawn()
     band = (0.75 * rotor.omega[0], 1.3 * rotor.omega[0])
     modes = fit_sweep(sweep, bands=[band])
-    value, std = found(modes)[0], modes.fit.fit.std[0]
+    value, std = found(modes)[0], modes.fit.std[0]
     assert abs(value - rotor.omega[0]) < 4 * std + 1e-3 * value
 
 

@@ -6,11 +6,7 @@ import time
 
 import numpy as np
 import pytest
-import scipy.linalg
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from rotorid.identify.integrators import expm_and_derivatives
 from rotorid.identify.ode import SimulationError, ode_model
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import simulate
@@ -366,17 +362,3 @@ def test_missing_inputs_are_named():
     model = ode_model({"x": "-a*x + u"}, initial={"x": 0}, estimate={"a": 1.0}, inputs=["u"])
     with pytest.raises(ValueError, match="run 7: the input u is missing; inputs are: w"):
         simulate(model, [1.0], Record([0, 1], inputs={"w": [1, 2]}, name="run 7"))
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(1, 6), st.integers(0, 3), st.floats(-3, 2.5), st.integers(0, 10**6))
-def test_matrix_exponential_and_derivatives_against_scipy(n, k, size, seed):
-    random = np.random.default_rng(seed)
-    a, e = 10**size * random.standard_normal((2, n, n)) / n, random.standard_normal((2, k, n, n))
-    p, d = expm_and_derivatives(a, e)
-    for i in range(2):
-        scale = np.abs(scipy.linalg.expm(np.abs(a[i]))).max() if size < 1 else np.abs(p[i]).max()
-        np.testing.assert_allclose(p[i], scipy.linalg.expm(a[i]), atol=1e-11 * scale)
-        for j in range(k):
-            _, expected = scipy.linalg.expm_frechet(a[i], e[i, j])
-            np.testing.assert_allclose(d[i, j], expected, atol=1e-10 * np.abs(expected).max())

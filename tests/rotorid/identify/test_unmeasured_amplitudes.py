@@ -73,7 +73,6 @@ def test_springs_in_series_show_the_one_stiffness_whatever_they_are(ka, kb):
     (near,) = found.combinations
     assert near.words.startswith("(near these values) ka + ")
     assert near.std is None
-    assert "no experiment of this kind tells more" in found.unidentifiable[1]
     assert found.linear is None
 
 
@@ -128,6 +127,5 @@ def test_the_cases_say_what_they_should(cli):
     words = " ".join(found["unidentifiable"])
     assert "no experiment of this kind tells more" in words
     assert "nothing is determined" not in words
-    assert "may determine" not in words
     found = run(cli, "speed_column").json
     assert found["identifiable"]

@@ -228,7 +228,7 @@ def told(z, turns=100.0, speed=100.0, rate=64):
     made = one_mass(1.0, 0.0, 1.0, unbalance={1: 1.0})
     values = np.asarray(z(angle), dtype=complex)[:, None]
     rest = np.zeros(2)
-    return MotionRun(made, (1,), angle / speed, (speed, speed), values, rest, rest, 0.0, 1, 0, 1e-6, "")
+    return MotionRun(made, (1,), angle / speed, (speed, speed), values, rest, rest, 0.0, 1, 1e-6, "")
 
 
 @pytest.mark.parametrize(

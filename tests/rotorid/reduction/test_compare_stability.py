@@ -148,7 +148,8 @@ def test_cross_coupling_at_the_limit(factor, status):
     q = factor * damping * CRITICAL
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), damping, kind="seal")), 500.0)
     assert cost.full.status == cost.small.status == status
-    assert ("Both models are stable" in cost.summary()) == (status == "stable")
+    assert cost.summary().startswith(f"Full rotor: {status}")
+    assert f"\n1-mass model: {status}" in cost.summary()
 
 
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.8])
@@ -192,7 +193,6 @@ def test_lumped_rotor_is_the_full_one():
     assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=1e-8)
     assert (cost.small.mode, cost.small.direction) == (cost.full.mode, cost.full.direction)
     assert cost.small_decrement == pytest.approx(cost.full_decrement, rel=1e-6, abs=1e-9)
-    assert cost.small_frequency == pytest.approx(cost.full_frequency, rel=1e-6)
     assert cost.warnings == ()
 
 
@@ -216,7 +216,7 @@ def test_compressor(nodes, modes):
 def test_decrements_are_those_of_the_eigenvalues():
     small = compressor((8, 14, 20), 1)
     cost = compare_stability(small, 1600.0, lowest=110.0, steps=5)
-    campbell = fem.campbell(small.rotor, cost.speeds, cost.n_full)
+    campbell = fem.campbell(small.rotor, cost.speeds, 8)
     assert cost.full_decrement == pytest.approx(np.nanmin(campbell.log_decrements, axis=1), rel=1e-6)
     for k, speed in enumerate(cost.speeds):
         values = small.eigenvalues(speed)
@@ -224,7 +224,6 @@ def test_decrements_are_those_of_the_eigenvalues():
         decrements = -2 * np.pi * values.real / values.imag
         least = int(np.argmin(decrements))
         assert cost.small_decrement[k] == pytest.approx(decrements[least], rel=1e-7)
-        assert cost.small_frequency[k] == pytest.approx(values[least].imag, rel=1e-7)
 
 
 def test_running_away():
@@ -252,10 +251,7 @@ def test_undamped_is_not_unstable():
     assert cost.full.status == cost.small.status == "stable"
     assert cost.small.threshold is None
     assert cost.relative_difference is None
-    assert cost.answer.judgement == (
-        "No damping acts on either model from 0 to 9549.3 rpm (0 to 1000 rad/s): no motion grows, and none "
-        "decays."
-    )
+    assert np.abs([cost.full_decrement, cost.small_decrement]).max() < 1e-8
 
 
 def test_unstable_from_the_start():
@@ -263,9 +259,7 @@ def test_unstable_from_the_start():
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), 10.0, kind="seal")), 500.0)
     assert cost.small.status == "unstable"
     assert cost.small.direction == 1
-    assert (
-        "The full rotor is unstable already at 0 rpm, the small model is unstable already" in cost.summary()
-    )
+    assert cost.summary().count(": unstable already at 0 rad/s") == 2
     away = stability_threshold(jeffcott(fem.Support(2, -2 * STIFFNESS, 10.0, kind="seal")), 500.0)
     assert (away.status, away.mode) == ("unstable", None)
 
@@ -282,8 +276,8 @@ def test_disagreement_is_said():
     calm = small_rotor(rotor, (7, 12, 18), [89.0, 196.0, 198.0], modal_damping=(0.3, 0.3, 0.3))
     second = dataclasses.replace(first, small=stability_threshold(calm, 500.0))
     assert second.small.status == "stable"
-    assert "The models disagree: the full rotor is unstable already at 0 rpm" in second.summary()
-    assert "the small model is stable from 0 to 4774.65 rpm" in second.answer.judgement
+    assert second.summary().startswith("The models DISAGREE. Full rotor: unstable already at 0 rad/s")
+    assert "3-mass model: stable from 0 to 500 rad/s" in second.answer.judgement
 
 
 def test_other_mode_is_said():
@@ -351,8 +345,3 @@ def test_bad_input(highest, options, message):
     for function in (compare_stability, stability_threshold):
         with pytest.raises(ValueError, match=message):
             function(jeffcott(), highest, **options)
-
-
-def test_too_many_modes():
-    with pytest.raises(ValueError, match="5 modes cannot be found"):
-        compare_stability(jeffcott(), 100.0, n=5)

@@ -8,9 +8,6 @@ from book_task_9 import COMPLIANCE, FREQUENCIES, SHAPES
 
 from rotorid.reduction import InputErrors, equivalent_masses, natural_frequencies, reduce_measured
 
-ALPHA12 = 11.2e-8 / COMPLIANCE[0, 1] - 1
-"""What the printed α12 is wrong by: +1.337 %."""
-
 
 def book(modes, **how):
     return reduce_measured(COMPLIANCE, FREQUENCIES, SHAPES, modes, **how)
@@ -34,37 +31,15 @@ def test_standard_deviations_agree_with_drawn_inputs(modes, sigma):
     np.testing.assert_allclose(std, np.std(draws, axis=0), rtol=0.1)
 
 
-@pytest.mark.parametrize("modes", [1, 2])
-def test_sensitivity_is_the_uncertainty_of_equal_errors(modes):
-    """First order: small errors, of compliances and shapes alike."""
-    errors = book(modes, errors=InputErrors(compliance=1e-5, shapes=1e-5))
-    np.testing.assert_allclose(
-        errors.errors.masses / errors.masses.solution / 1e-5, errors.sensitivity, rtol=0.06
-    )
-
-
-# what the error of the printed α12 does, exactly (kg; second frequency, rad/s)
-OF_ALPHA12 = {1: ([-21.68, 9.76, -1.06], 15.19), 2: ([-2.193, 0.426, -0.890], -0.249)}
-
-
-@pytest.mark.parametrize("modes", [1, 2])
-def test_what_the_error_of_the_printed_alpha12_does(modes):
+@pytest.mark.parametrize(("modes", "change"), [(1, [-21.68, 9.76, -1.06]), (2, [-2.193, 0.426, -0.890])])
+def test_what_the_error_of_the_printed_alpha12_does(modes, change):
     """One mode: 15 % of a mass; two modes: 1.6 %."""
-    found = book(modes)
-    shift = found.what_if({"alpha12": ALPHA12})
-    masses, second = OF_ALPHA12[modes]
-    np.testing.assert_allclose(shift.masses, masses, atol=0.012)
-    assert shift.frequencies[1] == pytest.approx(second, abs=0.012)
     printed = COMPLIANCE.copy()
     printed[0, 1] = printed[1, 0] = 11.2e-8
-    m = equivalent_masses(printed, FREQUENCIES[:modes], SHAPES[:, :modes]).values
-    np.testing.assert_allclose(found.masses.solution + shift.masses, m, rtol=1e-9)
-    omega = natural_frequencies(printed, m)[0]
-    np.testing.assert_allclose(found.frequencies + shift.frequencies, omega, rtol=1e-9)
-    turned = found.what_if({"alpha21": ALPHA12})
-    np.testing.assert_array_equal(turned.masses, shift.masses)
-    assert json.loads(json.dumps(shift.to_dict()))["masses_kg"] == pytest.approx(shift.masses)
-    assert f"{shift.masses[0]:+.4g}" in shift.answer.judgement
+    wrong, right = (
+        reduce_measured(alpha, FREQUENCIES, SHAPES, modes).masses.solution for alpha in (printed, COMPLIANCE)
+    )
+    np.testing.assert_allclose(wrong - right, change, atol=0.012)
 
 
 def test_with_one_mode_the_first_frequency_has_no_error_but_its_own():
@@ -72,24 +47,14 @@ def test_with_one_mode_the_first_frequency_has_no_error_but_its_own():
     assert found.frequencies[0] == pytest.approx(2e-4 * FREQUENCIES[0], rel=0.05)
 
 
-def test_more_than_nine_masses_have_names_that_differ():
-    n = 11
-    alpha, m = np.eye(n) * 1e-8 + 1e-9, np.linspace(10, 30, n)
-    omega, shapes = natural_frequencies(alpha, m)
-    found = reduce_measured(alpha, omega, shapes, normalise="length", rows="relative")
-    assert len(set(found.inputs.names)) == n * (n + 1) // 2 + n + n * n + n
-    one, other = (found.what_if({name: 1e-4}).masses for name in ("alpha11,1", "alpha1,11"))
-    np.testing.assert_array_equal(one, other)
-
-
 def test_masses_that_are_not_known_are_said():
     found = book(1, errors=InputErrors(0.03, 0.0, 0.03)).errors
-    assert "as large as the mass" in " ".join(found.warnings)
+    assert "the stated errors do not determine m" in " ".join(found.warnings)
     alpha = np.array([[4.0, 3.0], [3.0, 4.0]]) * 1e-8
     found = reduce_measured(alpha, [1000.0], [[1.0], [0.5]], errors=InputErrors(0.01))
     document = json.loads(json.dumps(found.to_dict()))
     assert document["uncertainty"]["natural_frequencies_std_rad_s"][1] is None
-    assert "and then no omega2" in " ".join(found.errors.warnings)
+    assert "do not determine omega2" in " ".join(found.errors.warnings)
 
 
 def test_no_errors_give_no_uncertainty():
@@ -113,12 +78,3 @@ def test_no_errors_give_no_uncertainty():
 def test_impossible_errors_are_refused(errors, message):
     with pytest.raises(ValueError, match=message):
         book(2, errors=InputErrors(**errors))
-
-
-def test_impossible_questions_are_refused():
-    found = book(1)
-    for name in ("alpha14", "U12"):
-        with pytest.raises(ValueError, match=f"no input '{name}'"):
-            found.what_if({name: 0.1})
-    with pytest.raises(ValueError, match="must be finite"):
-        found.what_if({"alpha12": np.nan})

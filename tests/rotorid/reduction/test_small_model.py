@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import fem
 from fem import state_space
+from rotorid.plots import plot
 from rotorid.reduction import reduce, small_model
 
 NODES = (7, 12, 18)
@@ -92,9 +93,12 @@ def test_a_rotor_that_is_a_few_masses_is_its_own_small_model(rotor, speed):
         for value in some[np.abs(some) < limit]:
             assert np.abs(others - value).min() < 1e-8 * abs(value)
     omega = np.array([speed + 40.0])
-    W = small.response(omega)[:, : len(nodes)]
-    full = exactly(fem.influence, rotor, nodes, nodes, omega).W
-    np.testing.assert_allclose(W, full, rtol=0, atol=1e-8 * np.abs(full).max())
+    unbalance = {node: 1e-3 * np.exp(2j * node) for node in nodes}
+    mine = small.deflections(omega, unbalance)[0]
+    full = exactly(fem.unbalance_response, rotor, unbalance, omega, nodes=nodes)
+    n, size = len(nodes), np.abs(full.major).max()
+    np.testing.assert_allclose(mine[:n], full.x[0], rtol=0, atol=1e-8 * size)
+    np.testing.assert_allclose(mine[len(small.nodes) :][:n], full.y[0], rtol=0, atol=1e-8 * size)
 
 
 def full_machine(**changes):
@@ -253,7 +257,9 @@ def test_state_space_has_the_same_eigenvalues_and_response():
     # unbalance U: f_x = Re(U Ω² e^{iΩt}), f_y = Im: f_y is −i times f_x
     H = frequency_response(small.state_space(250.0), 250.0)[0]
     expected = 250.0**2 * (H[:2, :2] - 1j * H[:2, 2:])
-    np.testing.assert_allclose(small.response(250.0)[0, :2], expected, rtol=1e-9)
+    for k, node in enumerate((4, 8)):
+        x = small.deflections(np.array([250.0]), {node: 1.0})[0, :2]
+        np.testing.assert_allclose(x, expected[:, k], rtol=1e-9)
     bearing = small.state_space(250.0, inputs=["f_x1"], outputs=["x1", "v_x4"])
     assert frequency_response(bearing, 250.0).shape == (1, 2, 1)
 
@@ -298,7 +304,6 @@ def test_damped_supports_cannot_be_condensed():
         ((4, 12), (1.0, 1.0), {}, "node 12 does not exist"),
         (("fan",), (1.0,), {}, "no station is called 'fan'"),
         ((4, 8), (1.0,), {}, "as many masses"),
-        ((4, 8), ("a", 1.0), {}, "numbers in kg"),
         ((4, 8), (1.0, -2.0), {}, "node 8 is -2 kg, not positive: a physical model needs positive masses"),
         ((4, 8), (1.0, 0.0), {}, "positive masses"),
         ((4, 8), (np.nan, 1.0), {}, "positive masses"),
@@ -322,7 +327,7 @@ def test_a_shaft_that_nothing_holds_is_refused_in_words():
     free = full_machine(supports=[fem.Support(1), fem.Support(11)], material_damping=0.0)
     with pytest.raises(ValueError, match="can move without force"):
         small_model(free, (4,), (30.0,)).motion(condensed=True)
-    with pytest.raises(ValueError, match="can move without force"):
+    with pytest.raises(ValueError, match="is not held has no rest"):
         small_model(free, (4,), (30.0,), modal_damping=(0.01,))
     with pytest.raises(ValueError, match="held neither"):
         eigenvalues(small_model(free, (4,), (30.0,)))
@@ -337,7 +342,7 @@ def test_speeds_are_checked(rotor):
         eigenvalues(small, 600.0)
     for bad in (-1.0, np.inf, "fast"):
         with pytest.raises(ValueError, match="speeds must be"):
-            small.response(bad)
+            small.response(bad, {4: 1e-3})
     with pytest.raises(ValueError, match="it is"):
         small.motion(plane="z")
     jeffcott = fem.Rotor(
@@ -348,4 +353,64 @@ def test_speeds_are_checked(rotor):
         supports=[fem.Support(1, 1e4), fem.Support(3, 1e4)],
     )
     with pytest.raises(ValueError, match="exactly at a critical speed"):
-        small_model(jeffcott, (1, 3), (1.0, 1.0)).response(100.0)
+        small_model(jeffcott, (1, 3), (1.0, 1.0)).response(100.0, {1: 1e-3})
+
+
+def test_the_response_is_that_of_a_rotor_which_is_a_few_masses():
+    """Readings, forces on the supports and ranges without a steady state; critical speeds are its peaks."""
+    rotor = full_machine(supports=full_machine().supports[:2])
+    small, unbalance = small_model(rotor, (4, 8), (30.0, 20.0)), {4: 2e-4, 8: 1e-4j}
+    speeds = np.linspace(0.0, 450.0, 46)
+    mine, full = small.response(speeds, unbalance), fem.unbalance_response(rotor, unbalance, speeds)
+    for sensor in ((4, 30.0), 8):
+        np.testing.assert_allclose(mine.at(sensor), full.at(sensor), rtol=1e-8, atol=1e-15)
+    forces = (each.bearing_forces().largest for each in (mine, full))
+    np.testing.assert_allclose(*forces, rtol=1e-7, atol=1e-12)
+    np.testing.assert_array_equal(mine.largest, mine.major.max(axis=1))
+    assert [w.to_dict() for w in mine.windows] == [pytest.approx(w.to_dict()) for w in full.windows]
+    assert "4 nodes. Largest amplitude" in repr(mine)
+    assert len(mine.to_frame()) == 46 * 4
+    drawn = plot(mine).get_lines()  # at its supports, as of a rotor without stations
+    assert [line.get_label() for line in drawn] == ["node 1", "node 11"]
+
+
+def test_the_response_of_an_unstable_model_has_a_range_without_steady_state():
+    k = ((1e7, 4e6), (-4e6, 1e7))
+    rotor = full_machine(supports=[fem.Support(1, k, 2e3), fem.Support(11, k, 2e3)])
+    small = small_model(rotor, (4, 8), (30.0, 20.0))
+    response = small.response([100.0, 500.0], {4: 1e-4})
+    (window,) = response.windows
+    assert not response.steady.any()
+    assert "grows" in response.warnings[-1]
+    theirs = fem.unbalance_response(rotor, {4: 1e-4}, [100.0, 500.0]).windows[0]
+    assert (window.first, window.frequency) == pytest.approx((theirs.first, theirs.frequency))
+
+
+def test_critical_speeds_are_where_modes_whirl_once_a_turn():
+    rotor = full_machine(
+        discs=[fem.Disc(4, 30.0, 0.6, 0.3), fem.Disc(8, 20.0, 0.4, 0.2)],
+        supports=[fem.Support(1, 2e7), fem.Support(11, 3e7)],
+        model=fem.Model(True, False, True),
+    )
+    small = small_model(rotor, (4, 8), (30.0, 20.0))
+    criticals = small.critical_speeds(0.0, 2000.0)
+    assert criticals.size >= 3  # forward and backward
+    for speed in criticals:
+        away = np.abs(np.abs(small.whirl(speed).values.imag) / speed - 1)
+        assert np.nanmin(away) < 1e-6
+    W = [np.abs(small.response(w, {4: 1e-4}).amplitudes).max() for w in (criticals[-1] * (1 + 1e-4), 50.0)]
+    assert W[0] > 20 * W[1]
+
+
+def test_what_no_response_is_computed_of():
+    rotor = full_machine()
+    small = small_model(rotor, (4, 8), (30.0, 20.0))
+    with pytest.raises(ValueError, match="no unbalance is given"):
+        small.response(100.0)
+    with pytest.raises(ValueError, match="node 5 does not exist"):
+        small.response(100.0, {5: 1e-4})
+    films = replace(rotor, forces=[fem.Stop(4, gap=1e-3, stiffness=1e8)])
+    with pytest.raises(ValueError, match="rotorid motion"):
+        small_model(films, (4, 8), (30.0, 20.0)).response(100.0, {4: 1e-4})
+    bent = replace(small, bow={4: 1e-5, 8: 1e-5, 1: 0.0}, unbalance={4: 1e-4})
+    assert any("bow of the model is left out" in warning for warning in bent.response(100.0).warnings)

@@ -15,11 +15,11 @@ import fem
 from balancing import Trials, correct, refine
 from rotorid import read_rotor
 from rotorid.commands import CalibrateOptions, calibrate
+from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
 from rotorid.study import StudyOptions, drawn_machine, study
 from rotorid.study.drawn_machine import UNSTABLE
 from rotorid.study.machine_counts import EDGES, UNDETERMINED
-from rotorid.tables.reader.problems import InputError
 from rotorid.tables.study_file import read_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
@@ -158,9 +158,9 @@ def test_what_the_model_leaves_out_is_told(tmp_path):
 @pytest.mark.full
 def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
-    options = CalibrateOptions("bearing[*].stiffness", exact=True)
-    rotor, data = sample_data() / "rotor23.csv", sample_data() / "calibration" / "critical.csv"
-    known = calibrate(rotor, data, options).result
+    options = CalibrateOptions("bearing[*].kxx.scale", exact=True)
+    rotor, data = (sample_data() / name for name in ("compressor/rotor.toml", "calibration/trial.toml"))
+    known = calibrate(rotor, data, options).result.found
     assert found.result.found.tolist() == [6]
     assert found.result.ends[0] == pytest.approx(known.fit.estimate.solution, rel=1e-4)
     assert found.result.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
@@ -241,10 +241,10 @@ def test_what_means_nothing_for_starts_is_told(tmp_path):
 
 @pytest.mark.parametrize("name", ["sample", "chi_square", "converged"])
 def test_a_number_that_is_called_as_another_column_is_refused(tmp_path, name):
-    file = starts(tmp_path, ("bearing[*].stiffness", f"{name} = bearing.stiffness"))
+    file = starts(tmp_path, ("bearing[*].kxx.scale", f"{name} = bearing.kxx.scale"))
     with pytest.raises(ValueError, match=f"{name!r} is another column"):
         run(file, samples=1)
-    found = run(starts(tmp_path, ("bearing[*].stiffness", "k = bearing.stiffness")), samples=2)
+    found = run(starts(tmp_path, ("bearing[*].kxx.scale", "k = bearing.kxx.scale")), samples=2)
     assert found.result.names == ("k",)
     assert found.summary().startswith("2 starts of 2 end at")
 

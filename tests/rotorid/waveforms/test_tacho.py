@@ -144,7 +144,7 @@ def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
     [
         (np.zeros(10000), "has no pulses: it reads 0 throughout"),
         (5.0 * (0.3 * T % 1 < 0.05), "at least 8 are needed"),
-        (np.where((T > 8) & (T < 8.6), 0.0, pulses()), "is silent from 7.989 to 8.618 s, about 17"),
+        (np.where((T > 8) & (T < 8.6), 0.0, pulses()), "is silent from 7.989 to 8.618 s, about 18"),
     ],
 )
 def test_what_does_not_tell_turns_is_refused(samples, words):

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from types import SimpleNamespace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
-from rotorid.waveforms.plots import (
-    BLANK,
-    LINES,
-    figure_of,
-    figure_orbit,
-    figure_tacho,
-    figure_waterfall,
-    spectra,
-)
-from rotorid.waveforms.record import Channel, WaveformRecord
+from rotorid.waveforms.plots import figure_tacho
+from rotorid.waveforms.record import Channel
 
 RATE = 2560.0
 
@@ -68,166 +59,13 @@ class OnDisk:
         return part
 
 
-def record(tacho, sensors, most=None, factor=1e-6, derivative=0):
-    """Sensors by name: complex amplitudes by order, in 1/factor."""
-    t = np.arange(int(tacho.seconds * RATE)) / RATE
-    angle = 2 * np.pi * tacho.turn_at(t)
-    channels = []
-    for name, orders in sensors.items():
-        values = sum(np.real(A * np.exp(1j * order * angle)) for order, A in orders.items())
-        samples = values if most is None else OnDisk(values, most)
-        channels.append(Channel(name, samples, factor, derivative))
-    return WaveformRecord("run", "file.wav", RATE, None, tuple(channels))
-
-
 @pytest.fixture(scope="module")
 def steady():
     return Pulses(25.0, 0.0, 20.0)
 
 
-@pytest.fixture(scope="module")
-def run_up():
-    return Pulses(10.0, 0.8, 60.0)
-
-
 def curves(ax, label):
     return [line for line in ax.lines if line.get_label() == label]
-
-
-@pytest.mark.parametrize("frequency", [101.0, 101.13, 101.5, 333.77])
-def test_the_peak_of_a_sine_is_its_amplitude(frequency):
-    t = np.arange(40000) / RATE
-    samples = np.round(8000 * np.cos(2 * np.pi * frequency * t + 0.7) + 300).astype(np.int16)
-    at, amplitudes = spectra(Channel("A", samples, 2.5e-9), RATE, np.array([3.0, 0.0, 99.0]), 2560)
-    assert amplitudes.shape == (3, at.size)
-    np.testing.assert_allclose(amplitudes.max(axis=1), 2e-5, rtol=2e-3)
-    np.testing.assert_allclose(at[amplitudes.argmax(axis=1)], frequency, atol=1.0)
-
-
-def test_a_waterfall_over_a_run_up(run_up):
-    n = RATE / np.sqrt(0.8)
-    made = record(run_up, {"X": {1: 40.0, 2: 20j}}, most=1.01 * n)
-    figure = figure_waterfall(made, "X", run_up, orders=(1, 2, 3))
-    (ax,) = figure.axes
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency, Hz", "speed, rpm")
-    spectra_drawn, dashed = ax.lines[:LINES], ax.lines[LINES : LINES + 3]
-    speeds = dashed[0].get_ydata()
-    np.testing.assert_allclose(np.diff(speeds), np.diff(speeds)[0], rtol=0.02)  # evenly
-    for order, line in zip((1, 2, 3), dashed, strict=True):
-        np.testing.assert_allclose(line.get_xdata(), order * speeds / 60, rtol=1e-9)
-    tall = 0.3 * np.ptp(speeds) / 40.0  # of 1 µm
-    assert float(ax.get_title().split("largest ")[1].split()[0]) == pytest.approx(40, rel=0.01)
-    for line, rpm in zip(spectra_drawn, speeds, strict=True):
-        x, y = line.get_xdata(), (line.get_ydata() - rpm) / tall
-        for order, size, error in ((1, 40.0, 0.005), (2, 20.0, 0.015)):
-            near = np.abs(x - order * rpm / 60) < 3
-            assert y[near].max() == pytest.approx(size, rel=error)
-            assert x[near][y[near].argmax()] == pytest.approx(order * rpm / 60, abs=1.0)
-    assert made.sensors[0].samples.read == pytest.approx(LINES * n, rel=0.01)
-
-
-def test_a_waterfall_at_a_steady_speed_is_over_time(steady):
-    ax = figure_waterfall(record(steady, {"X": {1: 3.0}}, factor=1.0, derivative=None), "X", steady).axes[0]
-    assert ax.get_ylabel() == "time, s"
-    assert "largest 3 (peak)" in ax.get_title()
-    assert f"{64 / 25:.2g} s" in ax.get_title()  # so many turns
-
-
-class UpAndDown(Pulses):
-    """From f0 to 3 f0 and back."""
-
-    def turn_at(self, t):
-        period = self.seconds
-        return 2 * self.f0 * t - self.f0 * period / (2 * np.pi) * np.sin(2 * np.pi * t / period)
-
-
-def test_up_and_down_is_over_time():
-    there = UpAndDown(20.0, 0.0, 20.0)
-    ax = figure_waterfall(record(there, {"X": {1: 3.0}}), "X", there).axes[0]
-    assert ax.get_ylabel() == "time, s"
-    once = ax.lines[LINES]
-    expected = 40 - 20 * np.cos(2 * np.pi * once.get_ydata() / 20)
-    np.testing.assert_allclose(once.get_xdata(), expected, rtol=1e-3)
-
-
-def test_a_dead_sensor_has_flat_lines(steady):
-    ax = figure_waterfall(record(steady, {"X": {1: 0.0}}), "X", steady).axes[0]
-    assert all(np.ptp(line.get_ydata()) == 0 for line in ax.lines[:LINES])
-
-
-def circle(radius, orders=(1,)):
-    return {"X": dict.fromkeys(orders, radius), "Y": dict.fromkeys(orders, -1j * radius)}
-
-
-def test_the_mark_on_an_orbit_is_blank_and_then_bright(steady):
-    figure = figure_orbit(record(steady, circle(30.0), most=1000), ("X", "Y"), steady, 4.01, turns=3)
-    (orbit,) = figure.axes
-    assert orbit.get_aspect() == 1.0
-    assert (orbit.get_xlabel(), orbit.get_ylabel()) == ("X, µm", "Y, µm")
-    for label in ("as measured", "1×"):
-        (line,) = curves(orbit, label)
-        z = line.get_xdata() + 1j * line.get_ydata()
-        turn = np.arange(z.size) / 200
-        blank = np.isnan(z)
-        assert not blank[(turn % 1 < 1 - BLANK - 0.006) & (turn % 1 > 0.001)].any()
-        assert blank[(turn % 1 > 1 - BLANK + 0.001)].all()
-        np.testing.assert_allclose(z[~blank], 30 * np.exp(2j * np.pi * turn[~blank]), atol=0.01)
-    (dots,) = curves(orbit, "mark, blank before it")
-    np.testing.assert_allclose([dots.get_xdata(), dots.get_ydata()], [[30.0] * 2, [0.0] * 2], atol=0.01)
-    assert orbit.get_title().startswith("1500 rpm, at 4.04 s")
-
-
-def test_only_1x_is_filtered(steady):
-    made = record(steady, circle(30.0, orders=(1, 2)))
-    orbit = figure_orbit(made, ("X", "Y"), steady, 4.0).axes[0]
-    (measured,), (first,) = curves(orbit, "as measured"), curves(orbit, "1×")
-    assert np.nanmax(measured.get_xdata()) == pytest.approx(60, rel=1e-3)
-    assert np.nanmax(first.get_xdata()) == pytest.approx(30, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "words"),
-    [
-        (30.0, -20j, "forward whirl, with the rotation"),
-        (30.0, 20j, "backward whirl, against the rotation"),
-        (30.0, 0.1j, "nearly along a line"),
-    ],
-)
-def test_which_way_it_whirls(steady, x, y, words):
-    figure = figure_orbit(record(steady, {"X": {1: x}, "Y": {1: y}}), ("X", "Y"), steady, 1.0)
-    assert figure.axes[0].get_title().endswith(f"1×: {words}, if Y stands 90° after X")
-
-
-def test_orbits_that_cannot_be_drawn(steady):
-    made = record(steady, circle(1.0))
-    other = replace(made, sensors=(made.sensors[0], replace(made.sensors[1], derivative=1)))
-    with pytest.raises(ValueError, match="'X' and 'Y' measure different quantities"):
-        figure_orbit(other, ("X", "Y"), steady, 1.0)
-    with pytest.raises(ValueError, match=r"not 4 whole turns after 19.95 s: its pulses end at 19.96 s"):
-        figure_orbit(made, ("X", "Y"), steady, 19.95)
-
-
-def test_the_picture_that_is_asked_for(run_up):
-    """The orbit is drawn where 1× is largest, and never beyond the last turn."""
-    signal = tacho_signal(run_up, 10**6)
-    made = replace(record(run_up, circle(5.0)), tacho=signal)
-    times = np.array([10.0, 30.0, 59.99])
-    for sizes, at in (((1, 3, 2), 30.0), ((1, 2, 3), 59.9)):
-        found = SimpleNamespace(
-            tacho=run_up,
-            sensors=("X", "Y"),
-            orders=(1, 3),
-            times=times,
-            vectors=np.array(sizes)[:, None, None] * np.ones((3, 2, 2)),
-        )
-        title = figure_of("orbit", made, found).axes[0].get_title()
-        assert float(title.split("at ")[1].split()[0]) == pytest.approx(at, abs=0.15)
-    texts = [text.get_text() for text in figure_of("waterfall", made, found).axes[0].texts]
-    assert texts[:3] == ["1×", "2×", "3×"]
-    assert figure_of("tacho", made, found).axes[0].get_ylabel() == "tacho, as recorded"
-    found.sensors = ("X",)
-    with pytest.raises(ValueError, match=r"file.wav: an orbit needs two sensors; there is only 'X'"):
-        figure_of("orbit", made, found)
 
 
 def tacho_signal(pulses, most):
@@ -249,8 +87,6 @@ def test_a_tacho_with_damage():
     (missing,) = curves(signal, "missing, bridged: 2")
     np.testing.assert_allclose(missing.get_xdata()[0], gap)
     np.testing.assert_array_equal(curves(signal, "double, left out: 1")[0].get_xdata(), [18.0])
-    bridged = next(line for line in speed.lines if line.get_marker() == "D")
-    np.testing.assert_allclose(bridged.get_ydata(), 60 * (10 + 0.8 * bridged.get_xdata()), rtol=1e-3)
     rpm = speed.lines[0]
     np.testing.assert_allclose(rpm.get_ydata(), 60 * (10 + 0.8 * rpm.get_xdata()), rtol=1e-3)
     assert signal.get_title() == "jitter 0.25° (standard deviation of a pulse)"

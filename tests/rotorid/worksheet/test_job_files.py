@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rotorid.files import table_writing
+from rotorid.files.columns import read_grid
+from rotorid.files.problems import InputError, Problems
 from rotorid.tables import read_job
-from rotorid.tables.reader import table_writing
-from rotorid.tables.reader.columns import read_grid
-from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
 pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")

@@ -7,6 +7,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 from typer.testing import CliRunner
+from workbook_jobs import as_workbook
 
 from rotorid.cli import app
 from rotorid.tables import read_job
@@ -27,11 +28,9 @@ COLUMNS = ("run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg")
 
 @pytest.fixture(scope="module")
 def balanced(tmp_path_factory):
-    path = tmp_path_factory.mktemp("balanced") / "sheet.xlsx"
-    assert (
-        CliRunner().invoke(app, ["balance", str(TURBO / "checked.toml"), "--output", str(path)]).exit_code
-        == 0
-    )
+    folder = tmp_path_factory.mktemp("balanced")
+    job, path = as_workbook(TURBO / "checked.toml", folder / "job.xlsx"), folder / "sheet.xlsx"
+    assert CliRunner().invoke(app, ["balance", str(job), "--output", str(path)]).exit_code == 0
     return path
 
 

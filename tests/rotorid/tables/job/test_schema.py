@@ -58,7 +58,7 @@ def test_what_no_rotor_file_may_say_does_not_keep_to_it(text):
 def test_it_is_json_with_every_key_in_every_unit():
     found = json.loads(json.dumps(schema("job")))
     assert found["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert set(found["properties"]) == {"schema_version", *(name for key in JOB for name in key.names)}
+    assert set(found["properties"]) == {"schema_version", *(name for key in JOB for name in key.variants)}
     planes = found["properties"]["planes"]["additionalProperties"]
     assert set(planes["properties"]) == {name for key in PLANE for name in key.variants}
     assert {"max_mass_lb", "max_unbalance_oz_in", "radius_in", "step_kg_m"} <= set(planes["properties"])

@@ -77,7 +77,7 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
         ),
         (HEAD.replace(",phase_std_deg", "") + ROWS.replace(",2,6", ",2").replace(",2,3", ",2"), "phase_std"),
         (HEAD.replace("std_um_pp", "std_mm_s") + ROWS, "amplitude_std_mm_s.* a unit that converts"),
-        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s or ms"),
+        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s, ms, us or min"),
         ("run,speed_rpm,sensor,amplitude,phase_deg\na,9,x,1,0\na,9,x,2,0\n", "need a column time_s"),
     ],
 )
@@ -91,3 +91,38 @@ def test_a_table_without_known_errors_has_no_columns_of_them(tmp_path):
     unknown = np.full((*sweep.vectors.shape, 2, 2), np.nan)
     names = [c.name for c in runs_columns([(sweep, sweep.speeds, sweep.vectors, unknown)])]
     assert names == ["run", "speed_rpm", "sensor", "amplitude_m", "phase_deg"]
+
+
+LONG = """\
+run,speed_rpm,sensor,amplitude_mil_pp,phase_deg,time_s
+coast,600,DE,2.1,30,1
+coast,600,NDE,1.5,40,1
+coast,650,DE,4.2,90,2
+coast,650,NDE,2.5,95,2
+"""
+SAME = {
+    "columns per sensor": "run,RPM,DE mils pp,DE deg,NDE mils pp,NDE deg,time_s\n"
+    "coast,600,2.1,30,1.5,40,1\ncoast,650,4.2,90,2.5,95,2\n",
+    "two rows of headings": ",,DE,,NDE,,\nrun,rpm,mils pp,deg,mils pp,deg,time_s\n"
+    "coast,600,2.1,30,1.5,40,1\ncoast,650,4.2,90,2.5,95,2\n",
+    "vectors": "run,RPM,DE,NDE,time_s\n,rpm,mil pp,mil pp,s\n"
+    "coast,600,2.1 @ 30°,1.5 @ 40°,1\ncoast,650,4.2 @ 90°,2.5 @ 95°,2\n",
+    "one run, named as its file": "RPM,DE mils pp,DE deg,NDE mils pp,NDE deg,time_s\n"
+    "600,2.1,30,1.5,40,1\n650,4.2,90,2.5,95,2\n",
+}
+
+
+@pytest.mark.parametrize("form", SAME)
+def test_tables_as_instruments_write_them_are_the_same(tmp_path, form):
+    (tmp_path / "coast.csv").write_text(SAME[form], encoding="utf-8")
+    (sweep,) = read_vectors(tmp_path / "coast.csv", "lag")
+    (other,) = read(tmp_path, LONG, "lag")
+    assert (sweep.run, sweep.sensors, sweep.labels) == (other.run, other.sensors, other.labels)
+    assert sweep.time.tolist() == other.time.tolist()
+    np.testing.assert_allclose(sweep.vectors, other.vectors, rtol=1e-14)
+
+
+def test_a_single_sensor_needs_no_column(tmp_path):
+    (sweep,) = read(tmp_path, "RPM,Amp (mils),Phase (deg)\n600,2.1,30\n650,4.2,90\n")
+    assert (sweep.run, sweep.sensors) == ("vectors", ("1",))
+    np.testing.assert_allclose(sweep.labels.vibration(sweep.vectors[:, 0]), [[2.1, 4.2], [30, 90]])

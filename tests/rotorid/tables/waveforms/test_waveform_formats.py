@@ -8,7 +8,7 @@ from cases import each_of
 from scipy.io import savemat, wavfile
 from waveform_files import RATE, SUFFIXES, drawn, write, write_tdms, write_uff
 
-from rotorid.tables.reader.problems import InputError
+from rotorid.files.problems import InputError
 from rotorid.tables.waveforms.waveforms import read_samples
 
 

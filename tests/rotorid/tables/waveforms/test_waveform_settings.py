@@ -9,8 +9,8 @@ from cases import each_of
 from waveform_files import RATE, drawn, write
 
 from balancing import Labels
-from rotorid.tables.reader.input_file import each_file_once, sha256
-from rotorid.tables.reader.problems import InputError
+from rotorid.files.input_file import each_file_once, sha256
+from rotorid.files.problems import InputError
 from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
 from rotorid.waveforms.record import SignalPath, TachoSettings
 

@@ -1,0 +1,1 @@
+"""Files of people and instruments: cells, units, settings, complaints; runs and weights in any layout."""

@@ -1,0 +1,507 @@
+"""Columns with names and units: cells become numbers in SI and names, or problems."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import SupportsIndex
+
+import numpy as np
+
+from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.suggestions import suggest
+from rotorid.base.text import listing
+from rotorid.files.decimal_numbers import (
+    NotANumber,
+    check_size,
+    decimal_comma,
+    parse_number,
+    thousands_or_decimals,
+)
+from rotorid.files.digits import written_steps
+from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import decode, parse_text, read_bytes
+from rotorid.files.units import Unit, UnitError, UnitReader
+
+REMARKS = ("note", "comment")
+KINDS = {
+    "a runs table": ("run", "speed", "sensor", "amplitude", "phase"),
+    "an influence table": ("speed", "sensor", "plane", "influence"),
+    "a weights table": ("run", "plane", "angle"),
+    "a table of modes": ("mode", "node", "shape"),
+    "a table of compliances": ("node", "force_node", "compliance"),
+    "a rotor table": ("length", "diameter"),
+    "an unbalance table": ("unbalance", "angle"),
+}
+"""Columns by which a table is known that is taken for another kind."""
+_UNCLEAR = Unit("?", "unclear")
+Source = str | Path | Grid | tuple[Path, ...]
+"""A table: a file, the cells of a sheet, or, of runs, files with one run each."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that a table may have.
+
+    Attributes
+    ----------
+    stem
+        The name without its unit.
+    unit
+        Reads the unit's name; None for a column of text.
+    examples
+        Full names for messages, the usual one first.
+    required
+        Whether the table is unusable without it.
+    blank
+        Whether a cell may be empty: NaN or `""` then, and the reader of the table decides.
+    """
+
+    stem: str
+    unit: UnitReader | None = None
+    examples: tuple[str, ...] = ()
+    required: bool = True
+    blank: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names for messages and suggestions."""
+        return self.examples or (self.stem,)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
+
+    Where its cells stood in several columns of the file, `names` has the one of each.
+    """
+
+    name: str
+    unit: Unit | None
+    cells: tuple[Cell, ...]
+    numbers: FloatArray
+    texts: tuple[str, ...]
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table with meaning, that still knows where everything stood.
+
+    Attributes
+    ----------
+    source
+        The file, and the sheet of a workbook.
+    header_row, rows
+        Row numbers in the file.
+    fields
+        By stem of the column's name.
+    problems
+        Collects the complaints.
+    misspelt
+        Stems that unknown columns were probably meant to have; they have been reported, with that suggestion.
+    comments
+        Comment lines.
+    complete
+        Whether every row of the file is here.
+    """
+
+    source: str
+    header_row: int
+    rows: tuple[int, ...]
+    fields: Mapping[str, Field]
+    problems: Problems
+    misspelt: frozenset[str] = frozenset()
+    comments: tuple[str, ...] = ()
+    complete: bool = True
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __contains__(self, stem: str) -> bool:
+        return stem in self.fields
+
+    def numbers(self, stem: str, missing: float = math.nan) -> FloatArray:
+        """Values in SI, shape (rows,); `missing` everywhere if the table has no such column."""
+        if stem not in self.fields:
+            return np.full(len(self.rows), missing)
+        return self.fields[stem].numbers
+
+    def steps(self, stem: str) -> FloatArray:
+        """Steps in SI in which the numbers of a column without problems are written, shape (rows,)."""
+        return np.asarray(written_steps(self.fields[stem].cells) * self.unit(stem).to_si(1.0))
+
+    def texts(self, stem: str) -> tuple[str, ...]:
+        """Values of a text column."""
+        return self.fields[stem].texts
+
+    def unit(self, stem: str) -> Unit:
+        """The unit of a column of numbers."""
+        unit = self.fields[stem].unit
+        if unit is None:
+            raise KeyError(stem)
+        return unit
+
+    def shown(self, stem: str, index: SupportsIndex) -> str:
+        """A cell as it stood in the file."""
+        return show(self.fields[stem].cells[index])
+
+    def is_blank(self, stem: str) -> BoolArray:
+        """Which cells of a column are empty, shape (rows,); none if the table has no such column."""
+        cells = self.fields[stem].cells if stem in self.fields else self.rows
+        return np.array([cell == "" for cell in cells], dtype=bool)
+
+    def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
+        """Note a problem with one cell."""
+        field = self.fields[stem]
+        name = field.names[index] if field.names else field.name
+        self.problems.add(self.source, self.rows[index], name, self.shown(stem, index), expected)
+
+    def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
+        """Note a problem with each of these cells of a column."""
+        for index in np.flatnonzero(wrong):
+            self.complain(index, stem, expected)
+
+    def in_header(self, column: str | None, expected: str) -> None:
+        """Note a problem with the header: a column that it lacks, or has too much."""
+        self.problems.add(self.source, self.header_row, column, None, expected)
+
+    def as_whole(self, column: str | None, expected: str) -> None:
+        """Note a problem of no single row."""
+        self.problems.add(self.source, None, column, None, expected)
+
+    def must_be(self, stem: str, allowed: FloatArray | Iterable[bool], expected: str) -> None:
+        """Complain about every number of a column that is not allowed; unreadable ones have been reported."""
+        if stem not in self:
+            return
+        bad = ~np.fromiter(allowed, dtype=bool, count=len(self)) & ~np.isnan(self.numbers(stem))
+        self.complain_where(bad, stem, expected)
+
+    def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
+        """The one column that there is of several; else None and a problem, if none is only misspelt.
+
+        Parameters
+        ----------
+        stems
+            Of the columns.
+        usual
+            The full name of one, for the message.
+        missing, several
+            What is expected where there is none, and where there are several (default: the same).
+        """
+        present = [stem for stem in stems if stem in self]
+        if len(present) == 1:
+            return present[0]
+        if present:
+            self.in_header(self.fields[present[1]].name, several or missing)
+        elif self.misspelt.isdisjoint(stems):
+            self.in_header(usual, missing)
+        return None
+
+    def once(self, stem: str, values: Iterable[Hashable], expected: str) -> None:
+        """Complain about each row of a value that stood before; `expected` has {} for the row of the first.
+
+        Values None and "" do not count.
+        """
+        first: dict[Hashable, int] = {}
+        for index, value in enumerate(values):
+            if value not in (None, "") and first.setdefault(value, index) != index:
+                self.complain(index, stem, expected.format(self.rows[first[value]]))
+
+
+def read_table(
+    source: Source,
+    sheet: str,
+    columns: Sequence[Column],
+    problems: Problems,
+    *,
+    first: bool = False,
+    may_be_empty: bool = False,
+) -> Table | None:
+    """Read a table from a text file or a workbook.
+
+    Parameters
+    ----------
+    source
+        A file, of which `.xlsx` is a workbook and everything else text, or the cells of a sheet.
+    sheet
+        Name of the sheet in a workbook; the only sheet may have any name (with `first`, the first one).
+    columns
+        What the table may contain; every other column is a problem.
+    problems
+        Collects the complaints.
+    may_be_empty
+        Whether a header without rows says something.
+
+    Returns
+    -------
+    Table or None
+        None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
+    """
+    grid = read_grid(source, sheet, problems, first=first, may_be_empty=may_be_empty)
+    return None if grid is None else make_table(grid, columns, problems)
+
+
+def read_grid(
+    source: Source,
+    sheet: str,
+    problems: Problems,
+    *,
+    first: bool = False,
+    may_be_empty: bool = False,
+) -> Grid | None:
+    """The cells of a text file or of a sheet."""
+    if isinstance(source, Grid):
+        return source
+    path = Path(source_name(source))
+    if is_workbook(path):
+        sheets = read_workbook(path, problems)
+        chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
+        if chosen is None:
+            return None
+        title, rows = chosen
+        return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
+    data = read_bytes(path, problems)
+    text = None if data is None else decode(str(path), data, problems)
+    return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
+
+
+def source_name(source: Source) -> str:
+    """How messages name a table."""
+    if isinstance(source, tuple):
+        return listing(map(str, source), "and")
+    return source.source if isinstance(source, Grid) else str(source)
+
+
+def sheet_source(path: Path, title: str) -> str:
+    """How messages name a sheet."""
+    return f"{path} (sheet {title!r})"
+
+
+def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
+    """Give the columns of a grid their meaning; every complaint goes to `problems`."""
+    if not any(column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
+        _complain_about_header(grid, columns, problems)
+        return None
+    misspelt = _misspelt(grid, columns)
+    if not _has_columns(grid, columns, misspelt, problems):
+        return None
+    found = _match(grid, columns, problems)
+    comma = decimal_comma(
+        (
+            cell
+            for index, column, _ in found.values()
+            if column.unit is not None
+            for cell in (cells[index] for _, cells in grid.rows)
+            if isinstance(cell, str) and "," in cell
+        ),
+        grid.separator,
+    )
+    fields = {
+        stem: _field(grid, index, column, unit, problems, comma=comma)
+        for stem, (index, column, unit) in found.items()
+    }
+    if any(column.required and column.stem not in found for column in columns):
+        return None
+    rows = tuple(number for number, _ in grid.rows)
+    return Table(grid.source, grid.header_row, rows, fields, problems, misspelt, grid.comments, grid.complete)
+
+
+_Match = tuple[int, Column, Unit | None]
+
+
+def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[str, _Match]:
+    """Which column of the grid is which; problems for unknown, repeated and wrongly named ones."""
+    found: dict[str, _Match] = {}
+    for index, name in enumerate(grid.header):
+        if not name or name.casefold().startswith(REMARKS):
+            continue
+        column = column_of(name, columns)
+        if column is None:
+            near = nearest(name, columns)
+            if near:  # the others have been reported
+                problems.add(
+                    grid.source, grid.header_row, name, name, f"a known column (did you mean {near!r}?)"
+                )
+            continue
+        unit: Unit | None = None
+        if column.unit is not None:
+            try:
+                unit = column.unit(name[len(column.stem) + 1 :])
+            except UnitError as error:
+                problems.add(grid.source, grid.header_row, name, name, str(error))
+                # Marked as found, so that it is not reported as missing too.
+                unit = _UNCLEAR
+        if column.stem in found:
+            other = grid.header[found[column.stem][0]]
+            what = "the column once" if other == name else f"one unit for {column.stem}, not also {other}"
+            problems.add(grid.source, grid.header_row, name, name, what)
+            continue
+        found[column.stem] = (index, column, unit)
+    return found
+
+
+def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
+    expected = "a header row with the names of columns, separated by , or ; or tabs: "
+    expected += _known(columns) + _seems(grid)
+    shown = None  # who knows what stands in a file that is no table
+    later = _header_below(grid, columns)
+    problems.withdraw(grid.source)  # that rows are longer than a title is no news
+    if later is not None:
+        shown = (grid.separator or " ").join(name for name in grid.header if name)
+        expected = (
+            f"the header in the first row, and it seems to be row {later}: "
+            "delete what stands above it, or begin those rows with #"
+        )
+    problems.add(grid.source, grid.header_row, None, shown, expected)
+
+
+def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
+    """The row that names most of the required columns, if it is not the first one."""
+    needed = {column.stem for column in columns if column.required}
+    for number, cells in grid.first_rows[1:]:
+        names = [column_of(show(cell), columns) for cell in cells]
+        if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
+            return number
+    return None
+
+
+def column_of(name: str, columns: Sequence[Column]) -> Column | None:
+    """The column that a heading names."""
+    fitting = [
+        column
+        for column in columns
+        if name == column.stem or (column.unit is not None and name.startswith(f"{column.stem}_"))
+    ]
+    return max(fitting, key=lambda column: len(column.stem), default=None)
+
+
+def nearest(name: str, columns: Sequence[Column]) -> str | None:
+    """The name of a column that was probably meant: `amplitude_um` for `Amplitude [um]`."""
+    plain = re.sub(r"[^\w/%]+|_+", "_", name).strip("_")
+    for column in sorted(columns, key=lambda column: -len(column.stem)):
+        head, tail = plain[: len(column.stem)], plain[len(column.stem) :]
+        if head.casefold() == column.stem and column.unit is not None and tail.startswith("_"):
+            try:
+                return f"{column.stem}_{column.unit(tail[1:]).name}"
+            except UnitError:
+                break
+    return suggest(name, [example for column in columns for example in column.names])
+
+
+def _known(columns: Sequence[Column]) -> str:
+    return listing([example for column in columns for example in column.names], "and")
+
+
+def _misspelt(grid: Grid, columns: Sequence[Column]) -> frozenset[str]:
+    """Stems of the columns that unknown ones were probably meant to be."""
+    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
+    near = [nearest(name, columns) for name in names if column_of(name, columns) is None]
+    close = [column_of(name, columns) for name in near if name]
+    return frozenset(column.stem for column in close if column is not None)
+
+
+def _has_columns(
+    grid: Grid, columns: Sequence[Column], misspelt: Collection[str], problems: Problems
+) -> bool:
+    """Whether it may be a table of this kind; one problem each with unknown and with missing columns."""
+    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
+    known = [column.stem for name in names if (column := column_of(name, columns)) is not None]
+    unknown = [name for name in names if column_of(name, columns) is None and nearest(name, columns) is None]
+    missing = [c for c in columns if c.required and c.stem not in known and c.stem not in misspelt]
+    present = listing([name for name in grid.named or grid.header if name], "and")
+    if (len(missing) > 1 and unknown) or len(unknown) > max(2, len(known)):
+        seems = _seems(grid) or "; remarks go into 'note'"
+        expected = f"a table with the columns {_known(columns)}; its columns are {present}{seems}"
+        problems.add(grid.source, grid.header_row, unknown[0], None, expected)
+        return False
+    if unknown:
+        one = unknown[0] if len(unknown) == 1 else None
+        expected = (
+            f"{'a known column' if one else 'known columns'}: {_known(columns)}; remarks go into 'note'"
+        )
+        problems.add(grid.source, grid.header_row, one, listing(unknown, "and"), expected)
+    if missing:
+        needed = (
+            listing(missing[0].names) if len(missing) == 1 else listing([c.names[0] for c in missing], "and")
+        )
+        expected = f"{'a column' if len(missing) == 1 else 'columns'} {needed}; the columns are {present}"
+        problems.add(grid.source, grid.header_row, missing[0].names[0], None, expected)
+    return True
+
+
+def _seems(grid: Grid) -> str:
+    """The kind of table that it is by its columns, as a clause; nothing where it is none that is known."""
+    names = [name for name in grid.named or grid.header if name]
+    for kind, stems in KINDS.items():
+        if all(any(name == stem or name.startswith(f"{stem}_") for name in names) for stem in stems):
+            return f": it seems to be {kind}"
+    return ""
+
+
+def _field(
+    grid: Grid, index: int, column: Column, unit: Unit | None, problems: Problems, *, comma: bool
+) -> Field:
+    cells = tuple(row[index] for _, row in grid.rows)
+    names = tuple(grid.named[columns[index]] for columns in grid.taken)
+    name = names[0] if len(set(names)) == 1 else grid.header[index]
+    numbers = np.full(len(cells), math.nan)
+    texts = [""] * len(cells)
+    # most cells of a long table say what another one has said
+    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    doubtful: set[str] = set()
+    if unit is not None and not comma and grid.separator in (";", "\t"):
+        doubtful = thousands_or_decimals(
+            (cell for cell in cells if isinstance(cell, str)), grid.header[index]
+        )
+    for place, cell in enumerate(cells):
+        if cell not in known:
+            try:
+                if isinstance(cell, BadCell):
+                    raise NotANumber(cell.expected)
+                if cell in doubtful:
+                    raise NotANumber(
+                        "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
+                        "in the whole file, 1,350"
+                    )
+                known[cell] = (
+                    _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
+                )
+            except NotANumber as error:
+                own = names[place] if names else name
+                problems.add(grid.source, grid.rows[place][0], own, show(cell), str(error))
+                continue
+        value = known[cell]
+        if isinstance(value, str):
+            texts[place] = value
+        else:
+            numbers[place] = value
+    return Field(name, unit, cells, numbers, tuple(texts), names)
+
+
+def _number(cell: str | float, unit: Unit, separator: str, *, comma: bool) -> float:
+    written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
+    check_size(written)
+    value = unit.to_si(written)
+    if unit is _UNCLEAR:
+        return math.nan
+    if not math.isfinite(value):
+        raise NotANumber("a finite number")
+    return value
+
+
+def _name(text: str) -> str:
+    if not text:
+        raise NotANumber("a name")
+    if text[0] in "=@":
+        raise NotANumber("a name; one that begins with = or @ would be a formula in a spreadsheet")
+    if is_spreadsheet_error(text) or not text.strip("#"):
+        raise NotANumber("a name, not an error of the spreadsheet")
+    if not text.isprintable():
+        raise NotANumber("a name without line breaks and control characters")
+    return text

@@ -1,0 +1,173 @@
+"""Excel workbooks (.xlsx): sheets into rows of cells."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import re
+import time
+import warnings
+import zipfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from rotorid.files.grid import MOST_CELLS, BadCell, Cell, Row, Shown, clean
+from rotorid.files.problems import Problems
+from rotorid.files.text_file import read_bytes
+
+SUFFIXES = (".xlsx", ".xlsm")
+MOST_UNPACKED = 200_000_000
+"""Bytes of all parts of a workbook."""
+MOST_PACKING = 100
+"""Times that parts may be larger than the file; those that people write are about 10 times."""
+MOST_SECONDS = 60.0
+LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
+_DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
+"""A number format with decimals or a power of ten."""
+
+
+def is_workbook(path: Path) -> bool:
+    """Whether the name says that the file is a workbook."""
+    return path.suffix.lower() in SUFFIXES
+
+
+def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None:
+    """All sheets of a workbook as rows of cells, or None and a problem.
+
+    Formulas count with the values that the spreadsheet program stored.
+    """
+    data = read_bytes(path, problems)
+    return None if data is None else sheets_in(path, data, problems)
+
+
+def sheets_in(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row]] | None:
+    """What `read_workbook` gives, of a workbook that has been read; `path` is for messages."""
+    if not data.startswith(b"PK"):
+        problems.add(str(path), None, None, None, "an Excel workbook, as the name says; this is none")
+        return None
+    try:
+        _check_size(data)
+        return _sheets(str(path), data, time.monotonic() + MOST_SECONDS, problems)
+    except _TooLarge as error:
+        problems.add(str(path), None, None, None, str(error))
+    except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        problems.add(str(path), None, None, None, f"an intact Excel workbook (reading it failed: {reason})")
+    return None
+
+
+class _TooLarge(ValueError):
+    """The message says what was expected instead."""
+
+
+def _check_size(data: bytes) -> None:
+    """Refuse a workbook that unpacks to too much, before it is unpacked."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(part.file_size for part in archive.infolist())
+    most = min(MOST_UNPACKED, 10_000_000 + MOST_PACKING * len(data))
+    if size > most:
+        raise _TooLarge(
+            f"a workbook of at most {most / 1e6:.0f} MB unpacked; this one has {size / 1e6:.0f} MB"
+        )
+
+
+def _sheets(source: str, data: bytes, deadline: float, problems: Problems) -> dict[str, list[Row]]:
+    import openpyxl
+    from openpyxl.cell.read_only import ReadOnlyCell
+    from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
+
+    class Parser(WorkSheetParser):  # type: ignore[misc]
+        """Stored values as openpyxl reads them, and formulas that have none."""
+
+        def parse_cell(self, element: Any) -> Any:  # noqa: ANN401
+            cell = super().parse_cell(element)
+            if cell["value"] is None and element.find(FORMULA_TAG) is not None:
+                cell |= {"value": self.parse_formula(element), "data_type": "f"}
+            return cell
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about styles and validation rules, which do not concern us
+        book = openpyxl.load_workbook(io.BytesIO(data), data_only=True, read_only=True)
+        if "schema_version" in book.custom_doc_props.names:
+            problems.refuse_newer(source, book.custom_doc_props["schema_version"].value)
+        found: dict[str, list[Row]] = {}
+        for sheet in book.worksheets:
+            # not its iter_rows, which fills gaps up to the last format and drops rows that are not in order
+            with sheet._get_source() as source:
+                rows = Parser(
+                    source,
+                    sheet._shared_strings,
+                    data_only=True,
+                    epoch=book.epoch,
+                    date_formats=book._date_formats,
+                    timedelta_formats=book._timedelta_formats,
+                ).parse()
+                made = ((number, [ReadOnlyCell(sheet, **cell) for cell in cells]) for number, cells in rows)
+                found[sheet.title] = sorted(_rows(made, deadline), key=lambda row: row[0])
+    return found
+
+
+def _rows(rows: Iterable[tuple[int, list[Any]]], deadline: float) -> Iterator[Row]:
+    """The rows that hold something, without blanks at their ends."""
+    total = 0
+    for number, written in rows:
+        if time.monotonic() > deadline:
+            raise _TooLarge(f"a workbook that can be read in {MOST_SECONDS:.0f} seconds")
+        cells = {cell.column: value for cell in written if (value := _cell(cell)) != ""}
+        if not cells:
+            continue
+        if number > LAST_ROW or max(cells) > LAST_COLUMN:
+            raise ValueError(f"a cell beyond row {LAST_ROW} or column {LAST_COLUMN}")
+        total += max(cells)
+        if total > MOST_CELLS:
+            raise _TooLarge(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
+        yield number, tuple(cells.get(column, "") for column in range(1, max(cells) + 1))
+
+
+def _cell(cell: Any) -> Cell:  # noqa: ANN401
+    value = cell.value
+    if value is None:
+        return ""
+    if cell.data_type == "f":
+        formula = str(getattr(value, "text", value))
+        return BadCell(formula, "a formula with its stored value: open and save the file in Excel")
+    if cell.data_type == "e":
+        return BadCell(str(value), "a value, not an error of the spreadsheet")
+    if isinstance(value, bool):
+        return BadCell(str(value).upper(), "a number or text, not a logical value")
+    if isinstance(value, (datetime.date, datetime.time, datetime.timedelta)):
+        return BadCell(str(value), "a number or text; the spreadsheet turned the cell into a date or time")
+    if isinstance(value, (int, float)):
+        if "%" in str(cell.number_format):
+            return BadCell(f"{100 * value:g}%", "a plain number; the cell is formatted as a percentage")
+        return _with_digits(value, str(cell.number_format))
+    return clean(str(value))
+
+
+def _with_digits(value: float, number_format: str) -> float:
+    """The number with the digits that its format shows, if the format shows all of it."""
+    found = _DIGITS.fullmatch(number_format)
+    if found is None:
+        return value
+    text = f"{value:.{len(found[1] or '')}{'e' if found[2] else 'f'}}"
+    return Shown(value, text) if float(text) == value else value
+
+
+def pick_sheet(
+    path: Path, sheets: dict[str, list[Row]], name: str, problems: Problems, *, first: bool = False
+) -> tuple[str, list[Row]] | None:
+    """The sheet of this name, else the only one that holds something (or, with `first`, the first)."""
+    named = find_sheet(sheets, name)
+    if named is not None:
+        return named, sheets[named]
+    filled = [title for title, rows in sheets.items() if rows] or list(sheets)
+    if filled and (first or len(filled) == 1):
+        return filled[0], sheets[filled[0]]
+    problems.add(str(path), None, None, None, f"a sheet {name!r}; the sheets are {', '.join(sheets)}")
+    return None
+
+
+def find_sheet(sheets: dict[str, list[Row]], name: str) -> str | None:
+    """The title of the sheet of this name, capitals aside."""
+    return next((title for title in sheets if title.strip().casefold() == name), None)

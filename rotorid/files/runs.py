@@ -1,0 +1,325 @@
+"""Runs tables: what the sensors read, one row per run × speed × sensor (and repeat).
+
+A table in another layout is brought into this form first (`layout`). With the weights tables they
+make trials.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from balancing import Labels, ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.files import units
+from rotorid.files.columns import Column, Source, Table, make_table
+from rotorid.files.conventions import (
+    DEFAULT_TOLERANCE,
+    FULL_TURN,
+    Angles,
+    Conventions,
+    Phase,
+    StatedErrors,
+)
+from rotorid.files.grid import Grid
+from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
+from rotorid.files.problems import Problems
+from rotorid.files.speeds import merge_speeds, same_speed, show_speed
+from rotorid.files.units import one_of
+from rotorid.files.weights import read_weights
+
+SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
+PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
+COLUMNS = (
+    Column("run"),
+    SPEED,
+    Column("sensor"),
+    Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
+    PHASE,
+    Column("repeat", required=False),
+    Column("time_s", required=False, blank=True),
+    Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
+    Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
+)
+_RUNS_NAMED, _SPEEDS_NAMED = 20, 10
+"""Of runs with gaps, and of speeds that one run lacks, so many are named."""
+
+
+def read_trials(
+    runs: str | Path,
+    weights: str | Path | None,
+    *,
+    phase: Phase | None = None,
+    angles: Angles | None = None,
+    speed_tolerance_percent: float = DEFAULT_TOLERANCE,
+    errors: StatedErrors | ReadingErrors | None = None,
+) -> Trials:
+    """Read a runs table and a weights table.
+
+    Parameters
+    ----------
+    runs, weights
+        Files (`.csv`, `.xlsx`); `runs` may be a folder with one file a run; weights may be None where
+        influence coefficients are known.
+    phase
+        Whether a positive phase in the runs table leads or lags; None: as its headings say, else lead,
+        which the labels call assumed.
+    angles
+        Whether angles in the weights table count with or against the rotation; None: with, which the labels
+        call assumed where an angle other than 0° and 180° is mounted.
+    speed_tolerance_percent
+        Speeds of different runs that differ by less count as one, their mean.
+    errors
+        One standard deviation of a reading.
+
+    Returns
+    -------
+    balancing.Trials
+        In SI (readings without a known unit as they are), phase lead, angles with the rotation.
+
+    Raises
+    ------
+    InputError
+        With all problems of both files.
+    ValueError
+        If an argument is none of the allowed values.
+    """
+    problems = Problems()
+    phase = phase or stated_phase(runs)
+    labels = Labels(phase=phase or "lead", angles=angles or "with rotation")
+    conventions = Conventions(labels, speed_tolerance_percent)
+    trials = problems.need(make_trials(runs, weights, conventions, errors, problems))
+    problems.stop()
+    assumed: tuple[str, ...] = ("phase",) if phase is None else ()
+    if angles is None and off_axis(trials.weights):
+        assumed += ("angles",)
+    return replace(trials, labels=replace(trials.labels, assumed=assumed))
+
+
+def make_trials(
+    runs: Source,
+    weights: Source | None,
+    conventions: Conventions,
+    errors: StatedErrors | ReadingErrors | None,
+    problems: Problems,
+) -> Trials | None:
+    """Put both tables together, or None and problems."""
+    names, trials = read_runs(runs, conventions, problems)
+    mounted = None if weights is None else read_weights(weights, names, conventions, problems)
+    if trials is None or (mounted is None and weights is not None) or len(problems):
+        return None
+    if isinstance(errors, StatedErrors):
+        trials = errors.stated_in(trials)
+    elif errors is not None:
+        trials = replace(trials, errors=errors)
+    if mounted is None:
+        return trials
+    labels = replace(trials.labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)
+    return replace(trials, planes=mounted.planes, weights=mounted.weights, labels=labels)
+
+
+def read_runs(
+    source: Source, conventions: Conventions, problems: Problems
+) -> tuple[tuple[str, ...] | None, Trials | None]:
+    """Read a runs table: names of its runs, and its readings without weights; None and problems.
+
+    Parameters
+    ----------
+    source
+        A file, a folder or a tuple with one file a run, or the cells of a sheet.
+    conventions
+        What phases mean, and which speeds count as one.
+    problems
+        Collects the complaints.
+    """
+    grids = read_runs_grids(source, conventions, problems)
+    if grids is None or (len(grids) > 1 and not all(readings_table(grid, problems) for grid in grids)):
+        return None, None
+    grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
+    table = None if grid is None else readings_table(grid, problems)
+    if table is None:
+        return None, None
+    amplitude, phase = table.numbers("amplitude"), table.numbers("phase")
+    run, sensor = table.texts("run"), table.texts("sensor")
+    speed = table.numbers("speed")
+    usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
+    start = len(problems)
+    speeds, index, words = merge_speeds(table, usable, conventions.speed_tolerance_percent)
+    runs = tuple(dict.fromkeys(name for name in run if name))
+    sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    run_at = {name: r for r, name in enumerate(runs)}
+    sensor_at = {name: c for c, name in enumerate(sensors)}
+    cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
+    for i in usable:
+        cells[run_at[run[i]], index[i], sensor_at[sensor[i]]].append(i)
+    if len(problems) == start:  # with unclear speeds all the rest would be noise
+        for rows in cells.values():
+            _complain_about_repeats(table, rows)
+    if table.complete and len(usable) == len(table) and len(problems) == start:
+        _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions.speed_tolerance_percent)
+    if not len(problems):
+        _ask_about_exchange(table, conventions)
+    if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
+        return runs, None
+    words += _which_mm_s(table)
+    values = conventions.labels.vibration_from(amplitude, phase)
+    repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
+    order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
+    most = max((len(rows) for rows in cells.values()), default=1)
+    rows = [row for own in cells.values() for row in sorted(own, key=lambda i: order[repeat[i]])]
+    at = np.array([(k, *place) for place, own in cells.items() for k in range(len(own))], dtype=int).T
+    readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
+    steps = np.full((2, *readings.shape), np.nan)
+    readings[*at] = values[rows]
+    steps[:, *at] = np.array([table.steps("amplitude"), table.steps("phase")])[:, rows]
+    labels = replace(
+        conventions.labels,
+        vibration_unit=table.unit("amplitude").name,
+        vibration_scale=table.unit("amplitude").scale,
+        weight_unit="g",
+        weight_scale=1e3,
+        speed_unit=table.unit("speed").name,
+    )
+    nothing = np.zeros((len(runs), 0), dtype=complex)
+    trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=words, steps=steps)
+    if "phase_std" not in table:
+        return runs, trials
+    covariance = np.full((2, 2, *readings.shape), np.nan)
+    covariance[:, :, *at] = np.moveaxis(covariances(table, values), 0, -1)[..., rows]
+    return runs, replace(trials, covariance=covariance)
+
+
+def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
+    """Of real and imaginary parts of the readings (n,) of a table with `amplitude_std` and `phase_std`.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 2, 2); where there is no amplitude, no direction is another.
+    """
+    along, size = table.numbers("amplitude_std"), np.abs(vectors)
+    across = np.where(size > 0, size * table.numbers("phase_std"), along)
+    return turned(vectors, along**2, across**2)
+
+
+def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = COLUMNS) -> Table | None:
+    """The columns of a runs table, with numbers that can be; None and problems."""
+    table = make_table(grid, columns, problems)
+    if table is None:
+        return None
+    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
+    table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
+    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    stems = [stem for stem in ("amplitude_std", "phase_std") if stem in table]
+    if len(stems) == 1:
+        expected = "amplitude_std_… and phase_std_deg together: one alone does not tell how a reading errs"
+        table.in_header(table.fields[stems[0]].name, expected)
+        return table
+    for stem in stems:
+        allowed = table.numbers(stem) > 0
+        table.must_be(stem, allowed, "a standard deviation above 0: nothing is measured exactly")
+    if stems and (unit := table.unit("amplitude")).kind != table.unit("amplitude_std").kind:
+        expected = f"a unit that converts to that of the amplitude, {unit.name or 'none'}"
+        table.in_header(table.fields["amplitude_std"].name, expected)
+    return table
+
+
+def _heading_of(table: Table) -> str:
+    """The heading of the amplitudes in the file."""
+    field = table.fields["amplitude"]
+    return field.names[0] if field.names else field.name
+
+
+def _which_mm_s(table: Table) -> tuple[str, ...]:
+    """How mm/s alone are read, below a heading that is not one of this program's own."""
+    heading, unit = _heading_of(table), table.unit("amplitude").name
+    if unit == "mm_s_rms" and is_severity(heading):
+        return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
+    if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
+        return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
+    return ()
+
+
+def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
+    """Amplitudes that look like angles beside phases that look like amplitudes, unless the job names both."""
+    stated = conventions.columns
+    named = {} if stated is None else {key for key, value in stated.items() if value is not None}
+    if "amplitude" in named or table.unit("phase").name != "deg" or len(table) < 4:
+        return
+    amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
+    phase, written = np.degrees(table.numbers("phase")), table.steps("phase")
+    whole = np.abs(amplitude - np.round(amplitude)) < 1e-9
+    like_angles = bool(np.all(whole & (amplitude <= 360))) and np.ptp(amplitude) > 90
+    if like_angles and np.all(np.abs(phase) < 30) and np.any(written < np.radians(0.5)):
+        one, other, unit = _heading_of(table), table.fields["phase"].name, table.unit("amplitude").name
+        key = f"amplitude_{unit}" if unit else "amplitude"
+        expected = (
+            "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, and "
+            f'all amplitudes look like angles. If they are, state [columns] {key} = "{other}", phase_deg = '
+            f'"{one}" in the job; if not, {key} = "{one}", phase_deg = "{other}"'
+        )
+        table.as_whole(one, expected)
+
+
+def _complain_about_repeats(table: Table, rows: list[int]) -> None:
+    """Two readings of one run, speed and sensor must say that they are repeats."""
+    first: dict[str, int] = {}
+    for row in rows if len(rows) > 1 else ():
+        label = table.texts("repeat")[row] if "repeat" in table else "the only one"
+        if label and first.setdefault(label, row) != row:
+            same = table.rows[first[label]]
+            if "repeat" in table:
+                table.complain(row, "repeat", f"another repeat than in row {same}, the same reading")
+                continue
+            expected = (
+                f"one reading per run, speed and sensor (row {same} has the same); "
+                "repeated readings need a column repeat"
+            )
+            table.complain(row, "sensor", expected)
+
+
+def _complain_about_gaps(
+    table: Table,
+    runs: tuple[str, ...],
+    speeds: FloatArray,
+    sensors: tuple[str, ...],
+    present: set[tuple[int, int, int]],
+    tolerance_percent: float,
+) -> None:
+    """Every run needs every sensor at every speed: influence coefficients compare runs."""
+    if len(present) == len(runs) * len(speeds) * len(sensors):
+        return
+    unit, column = table.unit("speed"), table.fields["speed"].name
+    read: list[dict[int, set[int]]] = [defaultdict(set) for _ in runs]
+    for r, s, c in present:
+        read[r][s].add(c)
+    anywhere = {(s, c) for _, s, c in present}
+    wanting = [r for r in range(len(runs)) if sum(map(len, read[r].values())) < len(speeds) * len(sensors)]
+    for r in wanting[:_RUNS_NAMED]:
+        run, at = runs[r], sorted(read[r])
+        if len(speeds) - len(at) > _SPEEDS_NAMED:
+            expected = f"readings of run {run!r} at all {len(speeds)} speeds of the runs; it has {len(at)}"
+            table.as_whole(column, expected)
+            continue
+        for s, speed in enumerate(speeds):
+            shown = show_speed(speed, unit)
+            if s not in read[r]:
+                near = min(at, key=lambda k: abs(speeds[k] - speed))
+                hint = f"; its nearest speed is {show_speed(speeds[near], unit)}"
+                if same_speed(speed, speeds[near], 10.0):
+                    hint += f", speeds count as one within {tolerance_percent:g} %"
+                table.as_whole(column, f"readings of run {run!r} at {shown}, as other runs have{hint}")
+                continue
+            for c in sorted(set(range(len(sensors))) - read[r][s]):
+                why = ", as other runs have"
+                if (s, c) not in anywhere:
+                    why = ": every run needs every sensor at every speed"
+                table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in run {run!r} at {shown}{why}")
+    if len(wanting) > _RUNS_NAMED:
+        table.as_whole(None, f"as many readings of {len(wanting) - _RUNS_NAMED} further runs")

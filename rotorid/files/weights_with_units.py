@@ -1,0 +1,41 @@
+"""Weights that a job writes with their units, as its weights are: masses, or unbalances (mass × radius)."""
+
+from __future__ import annotations
+
+from rotorid.files import units
+from rotorid.files.settings_keys import Quantity
+
+
+def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:
+    """A mass or unbalance, or several, in kg or kg·m.
+
+    Parameters
+    ----------
+    weight
+        With its unit.
+    unit
+        That of the job's weights: which of the two is wanted.
+    radius
+        m, converts between them.
+
+    Returns
+    -------
+    None where a radius is needed and there is none.
+    """
+    values = weight.value if isinstance(weight.value, tuple) else (weight.value,)
+    sizes = tuple(weight.unit.to_si(value) for value in values)
+    wanted = units.weight(unit).kind
+    if weight.unit.kind == wanted:
+        return sizes
+    if radius is None:
+        return None
+    return tuple(size * radius if wanted == "unbalance" else size / radius for size in sizes)
+
+
+def other_kind(key: str, unit: str) -> str:
+    """What is expected of a weight that does not convert to this unit."""
+    stem = key.partition("_")[0]
+    names = (f"{stem}_g", f"{stem}_g_mm") if stem != "max" else ("max_mass_g", "max_unbalance_g_mm")
+    mass = units.weight(unit).kind == "mass"
+    name, are = (names[0], "masses") if mass else (names[1], "unbalances (mass × radius)")
+    return f"{name}, because the weights of the job are {are}, or radius_mm too, to convert"

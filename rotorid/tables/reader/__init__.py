@@ -1,1 +1,0 @@
-"""Any file as cells, numbers and names: text, workbooks, settings, units, complaints, writing."""

@@ -1,0 +1,204 @@
+"""What must not be passed over in silence, and messages that stay readable whatever the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
+
+from balancing import Gaussian, correct, estimate_influence
+from rotorid.tables import (
+    InputError,
+    TableWarning,
+    influence_frame,
+    job_from_files,
+    read_influence,
+    read_job,
+    read_rotor,
+    read_trials,
+    write_influence,
+    write_table,
+)
+
+SHAFT = [
+    ["length_m", "diameter_m", "support_stiffness_N_per_m", "youngs_modulus_Pa", "density_kg_per_m3"],
+    [1.0, 0.1, 1e8, 2.1e11, 7800],
+    [1.0, 0.1, 1e8, 2.1e11, 7800],
+]
+
+
+@pytest.fixture
+def files(tmp_path):
+    return write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
+
+
+@pytest.mark.parametrize("title", [["My rotor"], ["Rotor 7, trial of June", "", "", "7"]])
+def test_a_title_above_the_header_is_named(tmp_path, files, title):
+    """Runs and weights are found under a title; any other table begins with its header."""
+    path = write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": [title, *WEIGHTS]})
+    assert read_job(path).planes == read_trials(*files).planes
+    text = tmp_path / "titled.csv"
+    text.write_text("My rotor\n\n" + csv_text(WEIGHTS), encoding="utf-8")
+    assert read_trials(files[0], text).planes == read_trials(*files).planes
+    rotor = write_book(tmp_path / "rotor.xlsx", {"rotor": [title, ["length_m", "diameter_m"], [1, 0.1]]})
+    [problem] = complaints(read_rotor, rotor)
+    assert "the header in the first row, and it seems to be row 2" in problem.expected
+
+
+def test_different_values_and_scattered_rows():
+    from rotorid.tables import Problem
+
+    problems = [Problem("f.csv", row, "a", str(row), "a number") for row in (2, 3, 5, 7, 9, 11)]
+    assert str(InputError(problems)) == (
+        "f.csv, rows 2–3, 5, 7, 9 and others (6 in all), column a: found '2', '3', '5' and so on, "
+        "expected a number"
+    )
+    many = [Problem("f.csv", row, f"c{row}", None, "x") for row in range(100)]
+    assert str(InputError(many)).splitlines()[20:] == ["and 80 more problems"]
+
+
+def test_many_runs_with_gaps_are_counted(tmp_path):
+    runs = [RUNS[0], *([f"r{k}", 100 * 1.1 ** (k % 40), "A", 1, 1] for k in range(200))]
+    with pytest.raises(InputError) as caught:
+        read_trials(write_csv(tmp_path / "runs.csv", runs), None)
+    problems = caught.value.problems
+    assert "readings of run 'r0' at all 40 speeds of the runs; it has 1" in problems[0].expected
+    assert "as many readings of 180 further runs" in problems[-1].expected
+
+
+@pytest.mark.parametrize("value", ["1e300", "-1e31", "5e-200", "1e-320"])
+def test_sizes_that_no_instrument_shows(tmp_path, files, value):
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 3, "amplitude_um_pp", value))
+    problem = complaints(read_trials, path, files[1])[0]
+    assert (problem.row, problem.column, problem.value) == (3, "amplitude_um_pp", value)
+    assert "between 1e-30 and 1e+30 in size" in problem.expected
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("length_m", 1000, "row 2, column length_m: 1000 means 1000 m; is this in mm?"),
+        ("diameter_m", 110, "column diameter_m: 110 means 110 m; is this in mm?"),
+        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in GPa?"),
+        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in g/cm³?"),
+    ],
+)
+def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):
+    path = write_csv(tmp_path / "rotor.csv", replaced(SHAFT, 2, column, value))
+    with pytest.warns(TableWarning) as caught:
+        read_rotor(path)
+    assert [words in str(w.message) for w in caught] == [True]
+
+
+def test_control_characters_in_the_name_of_a_file(tmp_path, files):
+    job = tmp_path / "job.toml"
+    job.write_text('runs = ".\\runs.csv"\nweights = "weights.csv"\n', encoding="utf-8")
+    problem = the_only(complaints(read_job, job), "job.toml", None, "runs", ".\runs.csv", "single quotes")
+    assert "write / in its place" in problem.expected
+    assert "'.\\runs.csv'" in str(problem)
+    assert "\r" not in str(problem)
+    [problem] = complaints(read_trials, "no\x1b[31m.csv", files[1])
+    assert str(problem).startswith("no\\x1b[31m.csv: expected a file that exists")
+
+
+def test_text_with_decimal_commas_in_a_workbook(tmp_path, files):
+    # one number shows that 9,487 is not nine thousand; and a point beside it is not passed over
+    mixed = replaced(replaced(RUNS, 2, "amplitude_um_pp", "9,487"), 3, "amplitude_um_pp", "13,5")
+    read = read_trials(write_book(tmp_path / "runs.xlsx", {"runs": mixed}), files[1])
+    assert abs(read.readings[0, 0, 0, 0]) == pytest.approx(9.487 * 0.5e-6)
+    points = replaced(mixed, 4, "amplitude_um_pp", "4.9")
+    the_only(
+        complaints(read_trials, write_book(tmp_path / "runs.xlsx", {"runs": points}), files[1]),
+        "runs.xlsx", 4, "amplitude_um_pp", "4.9", "a number with a decimal comma, as elsewhere",
+    )  # fmt: skip
+
+
+def test_merged_speeds_are_said(tmp_path, files):
+    assert read_trials(*files).warnings == ()
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "speed_rpm", 1003))
+    path = write_csv(path, replaced(replaced(RUNS, 2, "speed_rpm", 1003), 3, "speed_rpm", 1003))
+    [words] = read_trials(path, files[1]).warnings
+    assert words == "speeds of different runs within 0.5 % count as one: 1000, 1003 as 1001 rpm"
+    assert words in correct(estimate_influence(read_trials(path, files[1]))).warnings
+
+
+@pytest.fixture
+def lag(tmp_path, files):
+    """A job with lag and against rotation, its stored coefficients, and a baseline run."""
+    trials = read_trials(*files, phase="lag", angles="against rotation")
+    influence = estimate_influence(trials)
+    write_influence(tmp_path / "influence.csv", influence)
+    write_csv(tmp_path / "now.csv", RUNS[:3])
+    return correct(influence)
+
+
+def test_stored_conventions_hold_for_the_readings_if_nothing_else_is_said(tmp_path, lag):
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    assert (read.trials.labels.phase, read.trials.labels.angles) == ("lag", "against rotation")
+    c = correct(read.influence, read.trials)
+    np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
+    assert c.to_dict()["conventions"]["angles"] == "against rotation"
+    assert "nothing states the conventions of the readings" in c.warnings[0]
+    assert c.warnings[0].endswith("phase = lag and angles against rotation")
+
+
+def test_stated_conventions_hold_for_the_readings_alone(tmp_path, lag):
+    same = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lag")
+    np.testing.assert_allclose(correct(same.influence, same.trials).weights, lag.weights, rtol=1e-9)
+    assert not any("phase =" in w for w in same.trials.warnings)
+    turned = [RUNS[0], *([*row[:4], 360 - row[4]] for row in RUNS[1:3])]
+    write_csv(tmp_path / "now.csv", turned)
+    lead = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lead")
+    np.testing.assert_allclose(correct(lead.influence, lead.trials).weights, lag.weights, rtol=1e-9)
+    [words] = [w for w in lead.trials.warnings if "phase =" in w]
+    assert "the readings are taken with phase = lead, as stated" in words
+    assert "the coefficients with phase = lag, as" in words
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        *("# Phase: lag", "# PHASE = 'Lag'", "# phase is lag", "# phase lag.", "# phase = lagging"),
+        *("# phases lag behind the mark", "# a lag is positive phase", "# angle: clockwise"),
+    ],
+)
+def test_conventions_in_other_words_are_refused(tmp_path, lag, comment):
+    path = tmp_path / "influence.csv"
+    text = path.read_text(encoding="utf-8").replace("# phase = lag", comment)
+    path.write_text(text, encoding="utf-8")
+    problem = complaints(read_influence, path)[0]
+    assert problem.value == comment
+    assert problem.expected.startswith(("# phase = lead or lag", "# angles = with rotation or against"))
+
+
+def test_other_comments_mean_nothing(tmp_path, lag):
+    path = tmp_path / "influence.csv"
+    text = "# measured with a phase meter, angles read twice\n" + path.read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    assert read_influence(path).labels.phase == "lag"
+
+
+def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
+    influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
+    nothing = np.full(influence.baseline.shape, np.nan)
+    plain = replace(influence, baseline=nothing, errors=Gaussian.none(*influence.W.shape))
+    frame = influence_frame(plain)
+    frame = frame.rename(columns={"influence_um_pp_per_g": "influence_um_pp_per_kg_m"})
+    write_table(tmp_path / "si.csv", frame)
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
+    assert (read.trials.labels.weight_unit, read.trials.labels.weight_scale) == ("g_mm", 1e6)
+    c = correct(read.influence, read.trials).to_dict()["corrections"][0]
+    assert c["unit"] == "g_mm"
+    assert c["mass"] == pytest.approx(2.951e6, rel=1e-3)
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    assert read.trials.labels.weight_unit == "g"
+
+
+def test_a_weights_table_without_rows_and_stored_coefficients(tmp_path, lag):
+    write_csv(tmp_path / "none.csv", WEIGHTS[:1])
+    read = job_from_files([tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.csv")
+    c = correct(read.influence, read.trials)
+    np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
+    assert not c.mounted.weights.any()

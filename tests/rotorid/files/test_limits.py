@@ -1,0 +1,135 @@
+"""Files that are too large, or no files: refused in a sentence before they cost time or memory."""
+
+import io
+import os
+import time
+import zipfile
+
+import openpyxl
+import pytest
+from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
+
+from rotorid.files import excel_workbook, grid, input_file, text_file
+from rotorid.files.excel_workbook import read_workbook
+from rotorid.files.input_file import each_file_once, file_content
+from rotorid.files.problems import Problems
+from rotorid.tables import read_harmonic_model, read_ode_model, read_rotor, read_trials
+
+
+@pytest.fixture
+def book(tmp_path):
+    return write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": WEIGHTS})
+
+
+def words(path):
+    problems = Problems()
+    assert read_workbook(path, problems) is None
+    (problem,) = problems.of(str(path))
+    return problem.expected
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "expected"),
+    [
+        ("MOST_CELLS", 30, "at most 30 cells"),
+        ("MOST_UNPACKED", 1000, "unpacked"),
+        ("MOST_SECONDS", -1.0, "can be read in"),
+    ],
+)
+def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
+    monkeypatch.setattr(excel_workbook, limit, value)
+    assert expected in words(book)
+
+
+@pytest.mark.parametrize(("size", "most"), [(1_000_000, 500_000), (20_000_000, excel_workbook.MOST_UNPACKED)])
+def test_a_bomb_is_not_unpacked(book, monkeypatch, size, most):
+    stream = io.BytesIO(book.read_bytes())
+    with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/media/x.bin", b"\0" * size)
+    book.write_bytes(stream.getvalue())
+    monkeypatch.setattr(excel_workbook, "MOST_UNPACKED", most)
+    monkeypatch.setattr(excel_workbook, "_sheets", lambda *_: pytest.fail("read"))
+    assert f"{size // 10**6} MB" in words(book)
+
+
+def test_a_formula_without_its_value_is_refused_and_one_with_it_is_read(tmp_path):
+    made = openpyxl.Workbook()
+    made.active.append(["x", "y"])
+    made.active.append(["=1+1", 2])
+    made.save(tmp_path / "f.xlsx")
+    (rows,) = read_workbook(tmp_path / "f.xlsx", Problems()).values()
+    assert rows[1][1][0] == grid.BadCell(
+        "=1+1", "a formula with its stored value: open and save the file in Excel"
+    )
+
+
+def test_a_text_table_beyond_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_file, "MOST_CELLS", 20)
+    path = write_csv(tmp_path / "runs.csv", RUNS)
+    (problem,) = complaints(read_trials, path, write_csv(tmp_path / "w.csv", WEIGHTS[:2]))
+    assert "at most 20 cells" in problem.expected
+
+
+def test_a_large_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_file, "MOST_BYTES", 10)
+    (problem,) = complaints(read_rotor, write_csv(tmp_path / "rotor.csv", RUNS))
+    assert "it has more than 0 MB" in problem.expected
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_pipes_and_devices_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    for name in ("pipe.csv", "zero.csv"):
+        (problem,) = complaints(read_rotor, tmp_path / name)
+        assert "no regular file" in problem.expected
+
+
+def test_a_command_reads_a_file_once(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"one")
+    with each_file_once():
+        assert file_content(path) == b"one"
+        path.write_bytes(b"two")
+        assert file_content(path) == b"one"
+    assert file_content(path) == b"two"
+
+
+NAMES = [f"k{i}" for i in range(5000)]
+VALUES = "".join(f"{name} = 1.0\n" for name in NAMES)
+MODELS = {
+    "estimate": (read_harmonic_model, f'equations = ["k0*X = F"]\nestimate = {NAMES}\n'.replace("'", '"')),
+    "known": (read_harmonic_model, f'equations = ["k0*X = F"]\nestimate = ["k0"]\n[known]\n{VALUES}'),
+    "states": (read_ode_model, "[states]\n" + VALUES.replace("1.0", '"x"') + "[estimate]\na = 1\n"),
+    "outputs": (read_ode_model, "[outputs]\n" + VALUES.replace("1.0", '"x"') + "[estimate]\na = 1\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", MODELS)
+def test_a_model_of_5000_names_is_refused(tmp_path, key):
+    read, text = MODELS[key]
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    (problem,) = complaints(read, path)
+    assert problem.column == key
+    assert "at most 1,000 names; these are 5,000" in problem.expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a" + ".a" * 200_000 + " = 1\n", "a key of more than 20 parts"),
+        ("[a" + ' . "a"' * 200_000 + "]\n", "a key of more than 20 parts"),
+        ("k = 1\n" * 400_000, "at most 2 MB"),
+        ("x = [" + "1.5, " * 300_000 + "\n", "a TOML file: Invalid value"),
+        ("a" * 1_900_000, "a TOML file: Expected"),
+        ("a. " * 600_000, "a key of more than 20 parts"),
+    ],
+)
+def test_settings_that_would_take_long_are_refused_soon(tmp_path, text, expected):
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    begun = time.process_time()
+    (problem,) = complaints(read_ode_model, path)
+    assert expected in problem.expected
+    assert time.process_time() - begun < 5
