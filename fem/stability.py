@@ -350,7 +350,13 @@ def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float
 
 
 def windows_of(whirl: Whirl) -> tuple[Window, ...]:
-    """Ranges of growth of a whirl that has all modes that may grow."""
+    """Ranges of growth.
+
+    Parameters
+    ----------
+    whirl
+        Modes over the speeds, all those that may grow among them.
+    """
     grid, rates = _scan(whirl)
     grows = rates > GROWTH
     if not grows.any():

@@ -219,6 +219,7 @@ def compare_methods(reduction: Reduction) -> Methods:
 
     Examples
     --------
+    >>> from rotorid.reduction import reduce
     >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
     >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
     >>> model = compare_methods(reduce(shaft, [3], modes=1)).rows[0]

@@ -376,8 +376,17 @@ class Separated:
 def separate(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Separated:
     """Separate the shaft's flexibility from that of its two supports, [S] (41)–(47).
 
-    `nodes` are those of the n masses, numbers from 1 or names of stations; they may overhang. ValueError for
-    a rotor whose supports equilibrium alone cannot share a force among, and for nodes that cannot be.
+    Parameters
+    ----------
+    rotor
+        With bearings at two nodes.
+    nodes
+        Those of the n masses, numbers from 1 or names of stations; they may overhang.
+
+    Raises
+    ------
+    ValueError
+        For supports that equilibrium alone cannot share a force among, and for nodes that cannot be.
     """
     places = mass_nodes(rotor, nodes)
     ends = sorted({support.node for support in rotor.supports})

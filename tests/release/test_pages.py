@@ -36,8 +36,8 @@ MB = 10**6
             f"{expressions.MAX_LENGTH:,}, {expressions.MAX_DEPTH}",
         ),
         (
-            "exponents, degree and terms of an expression",
-            f"{expressions.MAX_EXPONENT}, {expressions.MAX_DEGREE:,}, {expressions.MAX_TERMS:,}",
+            "exponents and terms of an expression",
+            f"{expressions.MAX_EXPONENT}, {expressions.MAX_TERMS:,}",
         ),
         ("holes of a plane", f"{MOST_HOLES:,}"),
         (

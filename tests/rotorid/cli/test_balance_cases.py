@@ -132,12 +132,18 @@ def test_what_is_left_is_that_of_the_last_check_run(cli):
     assert first(ran).startswith("As predicted: with the weights rms 2.28 → 0.112 mm/s rms")
 
 
-def test_a_trim_that_cannot_be_one_of_pieces_says_why(cli):
-    job = JOBS / "two_checks/job.toml"
+def test_a_trim_is_of_pieces_where_the_mounted_ones_are_in_holes(cli, tmp_path):
+    """Weights of the last check run at the angles of holes take these; others must be named."""
+    for name in ("job.toml", "runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
+        (tmp_path / name).write_bytes((JOBS / "two_checks" / name).read_bytes())
     for options in ([], ["--split"]):
-        said = first(cli("balance", job, *options))
-        assert "Trim: add 0.364 g at 51.4° in plane 'L'" in said
-        assert "not as pieces: the holes in which weights of run 'check 2' stand are not named" in said
+        assert "Trim: L: 1.000 in holes 5, 12" in first(cli("balance", tmp_path / "job.toml", *options))
+    weights = tmp_path / "check_weights.csv"
+    weights.write_text(weights.read_text().replace("L,5,240", "L,5,244"))
+    for options in ([], ["--split"]):
+        answer = first(cli("balance", tmp_path / "job.toml", *options))
+        assert "Trim: add" in answer
+        assert "not as pieces: the holes in which weights of run 'check 2' stand are not named" in answer
 
 
 def test_weights_that_were_mounted_although_there_are_holes_are_stated(cli, tmp_path):
@@ -159,6 +165,3 @@ def test_weights_that_were_mounted_although_there_are_holes_are_stated(cli, tmp_
     (tmp_path / "bare.toml").write_text(job.split("[planes")[0])  # no holes
     said = first(cli("balance", tmp_path / "bare.toml"))
     assert "Taken to be mounted: the weights that were proposed; else state check_weights." in said
-    cli("balance", tmp_path / "weights.toml", "--output", tmp_path / "job.xlsx")
-    again = cli("balance", tmp_path / "job.xlsx", "--json").json
-    assert np.abs(vectors(again["check"]["mounted"][0]["weights"]) - exact).max() < 1e-9

@@ -248,7 +248,6 @@ def test_states_need_no_initial_values_for_amplitudes(tmp_path):
             r"outputs.y2: the amplitude needs a name of its own",
         ),
         (MATRICES, 'a = "1e3*y1"', 'k = "1e3*y1"', r"outputs.k: the amplitude needs a name of its own"),
-        (MATRICES, '"k"]]', '"sin(k)"]]', r"neither a polynomial nor a fraction"),
         (MATRICES, "[outputs]", 'per = ["m"]\n[outputs]', r"per: expected a name of coordinates"),
         (STATES.replace('"v0"', "1"), "c*z", "c*z**2", r"not linear in the signals"),
         (STATES.replace('"v0"', "1"), "3*u", "3*cos(t)", r"states.v depends on the time t"),
