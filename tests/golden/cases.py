@@ -99,7 +99,7 @@ response-report             {RESPONSE} --speeds 4000:10000:3000rpm {PROBES} --re
 response-compressor         {RESPONSE} --speeds 1000:15000:50rpm {PROBES} --operating 5300:6500rpm --plot bode.png
 response-no-sensor          {RESPONSE} --speeds 5000rpm --sensors "prob DE:45"
 bearings                    bearings {MOTION} --speeds 1000:9000:500rpm --plot bearings.png
-bearings-linear             bearings {MOTION} --speeds 2000,5000rpm --output linear.toml
+bearings-linear             bearings {MOTION} --speeds 2000,5000rpm --gravity-direction -45 --output linear.toml
 bearings-at-rest            bearings {MOTION} --speeds 0:3000:1000rpm
 motion                      motion {MOTION} --speed 4000rpm --time 0.1s --displaced left=3um --rate 500 --output m.csv
 motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3000:3300rpm --time 0.5s --rate 200 --sensors 12 --plot m.png
@@ -220,10 +220,16 @@ reduce-compressor-response  reduce {COMPRESSOR} --nodes "impeller 1,impeller 3,i
 reduce-printed              {PRINTED} --modes 1
 reduce-printed-2            {PRINTED} --modes 2
 reduce-given                {GIVEN} --modes 3 --output masses.csv
+reduce-given-relative       {GIVEN} --modes 2 --rows relative --nonnegative
 reduce-seals                {GIVEN} --modes 2 --seals 12=2e6
 reduce-model                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --model three_masses.toml
+reduce-force                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --damping 1,0.5 --force 12 --model m.toml --state-space m.npz
 reduce-report               reduce {ROTOR23} --nodes 7,12,18 --methods --report reduction.html
 reduce-output               reduce {ROTOR23} --nodes 7,12,18 --modes 3 --output masses.xlsx
+reduce-place-book           reduce {ROTOR23} --place book
+reduce-place-best           reduce {ROTOR23} --place best --masses 2 --candidates 5,8,11,14,17,20
+reduce-place-mac            reduce {ROTOR23} --place mac --masses 3 --candidates 5,8,11,14,17,20
+reduce-place-compromise     reduce {ROTOR23} --place compromise --candidates 5,8,11,14,17,20 --modes 2
 reduce-model-job            reduce sample_data/model_job/rotor.csv --nodes 6,12,19 --modes 2 --stability 0:9000rpm
 reduce-without-nodes        reduce {ROTOR23}
 reduce-order                reduce {ROTOR23} --nodes 12,7
@@ -499,9 +505,12 @@ STORED = (
     "reduce-equations",
     "reduce-errors",
     "reduce-everything",
+    "reduce-force",
+    "reduce-given-relative",
     "reduce-keep-supports",
     "reduce-model-job",
     "reduce-output",
+    "reduce-place-mac",
     "reduce-rank",
     "response-report",
     "runup-record",
