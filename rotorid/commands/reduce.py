@@ -357,6 +357,8 @@ def _places(
     """The ranking if it is needed, and nodes of the masses: as given, by rule, or of the measured shapes."""
     from rotorid.reduction import book_nodes, rank_nodes
 
+    if options.nodes is not None and options.place is not None:
+        raise ValueError("--nodes and --place are two ways to the same end: choose one")
     masses, placement = 3 if options.masses is None else options.masses, None
     if options.rank or options.place not in (None, "book"):
         candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]

@@ -51,6 +51,12 @@ def test_the_document_has_what_the_first_sentence_says(cli, unbalance):
     assert {"steady", "trend", "change", "at_rest", "chaotic", "whirl_frequency_rad_s"} <= {*end}
 
 
+@pytest.mark.parametrize("acceleration", ["10", "10rad/s/s", "10rad/s²", "10rad/s2"])
+def test_an_acceleration_in_rad_s_as_a_run_up(cli, acceleration):
+    found = cli("motion", ROTOR, "--run-up", "300:303", "--acceleration", acceleration, "--json").json
+    assert found["time_s"][-1] == pytest.approx(0.3)
+
+
 def test_more_modes_change_little(unbalance):
     options = {"speed": "4000rpm", "time": 0.1, "unbalance": unbalance, "sensors": "12"}
     few, many, all_of_them = (motion(ROTOR, MotionOptions(**options, modes=modes)) for modes in (4, 12, 24))
@@ -84,6 +90,11 @@ def test_a_start_in_steady_motion_has_no_transient(unbalance):
         (("--speed", "4000rpm"), "--time is needed"),
         (("--time", "1"), "one of --speed and --run-up is needed"),
         (("--run-up", "4000rpm", "--time", "1"), "use FIRST:LAST"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "3rpm"), "300rpm/s"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "3rad/s"), "300rpm/s"),
+        (("--run-up", "1000:2000rpm", "--time", "1", "--acceleration", "3rpm/s"), "one of --time and --acc"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "0rpm/s"), "must be above 0"),
+        ((*SHORT, "--acceleration", "3rpm/s"), "belongs to --run-up"),
         (("--speed", "4000rpm", "--time", "-1"), "seconds above 0"),
         ((*SHORT, "--displaced", "12=3"), "a number with its unit"),
         ((*SHORT, "--displaced", "99=3um"), "node 99 does not exist"),
@@ -160,8 +171,8 @@ def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):
         ROTOR,
         "--run-up",
         "3000:1000rpm",
-        "--time",
-        "0.5s",
+        "--acceleration",
+        "4000rpm/s",
         "--unbalance",
         unbalance,
     )

@@ -60,6 +60,7 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
     [
         ((ROTOR,), "say where the masses stand"),
         ((), "give a rotor, or --compliance and --measured"),
+        ((ROTOR, "--nodes", "7,12", "--place", "best"), "choose one"),
         ((ROTOR, "--nodes", "7,12", "--errors", "alpha13=1"), "'alpha13' is not known"),
         ((ROTOR, "--nodes", "7,12", "--errors", "stiffness=1"), "'stiffness' is not known"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance"), "is no NAME=VALUE"),
@@ -127,6 +128,8 @@ def test_measured_shapes_are_compared_with_the_rotor():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
+        (("--masses", 4), "--masses does nothing without --rank or --place"),
+        (("--force", "7"), "--force does nothing without --model"),
         (("--measured", BOOK / "modes.csv", "--methods"), "--methods compares with the computed rotor"),
         (("--response", "1:2"), "--response '1:2' is not a range"),
     ],
@@ -253,6 +256,10 @@ def test_kept_supports_are_refused(cli, tmp_path, monkeypatch, arguments, messag
 
 
 def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
+    for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
+        assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
+    few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
+    assert few["placement"]["considered"] == 4
     document = cli("reduce", ROTOR, "--rank", "--json").json
     assert document["nodes"] == [4, 10, 16]
     assert document["placement"]["best_by_frequency"]["nodes"] == [3, 11, 14]

@@ -24,13 +24,15 @@ SMALL = SmallModel(
 
 def test_a_rotor_with_its_tables(tmp_path):
     (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\ndisc,100,90\n")
-    found = moving(ROTOR, tmp_path / "u.csv")
-    assert found.files == (tmp_path / "u.csv",)
+    (tmp_path / "b.csv").write_text("node,bow_um,angle_deg\n1,0,0\ndisc,20,0\n5,0,0\n")
+    found = moving(ROTOR, tmp_path / "u.csv", str(tmp_path / "b.csv"), direction=180.0)
+    assert found.files == (tmp_path / "u.csv", tmp_path / "b.csv")
     system = found.system(10.0, 500.0)
     x, y = system.index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4j, 1e-4], rtol=1e-12, atol=1e-20)
-    assert system.weight[x] == pytest.approx(0, abs=1e-9)
-    assert system.weight[y] < 0
+    assert system.bow[x].real > 0
+    assert system.weight[x] < 0
+    assert system.weight[y] == 0
     assert (found.node("disc"), found.node("4")) == (3, 4)
 
 
@@ -50,11 +52,13 @@ def test_a_small_model_has_its_own(tmp_path):
 def test_tables_stand_in_place_of_a_small_model_s_own(tmp_path):
     """The same tables as of the rotor; nodes that the small model has not are refused with their row."""
     (tmp_path / "u.csv").write_text("plane,mass_g,radius_mm,angle_deg\n3,2,50,90\n3,1,100,0\n")
-    found = moving(SMALL, tmp_path / "u.csv")
+    (tmp_path / "b.csv").write_text("node,bow_um,angle_deg\n1,0,0\n3,20,0\n5,0,0\n")
+    found = moving(SMALL, tmp_path / "u.csv", tmp_path / "b.csv")
     x, y = (system := found.system(10.0, 500.0)).index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4 + 1e-4j, 1e-4 - 1e-4j], rtol=1e-12)
     whole = moving(ROTOR, tmp_path / "u.csv").system(10.0, 500.0)
     np.testing.assert_array_equal(whole.unbalance[[*whole.index(3)]], system.unbalance[[x, y]])
+    assert system.bow[x].real == pytest.approx(4e7 * 20e-6)
     (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n4,2,0\n")
     with pytest.raises(InputError, match=r"row 2, column plane: .* one of the nodes 1, 3 or 5"):
         moving(SMALL, tmp_path / "u.csv")

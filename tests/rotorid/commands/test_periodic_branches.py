@@ -106,6 +106,12 @@ def test_no_bifurcation_says_what_was_tried(cli, tmp_path):
     assert tried in " ".join(found.out.split())
 
 
+def test_a_limit_of_time_that_is_none(cli):
+    told = cli("periodic", ROTOR, *RANGE, "--max-seconds", "0")
+    assert told.code == 2
+    assert "max-seconds" in told.err
+
+
 @pytest.mark.parametrize("speeds", ["590:600", "600:600"])
 def test_a_second_stable_motion_beside_is_found_from_large_whirls(cli, tmp_path, speeds):
     """Both are centred circles in the film, 34 and 90 µm."""
