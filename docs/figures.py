@@ -95,7 +95,7 @@ GALLERY = (
         "balancing",
         f"balance {TURBO}/checked.toml --planes left,right --grade G6.3 --rotor-mass 558kg "
         "--service-speed 4500rpm",
-        "In both planes more than 700 times less unbalance is left than G6.3 permits: pass.",
+        "In both planes more than 600 times less unbalance is left than G6.3 permits: pass.",
     ),
     Picture(
         "tolerance",
