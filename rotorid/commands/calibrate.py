@@ -233,7 +233,8 @@ def calibrate(
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
     calibrated = Calibrated(found=result)
-    return outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
+    made = outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
+    return replace(made, result=result)
 
 
 def prepared(

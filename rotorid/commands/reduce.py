@@ -130,8 +130,9 @@ class ReduceOptions:
     state_space: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank place masses candidates methods rows nonnegative errors supports_apart",
+        "Method": "rank place masses candidates methods errors",
         "Small model": "response stability model state_space damping force keep_supports",
+        "Expert": "rows nonnegative supports_apart",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
     writes: ClassVar[Mapping[str, Sequence[str]]] = {

@@ -160,7 +160,7 @@ def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
     options = CalibrateOptions("bearing[*].kxx.scale", exact=True)
     rotor, data = (sample_data() / name for name in ("compressor/rotor.toml", "calibration/trial.toml"))
-    known = calibrate(rotor, data, options).result.found
+    known = calibrate(rotor, data, options).result
     assert found.result.found.tolist() == [6]
     assert found.result.ends[0] == pytest.approx(known.fit.estimate.solution, rel=1e-4)
     assert found.result.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
