@@ -356,6 +356,10 @@ def windows_of(whirl: Whirl) -> tuple[Window, ...]:
     ----------
     whirl
         Modes over the speeds, all those that may grow among them.
+
+    Returns
+    -------
+    Windows in the order of their speeds, rad/s.
     """
     grid, rates = _scan(whirl)
     grows = rates > GROWTH
