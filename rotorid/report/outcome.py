@@ -192,8 +192,18 @@ def outcome_of(
 
 
 def table_of(data: pd.DataFrame, name: str = "result") -> Table:
-    """A DataFrame as a table."""
-    return Table(name, tuple(Column(str(each), list(data[each])) for each in data))
+    """A DataFrame as a table; what pandas has as missing is unknown."""
+    known = data.notna()
+    return Table(
+        name,
+        tuple(
+            Column(
+                str(each),
+                [value if there else None for value, there in zip(data[each], known[each], strict=True)],
+            )
+            for each in data
+        ),
+    )
 
 
 def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:

@@ -482,6 +482,7 @@ STORED = (
     "critical-compressor-map",
     "critical-rk4",
     "critical-rotor23",
+    "demo",
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",

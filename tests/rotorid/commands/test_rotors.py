@@ -1,5 +1,6 @@
 """campbell, influence, response and reduce from Python: the document of the command, in SI or as text."""
 
+import pandas as pd
 import pytest
 
 from rotorid.commands.reduce import ReduceOptions, reduce
@@ -21,6 +22,15 @@ def same(one, other):
             same(*pair)
     else:
         assert other == (pytest.approx(one, rel=1e-7, abs=1e-12) if isinstance(one, float) else one)
+
+
+@pytest.mark.parametrize("ending", ["csv", "xlsx"])
+def test_cells_of_the_other_kind_are_blank_in_files(cli, tmp_path, ending):
+    path = tmp_path / f"masses.{ending}"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--output", path).code == 0
+    table = pd.read_csv(path) if ending == "csv" else pd.read_excel(path)
+    assert table["node"].tolist()[:3] == [7, 12, 18]
+    assert table["node"].isna().tolist() == table["mode"].notna().tolist() == [False] * 3 + [True] * 3
 
 
 def test_forces_act_on_masses_from_tables_too(cli, tmp_path):
