@@ -249,6 +249,9 @@ simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5
 simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
 modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
+modes-band                  {SHAKEN} --bands 24:28 --plot circles.png
+modes-one-side              {SHAKEN} --bands 25:26.2
+modes-no-reading            {SHAKEN} --bands 100:120Hz
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
