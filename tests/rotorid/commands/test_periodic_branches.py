@@ -83,7 +83,7 @@ def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
 
 @pytest.mark.full
 def test_on_linear_supports_it_is_the_response():
-    """The compressor on its table of bearings; the rotor is reduced here: 0.4 % beside a bearing, 0.06 % at 12."""
+    """The compressor on its table of bearings; reduced, which costs 0.4 % beside a bearing, 0.06 % at 12."""
     folder = sample_data() / "compressor"
     given = PeriodicOptions(speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30")
     found = periodic(folder / "rotor.toml", given).result
