@@ -10,29 +10,31 @@ from pathlib import Path
 
 import numpy as np
 
+from rotorid.commands import BearingsOptions, bearings
 from rotorid.motion.equilibrium import at_rest, equilibrium
 from rotorid.motion.periodic import periodic_motion
 from rotorid.motion.run import run
 from rotorid.motion.steady import steady_end
 from rotorid.motion.system import rotor_system
+from rotorid.reduction import held_rigidly, keep_supports, reduce
 from rotorid.tables import read_rotor
-from rotorid.workflows import BearingsOptions, ReduceOptions, bearings, reduce
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "motion" / "rotor.toml"
 RPM = np.pi / 30
+NODES = (7, 12, 18)
 UNBALANCE = {7: 1e-3, 18: 1e-3 * np.exp(2j * np.pi / 3)}  # kg·m
 
 
 def main() -> dict[str, float]:
     """Print the way from the shaft to the motion; return its key numbers."""
     # Masses by formula (50) on rigid supports; the journal bearings stay.
-    found = reduce(ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True))
-    small = found.small
-    assert small is not None
+    rotor = read_rotor(ROTOR)
+    masses = reduce(held_rigidly(rotor), NODES, 2).masses.solution
+    small = keep_supports(rotor, NODES, masses)
     print(small.summary(), end="\n\n")
 
     # The bearings carry what they carry in the whole rotor, and it loses stability where that does.
-    whole = bearings(read_rotor(ROTOR), BearingsOptions(speeds="5000:8000:1000rpm"))
+    whole = bearings(rotor, BearingsOptions(speeds="5000:8000:1000rpm")).result
     system = rotor_system(small, 500 * RPM, 9000 * RPM)
     resting = equilibrium(system, 5000 * RPM)
     loads = np.abs(resting.load), np.abs(whole.found[0].load)
@@ -43,8 +45,7 @@ def main() -> dict[str, float]:
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
 
     # Half a percent of external damping moves the threshold far up. There a limit cycle begins.
-    damped = reduce(ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)).small
-    assert damped is not None
+    damped = keep_supports(rotor, NODES, masses, modal_damping=[0.005] * 3)
     system, speed = rotor_system(damped, 500 * RPM, 13000 * RPM), 9000 * RPM
     rest, cycle, *_ = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
     (lost,) = rest.bifurcations

@@ -83,7 +83,7 @@ def calibration(speeds: Sequence[int], span: int = 560, stiffness: float = 1e6) 
     bearings = zip(start.supports, BEARINGS[span], strict=True)
     start = replace(start, supports=[replace(s, node=node, stiffness=stiffness) for s, node in bearings])
     files = [FOLDER / JOBS[rpm][0] for rpm in speeds]
-    return calibrate(start, files, CalibrateOptions(estimate=ESTIMATE, prior=PRIOR)).found
+    return calibrate(start, files, CalibrateOptions(estimate=ESTIMATE, prior=PRIOR)).result
 
 
 def known(rpm: int, kind: str, rotor: fem.Rotor | None = None) -> balancing.Influence:

@@ -49,7 +49,7 @@ REPEATED: dict[tuple[str, ...], Outcome] = {}
 
 def repeatable(words):
     """Whether a command line gives the same again, and nothing else."""
-    if not words or words[0] in ("demo", "fleet", "study", "worksheet") or "--verbose" in words:
+    if not words or words[0] in ("demo", "fleet", "study", "worksheet"):
         return False
     paths = [Path(word) for word in words if "/" in word or Path(word).suffix[1:].isalpha()]
     return bool(paths) and all(path.exists() and SAMPLES in path.resolve().parents for path in paths)

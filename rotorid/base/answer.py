@@ -15,7 +15,7 @@ Mount these weights.
 <BLANKLINE>
 left 3 g at 20°
 <BLANKLINE>
-Warning: the weight in plane 'A' is small (and 1 more of this kind)
+Warning: the weight in plane 'A' is small
 <BLANKLINE>
 Every sensor: --table.
 """
@@ -30,7 +30,9 @@ from dataclasses import dataclass
 
 from rotorid.base.text import capital, counted, cut
 
-LINES, COLUMNS = 24, 100
+LINES, COLUMNS = 12, 100
+TALLEST = 14
+"""Lines of the first block that are shown whatever the room is."""
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
 _QUANTITY = re.compile(r"(only |at most )?([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?= ?%| (?!rpm|Hz|rad/s)[^\W\d])")
@@ -96,7 +98,7 @@ class Answered(ABC):
         """The judgement and the answer first, and the tables behind them."""
 
     def summary(self) -> str:
-        """For a terminal, at most 24 lines of at most 100 columns."""
+        """For a terminal, a few lines of at most 100 columns."""
         return self.answer.brief()
 
 
@@ -114,20 +116,17 @@ def together(answers: Iterable[Answer]) -> Answer:
 
 
 def kinds(clauses: Iterable[str]) -> list[str]:
-    """The worst clause of each kind, by its quantities (else the first), and how many more there are.
+    """The worst clause of each kind, by its quantities (else the first).
 
     >>> kinds(["plane 'A': 3 g over", "plane 'B': 300 g over"])
-    ["plane 'B': 300 g over (and 1 more of this kind)"]
+    ["plane 'B': 300 g over"]
     >>> kinds(["line 3: no mass", "line 5: no mass", "no weight", "line 3: no mass"])
-    ['line 3: no mass (and 1 more of this kind)', 'no weight']
+    ['line 3: no mass', 'no weight']
     """
     found: dict[str, list[str]] = {}
     for clause in dict.fromkeys(clauses):
         found.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
-    return [
-        _worst(same).rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else "")
-        for same in found.values()
-    ]
+    return [_worst(same).rstrip(".") for same in found.values()]
 
 
 def _worst(same: list[str]) -> str:
@@ -155,15 +154,14 @@ def _wrapped(lines: Iterable[str]) -> list[str]:
 def _first(lines: list[str], room: int) -> tuple[list[str], str]:
     """As many lines as there is room for, and words for the others.
 
-    A block that does not fit is left out whole, where others stand before it: half a table of weights looks
-    like all of them.
+    A block that does not fit is left out whole, the first stands whole if that can be: half a table of
+    weights looks like all of them.
     """
     if len(lines) <= room:
         return lines, ""
-    room = max(room, 0)
-    ends = [k for k, line in enumerate(lines[: room + 1]) if not line]
-    shown = lines[: ends[-1] if ends else room]
-    return shown, counted(sum(map(bool, lines[len(shown) :])), "more line")
+    ends = [k for k, line in enumerate(lines) if not line] or [len(lines)]
+    shown = lines[: max([min(ends[0], max(room, TALLEST)), *(end for end in ends if end <= room)])]
+    return shown, counted(hidden, "more line") if (hidden := sum(map(bool, lines[len(shown) :]))) else ""
 
 
 def _fitting(remarks: Sequence[list[str]], room: int) -> tuple[list[str], int]:

@@ -3,8 +3,6 @@
 import logging
 
 logging.getLogger("rotorid").addHandler(logging.NullHandler())
-workflows = logging.getLogger("rotorid.workflows")
-"""INFO: numbers behind a result, and seconds; `--verbose` prints them."""
 progress = logging.getLogger("rotorid.progress")
 """INFO: how far long work is; a terminal shows the last line."""
 files = logging.getLogger("rotorid.files")

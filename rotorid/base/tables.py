@@ -222,15 +222,15 @@ class _Archive(zipfile.ZipFile):
         return super().open(name, mode, *args, **kwargs)
 
 
-def html(table: Table) -> Markup:
+def html(table: Table, longest: int = LONG) -> Markup:
     """A table of HTML: numbers with their place in the JSON document as `data-key`; `blocks` if wide.
 
-    Of a long one some rows, evenly spread.
+    Of one that is longer some rows, evenly spread.
     """
     from markupsafe import Markup
 
     count = len(table.columns[0].values)
-    rows = evenly(count, count if count <= LONG else THINNED)
+    rows = evenly(count, count if count <= longest else THINNED)
     notes = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
     shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]
     wide = len(shown) > NARROW or sum(max(map(len, texts)) for texts in shown) > LETTERS
@@ -251,9 +251,10 @@ def html(table: Table) -> Markup:
     kind = Markup(' class="blocks"') if wide else Markup("")
     words = " ".join(filter(None, notes))
     note = Markup('\n<p class="note">{}</p>').format(words) if words else Markup("")
-    return Markup(
-        "<table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}"
-    ).format(kind, table.name, heads, body, note)
+    caption = Markup("<caption>{}</caption>\n").format(table.name) if table.name else ""
+    return Markup("<table{}>\n{}<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}").format(
+        kind, caption, heads, body, note
+    )
 
 
 def _cells(column: Column, rows: Sequence[int]) -> list[Markup]:

@@ -1,33 +1,31 @@
-"""The command line: `rotorid COMMAND`. Thin: read, call, print; one file per command."""
+"""The command line: `rotorid COMMAND`. Thin: the commands are in `rotorid.commands`."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from rotorid.base.answer import COLUMNS
-from rotorid.cli.choices import Command
-from rotorid.cli.commands import (
-    balance,
-    demo,
-    fit,
-    reduce,
-    schema,
-)
-from rotorid.cli.fleet import fleet
-from rotorid.cli.study import study
-from rotorid.cli.worksheet import worksheet
+from rotorid.cli.choices import Command, Commands
+from rotorid.cli.demo import demo
 from rotorid.commands import (
+    Outcome,
+    balance,
     bearings,
     calibrate,
     campbell,
     critical,
+    fit,
     identify,
     influence,
     modes,
     motion,
     periodic,
+    reduce,
     response,
     runup,
     simulate,
@@ -37,58 +35,93 @@ from rotorid.commands import (
     unbalance,
     vectors,
 )
-from rotorid.commands.app import run, typer_command, written_help
-from rotorid.commands.terminal import markup_mode
-from rotorid.commands.verbose import verbosely
+from rotorid.commands.app import json_text, run, typer_command, written_help
+from rotorid.commands.progress import markup_mode
+from rotorid.fleet.adding import fleet_add
+from rotorid.fleet.fitting import fleet_fit
+from rotorid.fleet.showing import fleet_show
+from rotorid.study.studies import study
 
 app = typer.Typer(
     name="rotorid",
+    cls=Commands,
     rich_markup_mode=markup_mode(),
     invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
-    "Balance rotors": {
-        "balance": balance.balance,
-        "worksheet": worksheet,
-        "vectors": typer_command(vectors),
-        "trial-weight": typer_command(trial_weight),
-        "split": typer_command(split),
-        "tolerance": typer_command(tolerance),
-        "unbalance": typer_command(unbalance),
-        "fleet": fleet,
-    },
-    "Compute rotors": {
-        "critical": typer_command(critical),
-        "campbell": typer_command(campbell),
-        "response": typer_command(response),
-        "influence": typer_command(influence),
-        "study": study,
-    },
-    "Reduce rotors, let them move": {
-        "reduce": reduce.reduce,
-        "bearings": typer_command(bearings),
-        "motion": typer_command(motion),
-        "periodic": typer_command(periodic),
-    },
-    "Identify coefficients": {
-        "identify": typer_command(identify),
-        "fit": fit.fit,
-        "simulate": typer_command(simulate),
-        "modes": typer_command(modes),
-        "runup": typer_command(runup),
-        "calibrate": typer_command(calibrate),
-    },
-    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema},
+fleet = typer.Typer(
+    no_args_is_help=True, help="Jobs of many machines as tables, and coefficients of their type."
+)
+_JOBS: dict[str, tuple[Callable[..., Outcome], ...]] = {
+    "Balance rotors": (balance, vectors, trial_weight, split, tolerance, unbalance),
+    "Compute rotors": (critical, campbell, response, influence, study),
+    "Reduce rotors, let them move": (reduce, bearings, motion, periodic),
+    "Identify coefficients": (identify, fit, simulate, modes, runup, calibrate),
 }
-for _job, _commands in _COMMANDS.items():
-    for _name, _command in _commands.items():
-        if isinstance(_command, typer.Typer):
-            app.add_typer(_command, name=_name, rich_help_panel=_job)
-            continue
-        app.command(_name, cls=Command, rich_help_panel=_job)(verbosely(_command))
+"""Commands by what they are for, the chief one first."""
+
+
+def worksheet(
+    job: Annotated[
+        Path, typer.Argument(metavar="JOB | FOLDER", help="Job (.toml, .xlsx), or a folder for one.")
+    ] = Path(),
+    port: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, max=65535, help="Default: any free one.", rich_help_panel="Input"),
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the address.", rich_help_panel="Output")
+    ] = False,
+) -> None:
+    """A local page to type, balance, check and print a job; nothing leaves the machine.
+
+    Example: rotorid worksheet sample_data/turbo_job/job.toml
+
+    Example: rotorid worksheet my_fan
+
+    The files are the job: each cell is saved as it is typed, and `rotorid balance` reads the same files.
+    """
+    from rotorid.worksheet.server import serve
+
+    def opened(address: str) -> None:
+        typer.echo(f"worksheet: {address}   (end it with Ctrl+C)")
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    serve(job, port, opened)
+
+
+def schema(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")
+    ],
+    json: Annotated[
+        bool, typer.Option("--json", help="As without: a schema is JSON.", rich_help_panel="Output")
+    ] = True,
+) -> None:
+    """JSON schema of a job, a rotor file or other settings, for editors to check keys.
+
+    Example: rotorid schema job
+    """
+    from rotorid.tables.schema import schema as schema_of
+
+    typer.echo(json_text(schema_of(kind)))
+
+
+for _job, _works in _JOBS.items():
+    for _work in _works:
+        _name = _work.__name__.replace("_", "-")
+        app.command(_name, cls=Command, rich_help_panel=_job)(typer_command(_work))
+for _work in (fleet_add, fleet_show, fleet_fit):
+    fleet.command(_work.__name__.removeprefix("fleet_"), cls=Command)(typer_command(_work))
+app.add_typer(fleet, name="fleet", rich_help_panel="More")
+for _more in (worksheet, demo, schema):
+    _more.__doc__ = written_help(_more)
+    app.command(_more.__name__, cls=Command, rich_help_panel="More")(_more)
 
 
 def _version(show: bool) -> None:
@@ -109,8 +142,8 @@ def _rotorid(
     """Rotor models, flexible-rotor balancing and identification of oscillating systems.
 
     Every command has --json (one JSON document on standard output), --plot FILE and --output FILE
-    where they make sense, --table for every table, --verbose for the numbers behind a result (on
-    standard error), and --help with examples. `rotorid` alone shows an example of each job.
+    where they make sense, --table for every table, and --help with examples. `rotorid` alone shows an
+    example of each job.
 
     Exit status: 0, or 2 for bad input with one message.
     """
@@ -122,24 +155,14 @@ _rotorid.__doc__ = written_help(_rotorid)
 
 
 def _overview() -> str:
-    """The jobs, each with the first example of its first command, and their commands."""
-    lines = [
-        "An example of each job, run in a checkout (else: rotorid demo DIR). More: rotorid COMMAND --help"
-    ]
-    for job, commands in _COMMANDS.items():
-        told: dict[str, str] = {}
-        for name, command in commands.items():
-            if isinstance(command, typer.Typer):
-                told |= {
-                    f"{name} {one.name}": one.callback.__doc__ or "" for one in command.registered_commands
-                }
-            else:
-                told[name] = command.__doc__ or ""
-        example = " ".join("".join(told.values()).split("Example: ")[1].partition("\n\n")[0].split())
-        short = len(job) + len(example) + 2 <= COLUMNS
-        lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
-        lines += [f"  {name:<12}  {text.partition('.')[0]}" for name, text in told.items()]
-    return "\n".join(lines)
+    """The four jobs, each with the first example of its first command, and what else there is for it."""
+    lines = ["An example of each job, run in a checkout (else: rotorid demo DIR):"]
+    for job, (chief, *others) in _JOBS.items():
+        example = " ".join(written_help(chief).split("Example: ")[1].partition("\n\n")[0].split())
+        names = ", ".join(work.__name__.replace("_", "-") for work in others)
+        lines += ["", f"{job}:", f"  {example}"]
+        lines += textwrap.wrap(f"also {names}", COLUMNS, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join([*lines, "", "More: fleet, worksheet, demo, schema; each: rotorid COMMAND --help"])
 
 
 def main() -> None:

@@ -7,11 +7,21 @@ import re
 from typing import Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from rotorid.base.suggestions import suggest
 
 _CHOICE = re.compile(r"(?:Value error, )?('([^']*)' is not one of (.+?))\.?", re.DOTALL)
+
+
+class Commands(TyperGroup):
+    """All commands; a file in place of one is no option, even if its name begins with -."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - as typer declares it
+        """As typer's."""
+        if args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            ctx.fail(f"No such command {args[0]!r}: the command stands first, rotorid balance -- {args[0]}")
+        return super().resolve_command(ctx, args)
 
 
 class Command(TyperCommand):
@@ -25,9 +35,9 @@ class Command(TyperCommand):
 
     def get_help_option(self, ctx: Any) -> Any:  # noqa: ANN401 - as typer declares it
         """As typer's, among those of the output."""
-        found: Any = super().get_help_option(ctx)
-        found.rich_help_panel = "Output"
-        return found
+        option: Any = super().get_help_option(ctx)
+        option.rich_help_panel = "Output"
+        return option
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
         """As typer's, with the nearest choice in a complaint."""
@@ -41,7 +51,7 @@ class Command(TyperCommand):
 def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public type for it
     """Put the methods behind the help of each option that chooses one: Annotated[…, Option(…), choices].
 
-    `choices` is a function of the workflow: registries by the names of the options, read only for help.
+    `choices` is a function of the command's module: registries by the names of the options.
     """
     from rotorid.base.registry import described
 

@@ -4,52 +4,48 @@
 """
 
 from rotorid.commands.balance import Balance, BalanceOptions, balance
-from rotorid.commands.bearings import BearingEquilibria, BearingsOptions, bearings
-from rotorid.commands.calibrate import Calibrated, CalibrateOptions, calibrate
+from rotorid.commands.bearings import BearingsOptions, bearings
+from rotorid.commands.calibrate import CalibrateOptions, calibrate
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
-from rotorid.commands.fit import FitOptions, RecordFit, fit
+from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.modes import ModesOptions, modes
-from rotorid.commands.motion import Motion, MotionOptions, motion
-from rotorid.commands.outcome import Outcome
-from rotorid.commands.periodic import PeriodicMotions, PeriodicOptions, periodic
+from rotorid.commands.motion import MotionOptions, motion
+from rotorid.commands.periodic import PeriodicOptions, periodic
+from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.commands.response import ResponseOptions, response
 from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
-from rotorid.commands.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
+from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.commands.vectors import VectorsOptions, vectors
+from rotorid.report.outcome import Outcome
 
 __all__ = [
     "Balance",
     "BalanceOptions",
-    "BearingEquilibria",
     "BearingsOptions",
     "CalibrateOptions",
-    "Calibrated",
     "CampbellOptions",
     "CriticalOptions",
     "FitOptions",
     "IdentifyOptions",
     "InfluenceOptions",
     "ModesOptions",
-    "Motion",
     "MotionOptions",
     "Outcome",
-    "PeriodicMotions",
     "PeriodicOptions",
-    "RecordFit",
+    "ReduceOptions",
     "ResponseOptions",
     "RunUpOptions",
     "SimulateOptions",
     "SplitOptions",
     "ToleranceOptions",
     "TrialWeightOptions",
-    "TrialWeights",
     "UnbalanceOptions",
     "VectorsOptions",
     "balance",
@@ -63,6 +59,7 @@ __all__ = [
     "modes",
     "motion",
     "periodic",
+    "reduce",
     "response",
     "runup",
     "simulate",

@@ -4,7 +4,7 @@ A command is a function of a rotor, a job or data and of a dataclass of options 
 command line its docstring is the help; each parameter before `options` is an argument, or a required option
 after the first, and each field of the dataclass an option, with the texts of their docstrings:
 
-    number : -n N
+    number : -n N from 1
         How many critical speeds.
 
 where words that begin with - are what is typed beside, or with two -- instead of, `--number`.
@@ -15,7 +15,6 @@ from __future__ import annotations
 import ast
 import contextlib
 import dataclasses
-import functools
 import inspect
 import io
 import json
@@ -26,38 +25,25 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    Literal,
-    NamedTuple,
-    TypeVar,
-    cast,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast, get_origin
 
 import typer
-from typer.models import OptionInfo
 
 from rotorid.base.answer import LINES, kinds
-from rotorid.commands.outcome import USUAL, WITH_REPORT, Delivered, options_of
 from rotorid.commands.progress import busy
+from rotorid.report.options import option_name
+from rotorid.report.outcome import WITH_REPORT, Outcome, options_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotorid.report.outcome import Written
 
-_R = TypeVar("_R", bound=Delivered)
-Command = Callable[..., None]
-INPUT, OUTPUT = "Input", "Output"
 _TYPES: dict[str, Any] = {"bool": bool, "int": int, "float": float, "Path": Path, "Amplitudes": list[str]}
 """What is typed, by the first alternative of an annotation; else one of a few words, or any text."""
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
 Show = Literal["equations"]
-STATE_SPACES = (".json", ".npz", ".mat")
 
 
 @dataclass(frozen=True)
@@ -77,9 +63,7 @@ class Destination:
     report : FILE
         Sheet to print or to send, .html, one file.
     show : equations
-        What was solved, in symbols and in numbers, instead of the answer; with --json beside it.
-    latex
-        The equations as a document of LaTeX.
+        What was solved, in place of the answer.
     """
 
     json: bool = False
@@ -88,73 +72,67 @@ class Destination:
     output: Path | None = None
     report: Path | None = None
     show: Show | None = None
-    latex: bool = False
 
-    def deliver(
-        self,
-        what: str,
-        work: Callable[[], _R],
-        *,
-        draw: Callable[[_R], Figure] | None = None,
-        endings: Sequence[str] = TABLES,
-        more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = (),
-    ) -> _R:
-        """Do the work of a command, print what it result, and write its files, all of them or none.
+    def deliver(self, what: str, work: Callable[[], Outcome], options: Any = None) -> None:  # noqa: ANN401
+        """Do the work of a command, print its answer, and write its files, all of them or none.
 
         Parameters
         ----------
         what
             What takes so long, for the sign of life.
         work
-            Gives the result.
-        draw
-            Makes the picture; default: the result's main one.
-        endings
-            Of the name of the table.
-        more
-            Further files, how their names may end, and what makes them; or makes several, by their paths.
+            Gives the outcome.
+        options
+            Of a class that may have `outputs`, how the name of the table may end, and `writes`: fields that
+            take a further file, and how its name may end.
 
         Raises
         ------
         ValueError
             For a file that could not be written, before any work is done, and for one that was read.
         """
-        from rotorid.commands.verbose import note
         from rotorid.files.problems import printable
         from rotorid.files.table_writing import write_files
 
-        if self.latex and (self.show is None or self.json or self.table):
-            raise ValueError("--latex belongs to --show equations, without --json or --table")
-        plot, output = self.plot, self.output
-        files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = [
-            (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
-            (output, endings, lambda r: r.table_file(output or Path())),
-            *more,
-            (self.report, (".html",), lambda r: r.sheet()),
+        further: Mapping[str, Sequence[str]] = getattr(options, "writes", {})
+        asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
+            (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),
+            (self.output, getattr(options, "outputs", TABLES), lambda made, path: made.written(path)),
+            (self.report, (".html",), lambda made, path: made.sheet()),
         ]
-        check_targets([(path, endings) for path, endings, _ in files])
+        for name, endings in further.items():
+            asked.append((getattr(options, name), endings, _further(name)))
+        check_targets([(path, endings) for path, endings, _ in asked])
         with busy(what):
-            result = work()
-        equations = result.equations if self.show else None
-        document = result.document_for(output)
+            made = work()
+        document = made.document
+        if self.output and "rotor" in document and self.output.suffix == ".toml":
+            document["rotor"] = str(self.output)  # which `calibrate` has written
+        equations = made.equations if self.show else None
         if equations:
             document["equations"] = equations.to_dict()
-        note(document)
-        targets = {path: build for path, _, build in files if path is not None}
         built: dict[Path, bytes] = {}
-        for path, build in targets.items():
-            made = build(result)
-            built |= made if isinstance(made, Mapping) else {path: made}
+        for path, _, build in asked:
+            if path is not None:
+                file = build(made, path)
+                built |= file if isinstance(file, Mapping) else {path: file}
         check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
         write_files(built)
         if self.json:
             typer.echo(json_text(document))
-        else:
-            written = [f"written: {printable(str(path))}" for path in built]
-            answer = equations.answer(result.answer) if equations else result.answer
-            text = answer.whole() if self.table else answer.brief(LINES - len(written))
-            typer.echo("\n".join([equations.latex() if equations and self.latex else text, *written]))
-        return result
+            return
+        written = [f"written: {printable(str(path))}" for path in built]
+        answer = equations.answer(made.answer) if equations else made.answer
+        text = (
+            answer.whole()
+            if self.table
+            else answer.brief((2 * LINES if equations else made.lines) - len(written))
+        )
+        typer.echo("\n".join([text, *written]))
+
+
+def _further(option: str) -> Callable[[Outcome, Path], Written]:
+    return lambda made, path: made.written(path, option)
 
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
@@ -212,134 +190,89 @@ def figure_bytes(figure: Figure, path: Path) -> bytes:
     return stream.getvalue()
 
 
-def command(
-    options: type | None = None,
-    *,
-    names: Mapping[str, Sequence[str]] | None = None,
-    least: Mapping[str, float] | None = None,
-    panels: Mapping[str, str] | None = None,
-    to: Sequence[str] = USUAL,
-) -> Callable[[Command], Command]:
-    """Replace the parameters `options` and `to` of a command by one for each field of these dataclasses.
-
-    Their help and their metavar are the documentation of the dataclass, field by field, their names and
-    defaults those of the fields.
-
-    Parameters
-    ----------
-    options
-        The dataclass of the workflow's options; None for a command without.
-    names
-        What is typed instead of `--field`.
-    least
-        The least value of a number.
-    panels
-        Of the help, in their order: title, and the options in it, the common ones first. Options that are
-        not named stand in `INPUT`, before these, or in `OUTPUT` (those of `to`).
-    to
-        Which fields of `Destination` the command has.
-    """
-    fields = [] if options is None else [*_parameters(options, names or {}, least or {})]
-    where = [one for one in _parameters(Destination, {}, {}) if one.name in to]
-
-    def decorate(function: Command) -> Command:
-        hints = get_type_hints(function, include_extras=True)
-        parameters: list[inspect.Parameter] = []
-        for name, parameter in inspect.signature(function).parameters.items():
-            expanded = {"options": fields, "to": where}.get(name)
-            parameters += [parameter.replace(annotation=hints[name])] if expanded is None else expanded
-
-        @functools.wraps(function)
-        def wrapper(**given: Any) -> None:  # noqa: ANN401 - what typer has read
-            if options is not None:
-                given["options"] = _taken(options, given)
-            given["to"] = _taken(Destination, given)
-            function(**given)
-
-        wrapper.__doc__ = written_help(function)
-        only = inspect.Parameter.KEYWORD_ONLY
-        parameters = _in_panels([parameter.replace(kind=only) for parameter in parameters], panels or {}, to)
-        wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        return wrapper
-
-    return decorate
-
-
-def typer_command(work: Callable[..., Delivered]) -> Command:
+def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     """The command of a function: its first parameter, lists of files and what may be left out are arguments.
 
-    Others before `options` are required options.
+    Others before `options` are required options; those after it are Python's alone. A class of options may
+    have `panels` of the help, title by title with the options in each, and `to`, the fields of `Destination`;
+    options that no panel names stand in Input. Its `before(*arguments)` may refuse what is typed, or do all
+    that is asked.
     """
-    kind = options_of(work)
-    about = _documentation(work)
-    given = {name: one for name, one in inspect.signature(work).parameters.items() if name != "options"}
-
-    def deliver(options: Any, to: Destination, **values: Any) -> None:  # noqa: ANN401 - of that kind
-        what = work.__name__.replace("_", " ")
-        to.deliver(
-            what,
-            lambda: work(*(values[name] for name in given), options),
-            endings=getattr(kind, "outputs", TABLES),
-        )
-
-    hints: dict[str, Any] = {}
-    parameters = []
-    for name, one in given.items():
-        told: dict[str, Any] = {"metavar": about[name].metavar, "help": about[name].text}
-        files = str(one.annotation).startswith("Sequence[Path")
-        first = files or not hints or one.default is not one.empty
-        declared = typer.Argument(**told) if first else typer.Option(f"--{name}", **told)
-        taken: Any = Path if "Path" in str(one.annotation) and first else str
-        taken = list[Path] if files else taken
-        hints[name] = Annotated[taken if one.default is one.empty else taken | None, declared]
-        parameters.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=one.default))
-    parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in ("options", "to")]
-    deliver.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    deliver.__annotations__ = hints
-    made = command(kind, panels=getattr(kind, "panels", {}), to=getattr(kind, "to", WITH_REPORT))(deliver)
-    made.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
-    return made
-
-
-def _in_panels(
-    parameters: Sequence[inspect.Parameter], panels: Mapping[str, str], to: Sequence[str]
-) -> list[inspect.Parameter]:
-    """Arguments, then options, panel by panel."""
-    titles = {**panels, OUTPUT: " ".join((*to, panels.get(OUTPUT, "")))}
+    kind, about = options_of(work), _documentation(work)
+    every = list(inspect.signature(work).parameters.items())
+    arguments = dict(every[: [name for name, _ in every].index("options")])
+    to: Sequence[str] = getattr(kind, "to", WITH_REPORT)
+    panels: Mapping[str, str] = getattr(kind, "panels", {})
+    titles = {**panels, "Output": " ".join((*to, panels.get("Output", "")))}
     panel_of = {name: title for title, names in titles.items() for name in names.split()}
-    order = list(panel_of)
-    for parameter in parameters:
-        declared = parameter.annotation.__metadata__[0]
-        if isinstance(declared, OptionInfo):
-            declared.rich_help_panel = panel_of.get(parameter.name, INPUT)
-    return sorted(parameters, key=lambda one: order.index(one.name) if one.name in panel_of else -1)
+    first = [_argument(name, one, about[name], k) for k, (name, one) in enumerate(arguments.items())]
+    where = [one for one in _options(Destination, panel_of) if one.name in to]
+    options = [*_options(kind, panel_of), *where]
+    order = ["", *panel_of]
+    options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
+
+    def run_command(**typed: Any) -> None:  # noqa: ANN401 - what typer has read
+        from rotorid.files.input_file import each_file_once
+
+        _check_sizes(typed)
+        given = [typed.pop(name) for name in arguments]
+        target, chosen = _taken(Destination, typed), _taken(kind, typed)
+        with each_file_once():
+            if hasattr(chosen, "before") and (answer := chosen.before(*given)):
+                typer.echo(answer)
+            else:
+                target.deliver(work.__name__.replace("_", " "), lambda: work(*given, chosen), chosen)
+
+    parameters = [*first, *options]
+    run_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run_command.__annotations__ = {one.name: one.annotation for one in parameters}
+    run_command.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
+    return run_command
 
 
-def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
-    """The dataclass made of its fields among what typer has read; lists as tuples."""
-    values = {}
+def _check_sizes(typed: Mapping[str, Any]) -> None:
+    """Refuse numbers whose squares no computer holds."""
+    from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size
+
+    for name, value in typed.items():
+        if isinstance(value, float):
+            try:
+                check_size(value, LARGEST_STATED)
+            except NotANumber as error:
+                raise ValueError(f"{option_name(name)} takes {error}, not {value:g}") from None
+
+
+def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:
+    """A file, several, or a text; after the first a required option, unless it may be left out."""
+    files = str(one.annotation).startswith(("Sequence[", "JobGiven"))
+    needed = one.default is one.empty
+    first = files or not place or not needed
+    declared: Any = typer.Argument if first else typer.Option
+    flag = [] if first else [option_name(name)]
+    told = declared(*flag, metavar=about.metavar, help=about.text, rich_help_panel=None if first else "Input")
+    taken: Any = Path if "Path" in str(one.annotation) and first else str
+    taken = list[Path] if files else taken
+    annotation: Any = Annotated[taken if needed else taken | None, told]
+    default = None if one.default == () else one.default
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _options(kind: type, panel_of: Mapping[str, str]) -> Iterator[inspect.Parameter]:
+    """One option for each field of a dataclass; what it chooses from is told in its help."""
+    about, module = _documentation(kind), sys.modules[kind.__module__]
+    choices = getattr(module, "choices", None)
     for field in dataclasses.fields(kind):
-        value = given.pop(field.name, None)
-        values[field.name] = (
-            field.default if value is None else tuple(value) if isinstance(value, list) else value
+        name, written, kind_of = field.name, about[field.name], str(field.type).partition(" | ")[0]
+        alias = getattr(module, kind_of, str)
+        taken = _TYPES.get(kind_of, alias if get_origin(alias) is Literal else str)
+        flag = (option_name(name),) if taken is bool else ()  # without its --no-…
+        option = typer.Option(
+            *(written.flags or flag),
+            metavar=written.metavar,
+            help=written.text,
+            min=written.least,
+            rich_help_panel=panel_of.get(name, "Input"),
         )
-    return kind(**values)
-
-
-def _parameters(
-    kind: type, names: Mapping[str, Sequence[str]], least: Mapping[str, float]
-) -> Iterator[inspect.Parameter]:
-    """One option for each field of a dataclass."""
-    about = _documentation(kind)
-    choices = getattr(sys.modules[kind.__module__], "choices", None)
-    for field in dataclasses.fields(kind):
-        name, written = field.name, about[field.name]
-        taken = _type(kind, str(field.type))
-        flag = (f"--{name.replace('_', '-')}",) if taken is bool else ()  # without its --no-…
-        typed = names.get(name, written.flags or flag)
-        low = least.get(name, written.least)
-        option = typer.Option(*typed, metavar=written.metavar, help=written.text, min=low)
         default = None if field.default == () else field.default
         if field.default is dataclasses.MISSING:
             default = inspect.Parameter.empty
@@ -347,12 +280,11 @@ def _parameters(
         yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
-def _type(kind: type, annotation: str) -> Any:  # noqa: ANN401 - a type, for typer
-    first = annotation.partition(" | ")[0]
-    if first in _TYPES:
-        return _TYPES[first]
-    alias = getattr(sys.modules[kind.__module__], first, str)
-    return alias if get_origin(alias) is Literal else str
+def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
+    """The dataclass made of its fields among what typer has read; lists as tuples."""
+    values = {field.name: given.pop(field.name, None) for field in dataclasses.fields(kind)}
+    stated = {name: value for name, value in values.items() if value is not None}
+    return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in stated.items()})
 
 
 def written_help(of: Any) -> str:  # noqa: ANN401 - a function or a class
@@ -441,7 +373,7 @@ def _warnings_last() -> Iterator[None]:
 def _complain(problem: Exception) -> int:
     text = str(problem)
     if isinstance(problem, OSError) and problem.strerror:
-        text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
+        text = f"{problem.filename or 'standard output'}: {problem.strerror}"
     with contextlib.suppress(OSError):  # nobody can read it
         print(f"rotorid: {_safe(text)}", file=sys.stderr)
     return 2

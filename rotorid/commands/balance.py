@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import Answer, together
+from rotorid.base.answer import LINES, Answer, together
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
 from rotorid.commands.balance_options import BalanceOptions as BalanceOptions
-from rotorid.commands.balance_options import check_options
+from rotorid.commands.balance_options import choices
 from rotorid.commands.balance_solution import (
     read_source,
     solve,
@@ -20,12 +21,13 @@ from rotorid.commands.balance_solution import (
     with_limits_of,
     with_other_conventions,
 )
-from rotorid.commands.option_quantities import positions
-from rotorid.commands.outcome import Parts, command, provenance
+from rotorid.commands.coefficients import KINDS
+from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
+from rotorid.report.options import check_choices
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from balancing import (
@@ -34,161 +36,60 @@ if TYPE_CHECKING:
         Influence,
         LeftToDo,
         Mounted,
-        Subsets,
         Tolerance,
         Verdict,
     )
     from rotorid.commands.balance_solution import JobGiven
-    from rotorid.commands.type_coefficients import TypeKnowledge
+    from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.report.equations import Equations
+    from rotorid.report.outcome import Written
     from rotorid.tables import Job
-    from rotorid.tables.job.job_as_written import JobSource
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Balance(Parts):
+class Balance(Outcome):
     """A correction, and what was asked for beside it.
 
     Attributes
     ----------
-    result, influence
-        The correction and the coefficients that it is made of.
-    job, source
-        As it was read, and from what; None: it was given as it is.
-    mounted, check, verdict, tolerance, subsets
-        Pieces in holes, check runs beside their prediction, what limits and tolerances say, the tolerance
-        itself, choices of planes; None where there is nothing.
-    left
-        What is left to do after the check run.
-    of_type
-        Where the coefficients are those of a type of machines.
+    influence, job
+        What it is made of.
+    mounted, check, left, verdict, of_type
+        Pieces in holes, check runs beside their prediction, what is left to do after them, what limits and
+        tolerances say, where the coefficients are those of a type; None where there is nothing.
     """
 
-    result: Correction
     influence: Influence
     job: Job
-    source: JobSource | None
     mounted: Mounted | None
     check: CheckComparison | None
+    left: LeftToDo | None
     verdict: Verdict | None
-    tolerance: Tolerance | None
-    subsets: Subsets | None
-    left: LeftToDo | None = None
-    of_type: TypeKnowledge | None = None
-
-    @property
-    def parts(self) -> Mapping[str, Any]:
-        """The correction, and what was asked for beside it."""
-        return {
-            "": self.result,
-            "mounting": self.mounted,
-            "check": self.check,
-            "left_to_do": self.left,
-            "verdict": self.verdict,
-            "best_planes": self.subsets,
-            "of_type": self.of_type,
-        }
-
-    @property
-    def answer(self) -> Answer:
-        """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-        from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
-
-        weights, sound = self.result.answer, self.result.sound
-        if needs_trial_run(self.job, self.influence):
-            weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-        if self.left is not None:
-            return self._after_check(self.left)
-        if self.mounted:
-            judgement = "" if sound else weights.judgement
-            weights = replace(_behind(weights), judgement=judgement)
-        judged = [part.answer for part in (self.verdict, self.mounted) if part]
-        chosen = [] if self.subsets is None else [self.subsets.answer]
-        every = together([*judged, weights, *chosen] if sound else [weights, *judged, *chosen])
-        notes = list(every.notes)
-        if self.result.limits is not None and self.subsets:
-            notes.append("the comparison of planes does not look at the limits")
-        return replace(every, notes=tuple(notes))
-
-    def _after_check(self, left: LeftToDo) -> Answer:
-        """The verdict and what is left to do; the weights of the bare rotor are tables."""
-        limits = [] if self.verdict is None else [self.verdict.answer]
-        first = [one.judgement for one in (*limits, left.answer)]
-        cause, pieces = [], self.job.check_pieces
-        if self.check is not None:
-            first.insert(-1, self.check.headline)
-            cause.append(sentence(self.check.verdict))
-        if pieces is not None:
-            first.append(f"Taken to be mounted, by --split: {pieces.in_holes()}; else state check_weights.")
-        elif not (self.job.check_mounted or self.job.check_of_weights):
-            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
-        asked = [part.answer for part in (self.check, self.subsets) if part]
-        tables = [_behind(part.answer) for part in (self.mounted, self.result) if part]
-        every = together([left.answer, *limits, *asked, *tables])
-        return replace(every, judgement="\n".join([" ".join(first), *cause]))
-
-    def to_frame(self) -> pd.DataFrame:
-        """The weights, or what goes into each hole."""
-        return self.result.to_frame() if self.mounted is None else self.mounted.to_frame()
-
-    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
-        """The weights; for an .xlsx the job with its results, which `read_job` reads the job back from."""
-        if path.suffix.lower() != ".xlsx":
-            return super().table_file(path)
-        from rotorid.tables.job.workbook_writing import job_workbook_bytes
-
-        if self.source is None:
-            raise ValueError("a workbook is made of the files of a job: give these, not what was read")
-        return job_workbook_bytes(self.job, self.source, path, self, self.provenance)
-
-    @property
-    def equations(self) -> Equations:
-        """The stretched W D = −Y."""
-        from rotorid.report.equations_of_results import correction_equations
-
-        return correction_equations(self.result)
-
-    def figure(self) -> Figure:
-        """The correction, or what was asked for beside it: discs with holes, tolerances."""
-        from balancing import plots
-
-        pieces = self.mounted if self.left is None else self.left.pieces
-        if pieces is not None:
-            return plots.mounted_discs(pieces)
-        below, verdict = None, self.verdict
-        if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
-            below = partial(plots.draw_verdict, verdict, t=self.tolerance)
-        return plots.correction_figure(self.result, self.check, below)
+    of_type: TypeKnowledge | None
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
         from rotorid.report.balance import balance_report
 
-        return balance_report(
-            self.to_dict(), self.parts, self.influence, self.job, self.provenance, self.answer.judgement
-        )
-
-    def influence_table(self, path: Path | str) -> bytes:
-        """The coefficients for a file at this path, .csv or .xlsx."""
-        from rotorid.tables.runs.influence_table import influence_bytes
-
-        return influence_bytes(Path(path), self.influence)
-
-
-def _behind(answer: Answer) -> Answer:
-    """An answer whose tables come after all others'."""
-    return replace(answer, found="", tables=(answer.found, *answer.tables))
+        words = self.answer.judgement
+        made = self.result, self.mounted, self.left
+        return balance_report(self.to_dict(), made, self.influence, self.job, self.provenance, words)
 
 
 @command
-def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
-    """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
+def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balance:
+    """Correction weights from trial runs or a rotor model, with ± and what will be left.
+
+    Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
+
+    Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
+
+    --template job.xlsx writes a form; filled in, it is a job. --output sheet.xlsx is the job with results.
 
     Parameters
     ----------
-    job
-        A job file (`.toml`, `.xlsx`), or a runs table with a weights table or stored coefficients; or a job
-        that has been read already: what it would be under other conventions cannot be told then.
+    job : JOB | RUNS WEIGHTS | RUNS
+        Job (.toml, .xlsx); runs and weights tables; or runs with --influence.
     options
         Those that differ from the defaults.
 
@@ -201,7 +102,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     from rotorid.tables.job.job_as_written import JobSource
 
     options = options or BalanceOptions()
-    check_options(options)
+    _check(options)
     source = source_of(job, options)
     files = source if isinstance(source, JobSource) else None
     read = read_source(source, options)
@@ -227,28 +128,132 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
-    of_type = solved.of_type
-    return Balance(
-        result=result,
+    parts = {
+        "": result,
+        "mounting": mounted,
+        "check": check,
+        "left_to_do": left,
+        "verdict": verdict,
+        "of_type": solved.of_type,
+    }
+    made = provenance(read.files if solved.of_type is None else solved.of_type.files_beside(read), options)
+
+    def workbook(path: Path) -> Written:
+        from rotorid.tables.job.workbook_writing import job_workbook_bytes
+
+        if files is None:
+            raise ValueError("a workbook is made of the files of a job: give these, not what was read")
+        return job_workbook_bytes(read, with_limits_of(files, read, options), path, outcome, made)
+
+    def coefficients(path: Path) -> Written:
+        from rotorid.tables.runs.influence_table import influence_bytes
+
+        return influence_bytes(path, influence)
+
+    def solved_equations() -> Equations:
+        from rotorid.report.equations_of_results import correction_equations
+
+        return correction_equations(result)
+
+    fields = vars(
+        outcome_of(
+            result,
+            made,
+            answer=_answer(parts, read, influence),
+            keys=partial(_document, parts),
+            file=lambda: table_of((mounted or result).to_frame()),
+            files={".xlsx": workbook, "save_influence": coefficients},
+            pictures={"": lambda: _figure(parts, tolerance)},
+            solved=solved_equations,
+            lines=LINES + 6 * bool(mounted or (left and left.pieces)),
+        )
+    )
+    outcome = Balance(
         influence=influence,
         job=read,
-        source=None if files is None else with_limits_of(files, read, options),
         mounted=mounted,
         check=check,
-        verdict=verdict,
         left=left,
-        tolerance=tolerance,
-        subsets=solved.subsets,
-        of_type=of_type,
-        provenance=provenance(read.files if of_type is None else (*read.files, *of_type.files), options),
+        verdict=verdict,
+        of_type=solved.of_type,
+        **fields,
     )
+    return outcome
+
+
+def _check(options: BalanceOptions) -> None:
+    """Refuse options that are not known or do not go together, before anything is read."""
+    check_choices(options, choices())
+    if options.coefficients is not None:
+        one_of(options.coefficients, "--coefficients", KINDS)
+    if options.machine_type is not None and (options.coefficients or options.influence):
+        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
+    if options.ridge is not None and not 0 < options.ridge < math.inf:
+        raise ValueError(f"--ridge {options.ridge:g}: a strength above 0, such as 0.03")
+    if options.split and options.ridge is not None:
+        raise ValueError(
+            "--split takes the planes as they are, and would undo --ridge: use fewer --planes instead"
+        )
+
+
+def _document(parts: Mapping[str, Any]) -> dict[str, Any]:
+    keys = {key: part.to_dict() for key, part in parts.items() if part is not None}
+    return {**keys.pop(""), **keys}
+
+
+def _answer(parts: Mapping[str, Any], job: Job, influence: Influence) -> Answer:
+    """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+    from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
+
+    result, mounted, check, left, verdict = (
+        parts[key] for key in ("", "mounting", "check", "left_to_do", "verdict")
+    )
+    weights, sound = result.answer, result.sound
+    if needs_trial_run(job, influence):
+        weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
+    limits = [] if verdict is None else [verdict.answer]
+    if left is not None:  # the verdict and what is left to do; the weights of the bare rotor are tables
+        first, cause = [one.judgement for one in (*limits, left.answer)], []
+        if check is not None:
+            first.insert(-1, check.headline)
+            cause.append(sentence(check.verdict))
+        if job.check_pieces is not None:
+            pieces = job.check_pieces.in_holes()
+            first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
+        elif not (job.check_mounted or job.check_of_weights):
+            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
+        tables = [_behind(part.answer) for part in (mounted, result) if part]
+        every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
+        return replace(every, judgement="\n".join([" ".join(first), *cause]))
+    if mounted:
+        weights = replace(_behind(weights), judgement="" if sound else weights.judgement)
+    judged = [*limits, *([mounted.answer] if mounted else [])]
+    return together([*judged, weights] if sound else [weights, *judged])
+
+
+def _behind(answer: Answer) -> Answer:
+    """An answer whose tables come after all others'."""
+    return replace(answer, found="", tables=(answer.found, *answer.tables))
+
+
+def _figure(parts: Mapping[str, Any], tolerance: Tolerance | None) -> Figure:
+    """The correction, or what was asked for beside it: discs with holes, tolerances."""
+    from balancing import plots
+
+    left, verdict = parts["left_to_do"], parts["verdict"]
+    pieces = parts["mounting"] if left is None else left.pieces
+    if pieces is not None:
+        return plots.mounted_discs(pieces)
+    below = None
+    if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
+        below = partial(plots.draw_verdict, verdict, t=tolerance)
+    return plots.correction_figure(parts[""], parts["check"], below)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
-    along = (options.positions, options.bearings, options.centre)
-    if all(value is None for value in (grade, weight, speed, *along)):
+    if grade is None and weight is None and speed is None:
         return None
     if grade is None or weight is None or speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
@@ -257,10 +262,7 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
-    at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
-    if set(at) != set(planes):
-        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
-    stated = ToleranceOptions(weight, speed, grade, at, options.bearings, options.centre)
+    stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
     return permissible(stated, names=("--rotor-mass", "--service-speed"))
 
 

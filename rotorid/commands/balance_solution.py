@@ -11,14 +11,14 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.input_checks import file_of
 from rotorid.commands.option_quantities import largest_amplitudes, largest_weights, limited
 from rotorid.commands.quantities import names, speeds
+from rotorid.report.options import file_of
 
 if TYPE_CHECKING:
-    from balancing import ConventionTest, Correction, Influence, Subsets, Trials
+    from balancing import ConventionTest, Correction, Influence, Trials
     from rotorid.commands.balance_options import BalanceOptions
-    from rotorid.commands.type_coefficients import TypeKnowledge
+    from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
 
@@ -33,8 +33,7 @@ def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     from rotorid.tables.job.job_data import Overrides
 
     stored = None if options.influence is None else Path(options.influence)
-    errors = options.amplitude_error, options.phase_error, options.run_error
-    stated = (options.phase, options.angles, *errors, options.waveforms)
+    stated = (options.phase, options.angles, options.amplitude_error, options.phase_error)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
         return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
@@ -68,12 +67,11 @@ def with_limits_of(source: JobSource, job: Job, options: BalanceOptions) -> JobS
 
 
 class Solved(NamedTuple):
-    """A correction with the coefficients and the runs that it is made of, and the choice of its planes."""
+    """A correction with the coefficients and the runs that it is made of."""
 
     result: Correction
     known: tuple[Influence, Trials | None]
     planes: Sequence[str]
-    subsets: Subsets | None
     of_type: TypeKnowledge | None
 
 
@@ -106,29 +104,17 @@ def _test(job: Job) -> ConventionTest:
 
 
 def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
-    from balancing import compare_planes
-
-    of_type, subsets = None, None
+    of_type = None
     if options.machine_type is None:
-        known = choose(job, options.coefficients, options.model_error, refined=options.refine)
+        known = choose(job, options.coefficients, refined=options.refine)
     else:
-        from rotorid.commands.type_coefficients import type_coefficients
+        from rotorid.fleet.type_coefficients import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         known = of_type.influence, None
-    if planes is None:
-        planes = names(options.planes) or used_planes(job, known[0])
-        if options.best_planes is not None:
-            subsets = compare_planes(
-                *known,
-                planes,
-                options.best_planes,
-                speeds=_speeds(job, options),
-                row_weights=job.row_weights,
-            )
-            planes = subsets.planes[0]
+    planes = planes or names(options.planes) or used_planes(job, known[0])
     result = correct_job(job, known, planes, options)
-    return Solved(result if of_type is None else of_type.judged(result), known, planes, subsets, of_type)
+    return Solved(result if of_type is None else of_type.judged(result), known, planes, of_type)
 
 
 def correct_job(

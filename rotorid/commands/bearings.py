@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
-from rotorid.base.text import counted, figures, sentence
+from rotorid.base.text import figures, sentence
 from rotorid.commands.moving import moving
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rotorid.motion.equilibrium import Equilibrium
     from rotorid.reduction import SmallModel
 
-_ROWS = 14
+_ROWS = 6
 """Of the table that is printed with the answer."""
 _AXES = ("xx", "xy", "yx", "yy")
 
@@ -48,7 +48,7 @@ class BearingsOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BearingEquilibria(Delivered):
+class BearingEquilibria(Answered):
     """Equilibria at ascending speeds, the linear rotor with their coefficients, and where it loses stability.
 
     Attributes
@@ -138,20 +138,18 @@ class BearingEquilibria(Delivered):
 
         return on_figure(lambda ax: draw_journals(self.found, self.labels, ax), height=4.6)
 
-    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
-        """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.
+    def linear_files(self, path: Path) -> Mapping[Path, bytes]:
+        """The linear rotor as a rotor file, .toml, with its tables.
 
         Raises
         ------
         ValueError
-            For a rotor file of one speed, which would hold at all.
+            For one speed, which would hold at all.
         """
         from fem import Rotor
         from rotorid.tables.models.small_model_file import small_model_files
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
-        if path.suffix.lower() != ".toml":
-            return super().table_file(path)
         if len(self.found) < 2:
             raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")
         if isinstance(self.linear, Rotor):
@@ -160,7 +158,7 @@ class BearingEquilibria(Delivered):
 
 
 @command
-def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> BearingEquilibria:
+def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> Outcome:
     """Static equilibrium in journal bearings over speed, linear coefficients, stability.
 
     --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
@@ -192,17 +190,16 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     system = what.system(speeds[0], speeds[-1])
     if not (system.walls < float("inf")).any():
         raise ValueError("the rotor has no [[journal_bearing]], [[squeeze_film]] or [[annular_seal]]")
-    with phase(f"equilibrium at {counted(len(speeds), 'speed')}"):
-        resting = equilibria(system, speeds)
-    with phase("stability"):
-        stability = threshold(what.model, system, resting) if len(resting) > 1 else None
+    resting = equilibria(system, speeds)
+    stability = threshold(what.model, system, resting) if len(resting) > 1 else None
     small = "stiffness and damping are those at its centre, they hold for small orbits about it"
     films = [f"{named(f)}: {small}" for f in system.forces if isinstance(f, SqueezeFilm)]
     touched = dict.fromkeys(named(stop) for at in resting for stop in at.touched)
-    return BearingEquilibria(
+    result = BearingEquilibria(
         found=resting,
         linear=linear_rotor(what.model, resting),
         stability=stability,
         warnings=(*(f"the shaft rests on {stop}" for stop in touched), *films),
-        provenance=provenance(what.files, options),
     )
+    files = {".toml": result.linear_files}
+    return outcome_of(result, provenance(what.files, options), files=files)

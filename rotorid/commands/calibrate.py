@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import range_text
 from rotorid.base.text import capital, counted, error_figures
-from rotorid.commands.input_checks import file_of, rotor_source
-from rotorid.commands.outcome import Delivered, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Names, Nodes, nodes
+from rotorid.report.options import file_of, rotor_source
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,7 +58,7 @@ class CalibrateOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Delivered):
+class Calibrated(Answered):
     """The calibrated rotor."""
 
     found: CalibratedRotor
@@ -138,25 +138,19 @@ class Calibrated(Delivered):
             }
         )
 
-    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
-        """The calibrated rotor as a rotor file, .toml, with its tables; or the table of numbers.
+    def rotor_files(self, path: Path) -> Mapping[Path, bytes]:
+        """The calibrated rotor as a rotor file, with its tables.
 
         Raises
         ------
         ValueError
-            For a rotor file of numbers that the data do not determine.
+            For numbers that the data do not determine.
         """
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
-        if path.suffix.lower() != ".toml":
-            return super().table_file(path)
         if why := self.found.undetermined:
             raise ValueError(f"{path}: no rotor file can be written, {why}")
         return rotor_file_bytes(path, self.found.rotor)
-
-    def document_for(self, output: Path | None) -> dict[str, Any]:
-        """With the name of the file that is written."""
-        return {**self.document, "rotor": output and str(output)}
 
     def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
         """Names of some of the numbers, and these with their errors."""
@@ -201,8 +195,8 @@ class Prepared(NamedTuple):
 @command
 def calibrate(
     rotor: Rotor | Path | str, data: Sequence[Path | str] | Path | str, options: CalibrateOptions
-) -> Calibrated:
-    """Numbers of a rotor file from trial runs, with ±.
+) -> Outcome:
+    """Numbers of a rotor file from trial runs, critical speeds and modes, with ±.
 
     --output FILE.toml writes the calibrated rotor with its errors: `balance` then needs one run, and
     critical, campbell and response show bands.
@@ -228,19 +222,19 @@ def calibrate(
     from rotorid.commands.unknown_numbers import unknowns
 
     given = prepared(rotor, data, options)
-    log_rotor(given.rotor, unknowns=len(given.numbers))
     origin = provenance([*given.rotor_files, *given.data_files], options)
     paths = {number.path for number in given.numbers}
     beside = unknowns(given.rotor, given.probes, options.estimate, exact=False) if options.exact else []
     exact = [number for number in beside if number.path not in paths]
-    with phase("calibration"):
-        result = calibration.calibrate(*given[:3], exact=exact)
+    result = calibration.calibrate(*given[:3], exact=exact)
     of_rotor = {one["sha256"] for one in origin["inputs"][: len(given.rotor_files)]}  # which jobs name, too
     made_from = [one for one in origin["inputs"] if one["sha256"] not in of_rotor]
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    return Calibrated(found=result, provenance=origin)
+    calibrated = Calibrated(found=result)
+    made = outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
+    return replace(made, result=result)
 
 
 def prepared(

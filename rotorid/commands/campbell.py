@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
-from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, percent
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
-from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
+from rotorid.commands.quantities import Band, Speeds, band, rising_speeds
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,23 +34,11 @@ class CampbellOptions:
         How many modes, by default 6; forward and backward whirl count apart.
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
-    heavy : VALUE
-        Logarithmic decrement above which a mode is heavily damped: others are listed before it, and it is
-        drawn pale.
-    mesh_check
-        Estimate by elements cut in two how far off the mesh makes frequencies and critical speeds.
-    cross_coupling : LEAST:MOST
-        Stability over added cross-coupling, N/m, at the mid span, 0:5e7, or at a node or station, 0:5e7@12;
-        at the highest operating speed, or else the last speed.
     """
 
     speeds: Speeds
     number: int | None = None
     operating: Band | None = None
-    heavy: float = 6.0
-    mesh_check: bool = False
-    cross_coupling: Span | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
 @command
@@ -64,7 +50,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
 
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:9000:250rpm
-    --operating 5300:6500rpm --cross-coupling 0:1e7 --report whirl.html
+    --operating 5300:6500rpm --report whirl.html
 
     Parameters
     ----------
@@ -85,20 +71,16 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     from rotorid.commands.operating_range import Separation, unsearched
 
     operating = band(options.operating)
-    added = options.cross_coupling
-    span, place = (None, None) if added is None else span_at(added, "--cross-coupling", "0:5e7")
     model, files = rotor_source(rotor)
     speeds = rising_speeds(options.speeds)
-    solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
-    with phase(f"whirl at {counted(len(speeds), 'speed')}"):
-        whirl = solve(model)
+    solve = functools.partial(fem.campbell, speeds=speeds, n=options.number)
+    whirl = solve(model)
 
     def frequencies(other: Rotor) -> FloatArray:
         return nearest_modes(whirl.frequencies, (whirl if other is model else solve(other)).frequencies)
 
     std, doubts = error_band(model, "the frequencies", frequencies)
     whirl = dataclasses.replace(whirl, std=std, warnings=(*whirl.warnings, *doubts))
-    log_rotor(model, speeds=len(speeds), estimated_relative_error=whirl.error)
     beside: dict[str, Any] = {}
     if operating:
         doubt = unsearched(speeds[0], speeds[-1], operating)
@@ -110,24 +92,8 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     pictures: dict[str, Callable[[], Figure]] = {
         "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
     }
-    if span:
-        from rotorid.commands.cross_coupling import cross_coupling
-
-        with phase("cross-coupling"):
-            coupling = cross_coupling(model, operating[1] if operating else speeds[-1], span, place)
-        beside["cross_coupling"] = coupling
-        pictures["Logarithmic decrements over added cross-coupling."] = coupling.figure
     sentences += [part.sentence() for part in beside.values()]
     keys = {**whirl.to_dict(), **{key: part.to_dict() for key, part in beside.items()}}
-    if options.mesh_check:
-        with phase("mesh"):
-            changes = whirl.mesh_change()
-        named = zip(("frequencies_change", "critical_speeds_change"), changes, strict=True)
-        keys["mesh_check"] = plain(dict(named))
-        sentences.append(
-            f"Elements cut in two change frequencies by at most {percent(changes[0])} %, damped critical "
-            f"speeds by at most {percent(changes[1])} %."
-        )
     criticals, every = whirl.tables()
     return Outcome(
         result=whirl,
@@ -143,7 +109,6 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         notes=(whirl.cut,) if whirl.cut else (),
         pictures=pictures,
         title="Whirl",
-        rotor={"rotor": model},
         provenance=provenance(files, options),
     )
 

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from balancing import Correction, Influence, Trials
+    from balancing import Influence, Trials
     from rotorid.tables import Job
 
 KINDS = ("measured", "computed", "combined")
 MODEL_ERROR = 20.0
-"""Percent by which a computed coefficient may be wrong (one standard deviation) if nobody says."""
+"""Percent of a computed coefficient, one standard deviation, unless its rotor is calibrated."""
 
 
-def choose(
-    job: Job, kind: str | None = None, model_error: float | None = None, *, refined: bool = False
-) -> tuple[Influence, Trials | None]:
+def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple[Influence, Trials | None]:
     """Coefficients of a job, and the runs that give its vibration; None: those of the coefficients.
 
     Parameters
@@ -26,8 +24,6 @@ def choose(
         Its runs, stored coefficients or rotor.
     kind
         One of `KINDS`; None: measured where there are trial weights or stored coefficients.
-    model_error
-        Standard deviation of computed coefficients, percent.
     refined
         By the check runs of the job.
 
@@ -51,24 +47,18 @@ def choose(
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
             kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
-    if kind == "measured" and model_error is not None:
-        raise ValueError(
-            "--model-error is for computed coefficients: add --coefficients computed or combined"
-        )
     check = job.check if refined else None
     if refined and check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if check is not None and (kind == "computed" or job.influence is not None):
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     if kind == "computed":
-        return computed(job, model_error or 0.0), job.trials
+        return computed(job, 0.0), job.trials
     baseline = None if job.influence is None else job.trials
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
-        error = MODEL_ERROR if model_error is None else model_error
-        if model_error is None and job.rotor is not None and job.rotor.calibration:
-            error = 0.0  # it states its own
-        measured = combine(measured, computed(job, error))
+        calibrated = job.rotor is not None and job.rotor.calibration
+        measured = combine(measured, computed(job, 0.0 if calibrated else MODEL_ERROR))
     return measured, baseline
 
 
@@ -86,28 +76,6 @@ def _separate(trials: Trials) -> bool:
 def used_planes(job: Job, influence: Influence) -> list[str]:
     """Planes of these coefficients that the job does not leave out."""
     return [plane for plane in influence.planes if plane not in job.left_out]
-
-
-def proposed(job: Job, influence: Influence, runs: Trials | None = None) -> Correction:
-    """What `balance` proposes for a job with these coefficients, and no option changes it.
-
-    Parameters
-    ----------
-    job
-        With its limits, the planes it uses, and what is removed.
-    influence, runs
-        As of `correct`.
-    """
-    from balancing import correct
-
-    return correct(
-        influence,
-        runs,
-        used_planes(job, influence),
-        limits=job.limits_of(influence.planes),
-        row_weights=job.row_weights,
-        remove=sorted(job.remove),
-    )
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Band, band
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,8 +28,6 @@ class CriticalOptions:
     ----------
     number : -n N from 1
         How many critical speeds, by default 3; rigid-body motions come besides.
-    mesh_check
-        Estimate by refinement how far off the mesh makes each.
     speed_map : --map
         Critical speeds over the stiffness of the bearings, too; the picture is of them then.
     operating : A:B
@@ -37,10 +35,9 @@ class CriticalOptions:
     """
 
     number: int | None = None
-    mesh_check: bool = False
     speed_map: bool = False
     operating: Band | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "speed_map mesh_check"}
+    panels: ClassVar[Mapping[str, str]] = {"Method": "speed_map"}
 
 
 @command
@@ -73,12 +70,10 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     options = options or CriticalOptions()
     operating = band(options.operating)
     model, files = rotor_source(rotor)
-    with phase("critical speeds"):
-        modes = fem.critical_speeds(model, options.number)
-        speeds = modes.frequencies
-        n = options.number or int((speeds > 0).sum()) or 1
-        mesh = fem.mesh_check(model, n) if options.mesh_check else None
-        chart, left_out = _map(model, n) if options.speed_map else (None, [])
+    modes = fem.critical_speeds(model, options.number)
+    speeds = modes.frequencies
+    n = options.number or int((speeds > 0).sum()) or 1
+    chart, left_out = _map(model, n) if options.speed_map else (None, [])
     std, doubts = error_band(
         model,
         "the critical speeds",
@@ -86,14 +81,13 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     )
     left_out += _stubby(model, modes)
     modes = dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *doubts))
-    log_rotor(model)
     apart = None
     if operating:
         more = int((speeds > 0).sum()) >= (options.number or 3)
         doubt = unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
         apart = Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
     table, shapes = modes.tables()
-    beside = {"operating": apart, "mesh_check": mesh, "map": chart}
+    beside = {"operating": apart, "map": chart}
     asked = {key: result for key, result in beside.items() if result is not None}
     return Outcome(
         result=modes,
@@ -107,7 +101,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         notes=(modes.cut,) if modes.cut else (),
         pictures=_pictures(modes, chart, operating),
         title="Critical speeds",
-        rotor={"rotor": model, "conservative": True},
         provenance=provenance(files, options),
     )
 

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.logs import workflows as log
 from rotorid.base.text import listing
-from rotorid.commands.input_checks import check_choices, file_of, refuse
-from rotorid.commands.outcome import Found, command, phase, provenance, text_of
 from rotorid.commands.quantities import check_names, number, pairs
+from rotorid.report.options import check_choices, file_of, refuse
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from rotorid.base.registry import Method
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
-    from rotorid.identify.result_records import Fit
+    from rotorid.report.equations import Equations
 
-WITHOUT_CONTROL = ("expm", "taylor", "heun", "sequential-heun", "rk4")
-"""Integrators that know no tolerance."""
 Values = str | Mapping[str, float]
 """As "k=2,d=0.1", or by name."""
 
@@ -45,15 +40,9 @@ class FitOptions:
         Starting values instead of the model's: k=2,d=0.1; the others stay.
     starts : N from 1
         Begin from so many places; default: from others where the first minimum does not describe the record.
-    seed : N from 0
-        Other places to start from; default: 0.
-    max_iterations : N from 1
-        At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
     tolerance : X
         ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
         the sum of squares times Δt, is below it; default: where no step matters.
-    rtol : X
-        Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
     ridge : LAMBDA
@@ -69,13 +58,15 @@ class FitOptions:
     loss: str = "linear"
     start: Values | None = None
     starts: int | None = None
-    seed: int | None = None
-    max_iterations: int = 100
     tolerance: float | None = None
-    rtol: float | None = None
     allow_missing: bool = False
     ridge: float | None = None
     sigma: Values | float | None = None
+    panels: ClassVar[Mapping[str, str]] = {
+        "Input": "sigma start allow_missing",
+        "Method": "method loss starts ridge integrator tolerance",
+    }
+    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
 
 
 def choices() -> dict[str, tuple[Method[Any], ...]]:
@@ -87,49 +78,32 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
     return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RecordFit(Found):
-    """What the fit found, and the text of the model."""
-
-    found: Fit
-    model: str = ""
-
-    def table_file(self, path: Path) -> bytes | Mapping[Path, bytes]:
-        """Parameters; of the methods of the texts every iteration, in a workbook the states of each, too."""
-        from rotorid.base.tables import csv, excel
-
-        iterations = self.found.tables()
-        if not self.found.integrals:
-            return super().table_file(path)
-        return excel(*iterations) if path.suffix.lower() == ".xlsx" else csv(iterations[0])
-
-    def figure(self) -> Figure:
-        """Each signal with the model and its residuals, the inputs, the parameters."""
-        from rotorid.identify.plots_records import figure_fit
-
-        return figure_fit(self.found)
-
-    def sheet(self) -> bytes:
-        """To print or to send, one HTML file."""
-        from rotorid.report.estimation import fit_report
-
-        return fit_report(self.to_dict(), self.found, provenance=self.provenance, model=self.model)
-
-
 @command
 def fit(
     model: OdeModel | Path | str,
     records: Sequence[Record | Path | str] | Path | str,
     options: FitOptions | None = None,
-) -> RecordFit:
-    """Estimate parameters of differential equations from time records, with intervals.
+) -> Outcome:
+    """Coefficients of differential equations from time records, with ±.
+
+    Inputs are taken as exact, and as straight lines between their samples; only outputs have errors.
+
+    Example: rotorid fit sample_data/fit/three_masses/model.toml sample_data/fit/three_masses/record.csv
+    --sigma auto --plot fit.png
+
+    Every step of [Q], its regression M θ = Y, and the tables of its iterations:
+
+    Example: rotorid fit sample_data/fit/quasilinearization/model.toml
+    sample_data/fit/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun
+    --show equations
 
     Parameters
     ----------
-    model
-        A model, or its file.
-    records
-        Records, or their files; or one file.
+    model : MODEL.toml
+        Differential equations, outputs, what to estimate.
+    records : RECORD…
+        Time records, .csv or .xlsx: t_s, outputs and inputs; NAME_std beside an output NAME: standard
+        deviation of each sample.
     options
         Those that differ from the defaults.
 
@@ -138,13 +112,16 @@ def fit(
     ValueError
         For files, options or records that cannot be.
     """
+    from rotorid.base.tables import csv, excel
     from rotorid.identify.fit_records import fit as estimate
     from rotorid.identify.ode import OdeModel
-    from rotorid.identify.record_residuals import RTOL
+    from rotorid.identify.plots_records import figure_fit
     from rotorid.tables import read_ode_model
 
     options = options or FitOptions()
-    _check(options)
+    check_choices(options, choices())
+    if options.method not in ("gauss-newton", "quasilinearization"):
+        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
     if isinstance(records, Path | str) or not isinstance(records, Collection):
         records = [file_of(records, "records")]
     if not records:
@@ -157,40 +134,36 @@ def fit(
     weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
     deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
     data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
-    with phase("fit"):
-        result = estimate(
-            equations,
-            data,
-            method=options.method,
-            integrator=options.integrator,
-            loss=options.loss,
-            start=begin,
-            starts=options.starts,
-            seed=options.seed or 0,
-            max_iterations=options.max_iterations,
-            tolerance=options.tolerance,
-            rtol=RTOL if options.rtol is None else options.rtol,
-            weigh=weigh,
-            ridge=options.ridge or 0.0,
-        )
-    log.info("degrees_of_freedom = %s", result.estimate.dof)
-    log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in result.estimate.singular_values))
-    return RecordFit(found=result, model=text_of(model), provenance=provenance(files, options))
+    result = estimate(
+        equations,
+        data,
+        method=options.method,
+        integrator=options.integrator,
+        loss=options.loss,
+        start=begin,
+        starts=options.starts,
+        tolerance=options.tolerance,
+        weigh=weigh,
+        ridge=options.ridge or 0.0,
+    )
+    iterations: dict[str, Callable[[Path], bytes]] = {
+        ".csv": lambda _: csv(result.tables()[0]),
+        ".xlsx": lambda _: excel(*result.tables()),
+    }
 
+    def solved() -> Equations:
+        from rotorid.report.equations_of_results import equations_of
 
-def _check(options: FitOptions) -> None:
-    """Refuse names that are not known, and options that the method or the integrator would not look at."""
-    check_choices(options, choices())
-    if options.method not in ("gauss-newton", "quasilinearization"):
-        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
-    if options.rtol is None:
-        return
-    if not 1e-13 <= options.rtol <= 0.01:
-        raise ValueError(f"--rtol takes a number from 1e-13 to 0.01, not {options.rtol:g}")
-    if options.integrator in WITHOUT_CONTROL:
-        raise ValueError(
-            f"--rtol belongs to --integrator dop853, lsoda or auto: {options.integrator} has none"
-        )
+        return equations_of(result)
+
+    return outcome_of(
+        result,
+        provenance(files, options),
+        files=iterations if result.integrals else {},
+        pictures={"Signals and residuals over time; parameters with 95 %.": lambda: figure_fit(result)},
+        title="Parameters from time records",
+        solved=solved,
+    )
 
 
 def _check_once(records: Sequence[Path]) -> None:

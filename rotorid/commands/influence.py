@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.tables import LONG
-from rotorid.base.text import counted
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.report.options import rotor_source
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,9 +62,7 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
     model, files = rotor_source(rotor)
     planes, places = nodes(options.planes, "--planes"), sensors(options.sensors)
     speeds = rising_speeds(options.speeds)
-    with phase(f"influence coefficients at {counted(len(speeds), 'speed')}"):
-        result = fem.influence(model, planes, places, speeds)
-    log_rotor(model, speeds=len(speeds))
+    result = fem.influence(model, planes, places, speeds)
     *largest, every = result.tables()
     return Outcome(
         result=result,
@@ -81,6 +78,5 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
             )
         },
         title="Influence coefficients",
-        rotor={"rotor": model, "planes": planes, "sensors": places, "meaning": "planes"},
         provenance=provenance(files, options),
     )

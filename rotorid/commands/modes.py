@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing
-from rotorid.commands.input_checks import file_of
-from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
 from rotorid.commands.quantities import Band, band, one_of
+from rotorid.report.options import file_of
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from rotorid.base.arrays import ComplexArray
@@ -51,29 +50,8 @@ class ModesOptions:
     to: ClassVar[Sequence[str]] = USUAL
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ModesOutcome(Outcome):
-    """With a table for `reduce` and `identify`, or why there is none."""
-
-    lacking: str = ""
-
-    def _check(self) -> None:
-        if self.lacking:
-            raise ValueError(f"there is no table of modes: {self.lacking}")
-
-    def to_frame(self) -> pd.DataFrame:
-        """The main table; ValueError without it."""
-        self._check()
-        return super().to_frame()
-
-    def table_file(self, path: Path) -> bytes:
-        """The same as a file."""
-        self._check()
-        return super().table_file(path)
-
-
 @command
-def modes(data: Path | str, options: ModesOptions | None = None) -> ModesOutcome:
+def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
     """Natural frequencies, damping and shapes from amplitudes around resonances, with ±.
 
     The table of modes is for `reduce --measured`, and for `identify` in place of amplitudes.
@@ -99,8 +77,7 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> ModesOutcome
     options = options or ModesOptions()
     file = file_of(data, "a table of amplitudes")
     readings, force = _read(file, options)
-    with phase("modes"):
-        fit = fit_modes(readings, SteadyAnswers(readings.speeds, force), bands(options.bands) or None)
+    fit = fit_modes(readings, SteadyAnswers(readings.speeds, force), bands(options.bands) or None)
 
     def picture() -> Figure:
         from rotorid.identify.plots import figure_modes
@@ -108,14 +85,15 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> ModesOutcome
         return figure_modes(fit)
 
     lacking = next(iter(fit.undetermined), "")
-    return ModesOutcome(
+    return Outcome(
         result=fit,
         sentences=(_sentence(fit),),
         tables=() if lacking else _tables(fit),
         file=NO_MODES if lacking else fit.file_table(),
         keys=fit.to_dict(),
         pictures={"Readings and fit around each resonance.": picture},
-        lacking=lacking,
+        lacking=lacking and f"there is no table of modes: {lacking}",
+        title="Modes",
         warnings=fit.warnings,
         notes=() if lacking else fit.notes,
         provenance=provenance([file], options),

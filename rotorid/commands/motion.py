@@ -10,13 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures, percent
 from rotorid.commands.moving import moving, reduction, reduction_notes
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
@@ -29,6 +28,7 @@ from rotorid.commands.quantities import (
     pairs,
     speeds,
 )
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 View = Literal["motion", "orbits", "bode"]
 """What a picture shows."""
 Start = Literal["rest", "steady"]
+_TOLERANCE = 1e-6
+"""Error of one step, by how far the rotor has moved from where it began."""
 _SMALL = 24
 """Unknowns above which a rotor is reduced, where nothing else is asked for."""
 _LOOSER = 30.0
@@ -83,8 +85,6 @@ class MotionOptions:
         to 0.03 %; small models keep all.
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
-    tolerance : T
-        Error of one step, by how far the rotor has moved from where it began.
     view
         What --plot draws: x and y over time with the spectrum, orbits, or a run-up over speed.
     """
@@ -101,18 +101,17 @@ class MotionOptions:
     sensors: Nodes | None = None
     modes: int | None = None
     rate: float | None = None
-    tolerance: float = 1e-6
     view: View = "motion"
     panels: ClassVar[Mapping[str, str]] = {
         "Start": "start displaced",
-        "Method": "modes rate tolerance",
+        "Method": "modes rate",
         "Output": "view",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Motion(Delivered):
+class Motion(Answered):
     """Motion in time, what it comes to, and how sure it is.
 
     Attributes
@@ -311,7 +310,7 @@ class Motion(Delivered):
 
 
 @command
-def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
+def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Outcome:
     """Motion in time at a constant speed, through a run-up or a run-down.
 
     Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
@@ -333,7 +332,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     """
     import numpy as np
 
-    from rotorid.motion.run import LOOSEST, run
+    from rotorid.motion.run import run
     from rotorid.motion.steady import begin, steady_end
     from rotorid.motion.system import reduced_system
 
@@ -344,33 +343,26 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    tolerance = options.tolerance
-    if tolerance > LOOSEST / _LOOSER:
-        raise ValueError(f"--tolerance {tolerance:g}: {LOOSEST / _LOOSER:.0e} at most")
     if options.modes is not None or system.size > _SMALL:
-        with phase("equations"):
-            system = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
-    with phase("start"):
-        q, v, unsettled = begin(system, ends[0], options.start, shift, tolerance)
+        system = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
+    q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
-    with phase("motion"):
-        found = move(tolerance=tolerance)
-    with phase(f"motion with {_LOOSER:g} times the tolerance"):
-        rough = move(tolerance=_LOOSER * tolerance)
+    found = move(tolerance=_TOLERANCE)
+    rough = move(tolerance=_LOOSER * _TOLERANCE)
     if found.stopped:
         until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
         raise ValueError(found.stopped + until)
     k = min(found.time.size, rough.time.size)
     moved = np.abs(found.z - found.z[0]).max()
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    return Motion(
+    result = Motion(
         motion=found,
         end=steady_end(found),
         error=error,
         warnings=(*unsettled, *_warnings(found, error, bool(shift))),
         view=options.view,
-        provenance=provenance(source.files, options),
     )
+    return outcome_of(result, provenance(source.files, options))
 
 
 def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted, percent
-from rotorid.commands.input_checks import rotor_source
+from rotorid.report.options import rotor_source
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -15,7 +15,7 @@ from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings, run_errors
-from rotorid.commands.outcome import hash_of
+from rotorid.files.input_file import sha256
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,7 +55,7 @@ def counted_before(job: Job) -> bool:
     """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
     known = None if job.rotor is None else job.rotor.calibration
     own = job.files[:2]  # the job, then its runs
-    return known is not None and any(hash_of(file) in known.data.values() for file in own)
+    return known is not None and any(sha256(file) in known.data.values() for file in own)
 
 
 def needs_trial_run(job: Job, influence: Influence) -> bool:

@@ -6,7 +6,7 @@ From Python they are given in SI: kg, m, N, rad/s, kg·m; complex weights count 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from typing import TYPE_CHECKING, get_args
 
@@ -183,85 +183,64 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
 def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -> dict[str, Quantity]:
     """Largest weights by plane: "5g" of every plane that is not left out, "left=5g,right=3g" of these.
 
-    Without a unit in that of the job's weights.
+    Without a unit in that of the job's weights; numbers in SI.
 
     Raises
     ------
     ValueError
         Naming the option and what is wrong with it.
     """
-    from rotorid.files.settings_keys import Quantity
-
     own = job.trials.labels.weight_unit
+    example = "5g; to use no weight at all, leave the plane out"
 
-    def read(_: str, text: str) -> Quantity:
-        value, word = _number(text, what, "5g")
-        _above_zero(value, text, what, "5g; to use no weight at all, leave the plane out")
-        return Quantity(f"{what} {text!r}", value, _weight_unit(word or own, text, what))
-
-    def alone(text: str) -> dict[str, Quantity]:
-        if "," in str(given):
-            raise ValueError(
-                f"{what} {given!r}: give one value for all planes, or each plane once "
-                "(a decimal sign is a point)"
-            )
-        return dict.fromkeys(job.used, read("", text))
+    def read(value: Amount) -> Quantity:
+        if not isinstance(value, str):
+            return _limit(value, _si(own), value, what, "0.005 kg")
+        size, word = _number(value, what, "5g")
+        return _limit(size, _weight_unit(word or own, value, what), value, what, example)
 
     if given is None:
         return {}
-    if isinstance(given, str):
-        found = pairs(given, what, read, "5g or left=5g,right=3g", alone)
-    else:
-        several = given if isinstance(given, Mapping) else dict.fromkeys(job.used, given)
-        found = {
-            name: read(name, value)
-            if isinstance(value, str)
-            else Quantity(f"{what} {name}", _above_zero(value, value, what, "0.005 kg"), _si(own))
-            for name, value in several.items()
-        }
-    return _of(job.planes, "plane", found, f"{what} {given!r}")
+    if isinstance(given, str) and "," in given and "=" not in given:
+        raise ValueError(
+            f"{what} {given!r}: give one value for all planes, or each plane once (a decimal sign is a point)"
+        )
+    return _limits(given, what, read, "5g or left=5g,right=3g", "plane", job.planes, job.used)
 
 
 def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> dict[str, Quantity]:
     """Largest amplitudes by sensor: each `SENSOR=VALUE`, or `VALUE` of every sensor.
 
-    In the job's amplitude unit, or with one that converts to it.
+    In the job's amplitude unit, or with one that converts to it; numbers in SI.
 
     Raises
     ------
     ValueError
         Naming the option and what is wrong with it.
     """
-    from rotorid.files.settings_keys import Quantity
-
     own, sensors = units.vibration(job.trials.labels.vibration_unit), job.trials.sensors
 
-    def read(_: str, text: str) -> Quantity:
-        value, word = _number(text, what, "20")
-        _above_zero(value, text, what, "20")
+    def read(value: Amount) -> Quantity:
+        if not isinstance(value, str):
+            return _limit(value * own.scale, own, value, what, "20e-6")
+        size, word = _number(value, what, "20")
         try:
             unit = units.vibration(word or own.name)
         except UnitError as error:
-            raise ValueError(f"{what} {text!r}: expected {error}") from None
+            raise ValueError(f"{what} {value!r}: expected {error}") from None
         if unit.kind != own.kind:
             raise ValueError(
-                f"{what} {text!r}: the readings are in {own.name or 'no unit'}, to which {word} does not "
+                f"{what} {value!r}: the readings are in {own.name or 'no unit'}, to which {word} does not "
                 "convert"
             )
-        return Quantity(f"{what} {text!r}", value, unit)
+        return _limit(size, unit, value, what, "20")
 
-    if isinstance(given, Mapping):
-        found = {
-            name: read(name, v)
-            if isinstance(v, str)
-            else Quantity(f"{what} {name}", _above_zero(v, v, what, "20e-6") * own.scale, own)
-            for name, v in given.items()
-        }
-        return _of(sensors, "sensor", found, what)
-    found = {}
-    for option in [given] if isinstance(given, str) else given:
-        each = pairs([option], what, read, "SENSOR=20", lambda text: dict.fromkeys(sensors, read("", text)))
-        found |= _of(sensors, "sensor", each, f"{what} {option!r}")
+    several = [given] if isinstance(given, str | Mapping) else given
+    found: dict[str, Quantity] = {}
+    for one in several:
+        if not isinstance(one, str | Mapping):
+            raise ValueError(f"{what} {given!r}: texts are needed, such as SENSOR=20")
+        found |= _limits(one, what, read, "SENSOR=20", "sensor", sensors, sensors)
     return found
 
 
@@ -272,15 +251,41 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
     return with_limits(job, largest_weights(job, max_mass), largest_amplitudes(job, limits))
 
 
-def _of(names: Sequence[str], kind: str, found: dict[str, Quantity], what: str) -> dict[str, Quantity]:
-    """The same, of known planes or sensors only."""
+def _limits(
+    given: Amount | Mapping[str, Amount],
+    what: str,
+    read: Callable[[Amount], Quantity],
+    example: str,
+    kind: str,
+    known: Sequence[str],
+    every: Sequence[str],
+) -> dict[str, Quantity]:
+    """Limits of known planes or sensors, or one of every."""
+    if isinstance(given, Mapping):
+        found = {name: read(value) for name, value in given.items()}
+    elif isinstance(given, str):
+        found = pairs(
+            [given] if kind == "sensor" else given,
+            what,
+            lambda _, text: read(text),
+            example,
+            lambda text: dict.fromkeys(every, read(text)),
+        )
+    else:
+        found = dict.fromkeys(every, read(given))
     for name in found:
-        if name not in names:
+        if name not in known:
             raise ValueError(
-                f"{what}: there is no {kind} {name!r}{did_you_mean(name, names)}; "
-                f"there are {listing(map(repr, names), 'and')}"
+                f"{what} {given!r}: there is no {kind} {name!r}{did_you_mean(name, known)}; "
+                f"there are {listing(map(repr, known), 'and')}"
             )
     return found
+
+
+def _limit(value: float, unit: Unit, given: object, what: str, example: str) -> Quantity:
+    from rotorid.files.settings_keys import Quantity
+
+    return Quantity(f"{what} {given!r}", _above_zero(value, given, what, example), unit)
 
 
 def _number(text: str, what: str, example: str) -> tuple[float, str]:

@@ -9,14 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
 from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
-from rotorid.commands.outcome import USUAL, Delivered, command, phase, provenance
 from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,9 +51,6 @@ class PeriodicOptions:
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
         Table of the shaft's bow at rest; in place of a small model's own.
-    modes : N from 0
-        Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
-        default: as of `motion`; small models keep all.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     max_seconds : S from 0.01
@@ -65,18 +62,17 @@ class PeriodicOptions:
     limit_cycle: bool = False
     unbalance: Path | str | Mapping[int, complex] | None = None
     bow: Path | str | Mapping[int, complex] | None = None
-    modes: int | None = None
     gravity_direction: float = -90.0
     max_seconds: float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Motion": "limit_cycle",
-        "Method": "modes max_seconds",
+        "Method": "max_seconds",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PeriodicMotions(Delivered):
+class PeriodicMotions(Answered):
     """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced.
 
     Attributes
@@ -234,7 +230,7 @@ def _period(branch: Branch, orbit: Orbit) -> float:
 
 
 @command
-def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -> PeriodicMotions:
+def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -> Outcome:
     """Periodic motion over speed: stability, bifurcations, self-excited motion.
 
     Example: rotorid periodic sample_data/motion/rotor.toml --speeds 5000:8000rpm --limit-cycle
@@ -260,33 +256,25 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     from rotorid.motion.system import reduced_system
 
     low, high = _range(options.speeds)
-    if options.max_seconds is not None and not options.max_seconds > 0:
-        raise ValueError("--max-seconds takes a number above 0")
     direction = degrees(options.gravity_direction, "--gravity-direction")
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
-    few = full.size <= _SMALL and options.modes is None
-    system = full if few else reduced_system(full, kept, options.modes)
+    system = full if full.size <= _SMALL else reduced_system(full, kept, None)
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    with phase("periodic motion"):
-        motion = periodic_motion(
-            system,
-            low,
-            high,
-            limit_cycle=options.limit_cycle,
-            max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
-        )
-    return PeriodicMotions(
-        motion=motion,
-        labels=labels,
-        directions=directions,
-        provenance=provenance(what.files, options),
+    found = periodic_motion(
+        system,
+        low,
+        high,
+        limit_cycle=options.limit_cycle,
+        max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
     )
+    result = PeriodicMotions(motion=found, labels=labels, directions=directions)
+    return outcome_of(result, provenance(what.files, options))
 
 
 def _range(given: Band) -> tuple[float, float]:

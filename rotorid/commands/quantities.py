@@ -7,12 +7,14 @@ quantities with units are read by `rotorid.commands.option_quantities`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TypeVar, cast
+from typing import TypeVar
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.suggestions import one_of as one_of
 from rotorid.base.text import listing
+from rotorid.report.options import option_name as option_name
 
 _T = TypeVar("_T")
 Speeds = str | Sequence[float | str]
@@ -21,8 +23,6 @@ Times = str | Sequence[float]
 """As `times` reads them, or one by one, s."""
 Band = str | tuple[float | str, float | str]
 """As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
-Span = str | tuple[float, float]
-"""As `span_at` reads it, or the least and the most, in SI."""
 Nodes = str | Sequence[str | int]
 """As `nodes` reads them, or numbers of nodes and names of stations."""
 Sensor = str | int | tuple[str | int, float]
@@ -32,11 +32,7 @@ Names = str | Sequence[str]
 SLOWEST, FASTEST = 1e-9, 1e9
 """rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
-
-
-def option_name(field: str) -> str:
-    """As the command line writes it: "--first-hole"."""
-    return f"--{field.replace('_', '-')}"
+_SPEED = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(rad_s|rad/s|rpm|Hz|)\s*")
 
 
 def number(text: str) -> float:
@@ -168,29 +164,22 @@ def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") ->
     """Read "9000:10500rpm" (without a unit: the usual) as the ends of a range in rad/s; None stays None."""
     if given is None:
         return None
-    if not isinstance(given, str):
-        factor, ends = 1.0, [one_speed(end, what) for end in given]
-    else:
-        text = given.strip()
-        unit = next((name for name in _SPEED_UNITS if text.endswith(name)), "")
-        factor = _SPEED_UNITS[unit or usual]
-        ends = [number(part) for part in text.removesuffix(unit).split(":")]
-    if len(ends) != 2 or not 0 <= ends[0] < ends[1] <= FASTEST / factor:
-        others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual.replace("_", "/"))
+    ends = given.replace(":", ",") if isinstance(given, str) else given
+    try:
+        low, high = speeds(ends, usual, what)
+    except ValueError:
+        low = high = 0.0
+    if not low < high:
+        unit = usual.replace("_", "/")
         raise ValueError(
-            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in {usual.replace('_', '/')}, or with "
-            f"{others} at the end"
+            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in {unit}, or with "
+            f"{_others(unit)} at the end"
         )
-    return ends[0] * factor, ends[1] * factor
+    return low, high
 
 
-def span_at(given: Span, what: str, example: str) -> tuple[tuple[float, float], str | None]:
-    """Read "0:5e7" or "0:5e7@impeller 3" as a range of numbers and where it is meant; None: nowhere said."""
-    text, _, place = given.partition("@") if isinstance(given, str) else ("", "", "")
-    ends = [number(part) for part in text.split(":")] if isinstance(given, str) else [*given]
-    if len(ends) != 2 or not 0 <= ends[0] < ends[1] < math.inf:
-        raise ValueError(f"{what} {given!r} is not a range: use LEAST:MOST, such as {example}")
-    return (ends[0], ends[1]), place.strip() or None
+def _others(unit: str) -> str:
+    return " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != unit)
 
 
 def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[float]:
@@ -200,26 +189,26 @@ def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[f
     range is included where the steps meet it.
     """
     if not isinstance(given, str):
-        found = [one_speed(value, what) if isinstance(value, str) else value for value in given]
-        return _possible([float(value) for value in found], what, given)
+        each = [one_speed(value, what) if isinstance(value, str) else value for value in given]
+        return _possible([float(value) for value in each], what, given)
     sign = ":" if ":" in given else ","
-    parts = [_speed(part) for part in given.split(sign)]
-    usual = unit.replace("rad_s", "rad/s")
-    others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual)
-    example = f"use FIRST:LAST:STEP or a list with commas, in {usual}, or with {others} at the end"
-    if any(part is None for part in parts) or (sign == ":" and len(parts) != 3):
-        raise ValueError(f"{what} {given!r} is not a range: {example}")
-    values, own = zip(*cast("list[tuple[float, str]]", parts), strict=True)
+    read = [_SPEED.fullmatch(part) for part in given.split(sign)]
+    values = [math.nan if one is None else number(one[1]) for one in read]
+    if any(map(math.isnan, values)) or (sign == ":" and len(values) != 3):
+        usual = unit.replace("_", "/")
+        raise ValueError(
+            f"{what} {given!r} is not a range: use FIRST:LAST:STEP or a list with commas, in {usual}, "
+            f"or with {_others(usual)} at the end"
+        )
+    own = [one[2] for one in read if one is not None]
     if any(own[:-1]) and not all(own):
         raise ValueError(f"{what} {given!r}: give the unit at every speed, or once at the end")
-    if sign == ":" and len(set(own[:-1]) | {own[-1]} - {""}) > 1 and any(own[:-1]):
+    if sign == ":" and any(own[:-1]) and len({*own}) > 1:
         raise ValueError(f"{what} {given!r}: a range has one unit")
-    if not all(math.isfinite(value) for value in values):
-        raise ValueError(f"{what} {given!r}: speeds must be finite and not negative")
     factors = [_SPEED_UNITS[name or own[-1] or unit] for name in own]
     if sign == ":":
-        values = _range(values, what, given)
-        factors = [factors[0]] * len(values)
+        values = [*_range(values, what, given)]
+        factors = factors[:1] * len(values)
     return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
 
 
@@ -262,13 +251,3 @@ def _possible(found: list[float], what: str, given: Speeds) -> list[float]:
     if not found or not all(value == 0 or SLOWEST <= value <= FASTEST for value in found):
         raise ValueError(f"{what} {given!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
     return found
-
-
-def _speed(text: str) -> tuple[float, str] | None:
-    """A number and its unit (empty: none), or None."""
-    body = text.strip()
-    unit = next((name for name in _SPEED_UNITS if body.endswith(name)), "")
-    try:
-        return float(body.removesuffix(unit).strip()), unit
-    except ValueError:
-        return None

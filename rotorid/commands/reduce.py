@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from rotorid.base.logs import workflows as log
-from rotorid.base.text import counted
-from rotorid.commands.input_checks import rotor_source
-from rotorid.commands.outcome import command, provenance
+from rotorid.base.answer import Answer, together
+from rotorid.base.text import counted, listing
 from rotorid.commands.quantities import (
     Band,
     Nodes,
@@ -22,20 +20,30 @@ from rotorid.commands.quantities import (
     numbers,
     one_of,
     one_speed,
-    option_name,
     rising_speeds,
+)
+from rotorid.report.options import option_name, rotor_source
+from rotorid.report.outcome import (
+    EQUATIONS,
+    WITH_REPORT,
+    Outcome,
+    command,
+    outcome_of,
+    provenance,
+    table_of,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from fem import Rotor
-    from rotorid.commands.reduce_result import ReducedRotor
-    from rotorid.reduction import InputErrors, Placement, Reduction
+    from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
+    from rotorid.report.equations import Equations
+    from rotorid.report.outcome import Written
     from rotorid.tables.data.modes_table import MeasuredModes
 
 Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
-Normalise = Literal["first", "largest", "length"]
-"""How shapes are scaled."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
@@ -52,19 +60,19 @@ class ReduceOptions:
     place
         Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
         (extrema of the first two modes).
-    masses : N
+    rank
+        Rank all places of the masses; without --nodes or --place they are those of the best compromise.
+    masses : N from 1
         How many masses are placed or ranked; default: 3.
-    modes : N
+    candidates : LIST
+        Nodes that places are chosen from.
+    modes : N from 1
         How many modes the regression uses; default: 2.
-    normalise
-        Shapes scaled to 1 at the first mass (the book), at their largest, or in length.
     rows
         Rows of the regression as they stand (the book: the first mode dominates), or of each mode relative
         to its 1/ω².
     nonnegative
         No mass below 0.
-    supports_apart
-        Compliance of the shaft and its two bearings apart, (47).
     measured : FILE
         Table of measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.
     compliance : FILE
@@ -73,65 +81,82 @@ class ReduceOptions:
         With a table of compliance: springs to the ground that it does not hold, N/m, 12=2e6.
     errors : LIST
         Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.
+    supports_apart
+        Compliance of the shaft and its two bearings apart, (47).
+    damping : LIST
+        Modal damping of the small model, percent of critical of the first modes: 1,0.5.
     speed : SPEED
         Of tables of bearings and seals, and of the small model, such as 3000rpm; default: the lowest of the
         tables.
-    rank
-        Rank all places of the masses.
-    candidates : LIST
-        Nodes that places are chosen from.
     methods
         Beside other reductions.
     response : A:B:STEP
         Unbalance response beside the full rotor's, at speeds in rad/s or with a unit; or auto.
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
-    damping : LIST
-        Modal damping of the small model, percent of critical of the first modes: 1,0.5.
-    both_planes
-        Planes x and y in the model file, also where nothing couples them.
     force : LIST
         Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
+    model : FILE.toml
+        Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, `identify` and
+        `simulate`, a damper to be estimated at each mass.
+    state_space : FILE
+        Write A, B, C, D in both planes: .json, .npz or .mat.
     """
 
     nodes: Nodes | None = None
     place: Place | None = None
+    rank: bool = False
     masses: int | None = None
+    candidates: Nodes | None = None
     modes: int | None = None
-    normalise: Normalise = "first"
     rows: Rows = "equal"
     nonnegative: bool = False
-    supports_apart: bool = False
     measured: Path | str | None = None
     compliance: Path | str | None = None
     seals: str | Mapping[str, float] | None = None
     errors: str | Mapping[str, float] | None = None
+    supports_apart: bool = False
+    damping: str | Sequence[float] | None = None
     speed: str | float | None = None
-    rank: bool = False
-    candidates: Nodes | None = None
     methods: bool = False
     response: Speeds | None = None
     stability: Band | None = None
-    damping: str | Sequence[float] | None = None
-    both_planes: bool = False
     force: Nodes | None = None
     keep_supports: bool = False
+    model: Path | None = None
+    state_space: Path | None = None
+    panels: ClassVar[Mapping[str, str]] = {
+        "Input": "nodes modes speed measured compliance seals",
+        "Method": "rank place masses candidates methods errors",
+        "Small model": "response stability model state_space damping force keep_supports",
+        "Expert": "rows nonnegative supports_apart",
+    }
+    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
+    writes: ClassVar[Mapping[str, Sequence[str]]] = {
+        "model": (".toml",),
+        "state_space": (".json", ".npz", ".mat"),
+    }
 
 
 @command
-def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
-    """Find equivalent masses at chosen nodes (formula 50), how good they are, and the small model.
+def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> Outcome:
+    """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
-    small model.
+    small model (--response, --stability, --model, --state-space). With --keep-supports bearings, films and
+    other forces stay apart from the masses, for motion.
+
+    Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
+
+    Example: rotorid reduce sample_data/rotor23.csv --rank --plot map.png
 
     Parameters
     ----------
-    rotor
-        A rotor, a rotor table or a rotor file; None: compliance and modes are given by tables.
+    rotor : ROTOR
+        Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.
     options
         Those that differ from the defaults.
 
@@ -140,35 +165,109 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     ValueError
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
-    from rotorid.commands.reduce_result import ReducedRotor
-
     options = options or ReduceOptions()
-    how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
     _check_used(options, rotor is not None)
     if rotor is None:
-        result, files = _of_tables(options, how)
-        forces = _forces(options)
-        reduced = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
-    else:
-        reduced = _of_rotor(rotor, options, how)
-    solved = reduced.result.masses
-    log.info("rank = %s", solved.rank)
-    log.info("degrees_of_freedom = %s", solved.dof)
-    log.info("singular_values = %s", ", ".join(f"{value:.6g}" for value in solved.singular_values))
-    return reduced
+        result, files = _of_tables(options)
+        return _outcome({"": result}, options, files, "")
+    name = Path(rotor).name if isinstance(rotor, Path | str) else ""
+    parts, files = _of_rotor(rotor, options)
+    return _outcome(parts, options, files, name)
+
+
+def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[Path], name: str) -> Outcome:
+    """The masses, and what was asked for beside them, by their keys in the document; the ranking first."""
+    result: Reduction = parts[""]
+    small: SmallModel | None = parts.get("small_model")
+    placement: Placement | None = parts.get("placement")
+    force = [] if options.force is None else nodes(options.force, "--force")
+    forces = force if result.rotor is None else [result.rotor.node(node) for node in force]
+    speed = _speed(result.rotor, options)
+    first = [] if placement is None else [placement.answer]
+    if options.keep_supports and result.rotor is not None:
+        at = listing((str(support.node) for support in result.rotor.supports), "and")
+        first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
+    rest = (part.answer for part in parts.values() if part is not placement)
+
+    def model(path: Path) -> Written:
+        from rotorid.commands.reduce_result import model_files
+
+        kept = options.keep_supports
+        return model_files(path, result, small, speed, name, keeps_supports=kept, forces=forces)
+
+    def state_space(path: Path) -> Written:
+        from rotorid.commands.reduce_result import small_of, state_space_bytes
+
+        return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
+
+    def solved() -> Equations:
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(result)
+
+    keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
+    return outcome_of(
+        result,
+        provenance(files, options),
+        answer=together([*first, *rest]),
+        keys={**keys.pop(""), **keys},
+        file=lambda: table_of((placement or result).to_frame()),
+        files={"model": model, "state_space": state_space},
+        pictures=_pictures(parts),
+        title=f"Rotor reduced to {counted(len(result.nodes), 'mass', 'masses')}",
+        solved=solved,
+    )
+
+
+def _pictures(parts: Mapping[str, Any]) -> dict[str, Callable[[], Figure]]:
+    """Of what was asked for, the last first, and the shapes."""
+    captions = {
+        "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
+        "response": "Response of both models, and their difference.",
+        "methods": "What each method loses: errors of frequencies.",
+        "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
+        "": "Mode shapes of the small model over those it was made from.",
+    }
+
+    def drawn(key: str) -> Callable[[], Figure]:
+        def draw() -> Figure:
+            from rotorid.base.plot_style import new_figure
+            from rotorid.plots import plot
+
+            two = key == "response"
+            figure = new_figure(6.2 if two else 5.0)
+            axes = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
+            plot(parts[key], axes)
+            return figure
+
+        return draw
+
+    return {caption: drawn(key) for key, caption in captions.items() if key in parts}
+
+
+def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
+    """Of the small model, rad/s."""
+    if options.speed is not None:
+        return one_speed(options.speed, "--speed")
+    tables = [] if rotor is None else [support.speeds[0] for support in rotor.supports if support.speeds]
+    return max(tables, default=0.0)
 
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
     computed = ("rank", "place", "methods", "response", "stability")
     given = [name for name, value in vars(options).items() if value is not None and value is not False]
-    of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed", "keep_supports")
-    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "both_planes", "force")
+    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "state_space", "force")
     ranks = options.rank or options.place is not None
     wrong = (
-        (not has_rotor, of_rotor, "needs a rotor: give ROTOR instead of --compliance"),
+        (
+            not has_rotor,
+            (*computed, "candidates", "speed", "supports_apart", "damping", "keep_supports"),
+            "needs a rotor: give ROTOR instead of --compliance",
+        ),
         (has_rotor, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both"),
         (not ranks, ("masses", "candidates"), "does nothing without --rank or --place"),
+        (options.model is None, ("force",), "does nothing without --model"),
         (
             options.keep_supports,
             on_supports,
@@ -186,14 +285,18 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
             raise ValueError(f"{option_name(first)} {words}")
 
 
-def _forces(options: ReduceOptions) -> list[str | int]:
-    return [] if options.force is None else nodes(options.force, "--force")
-
-
-def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
+def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
     """The masses of a rotor, and what is asked for beside them."""
-    from rotorid.commands.reduce_result import ReducedRotor
-    from rotorid.reduction import check_free, held_nodes, held_rigidly, keep_supports
+    from rotorid.commands.reduce_result import small_of
+    from rotorid.reduction import (
+        check_free,
+        compare_methods,
+        compare_response,
+        compare_stability,
+        held_nodes,
+        held_rigidly,
+        keep_supports,
+    )
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
 
@@ -221,23 +324,28 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         speed=at,
         supports_apart=options.supports_apart,
         measured=None if data is None else (data.frequencies, data.shapes),
+        rows=options.rows,
+        nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
-        **how,
     )
-    tables = [support.speeds[0] for support in machine.supports if support.speeds]
-    reduced = ReducedRotor(
-        result=result,
-        placement=placement if options.rank else None,
-        damping=damping_ratios(options.damping),
-        speed=max(tables, default=0.0) if at is None else at,
-        both_planes=options.both_planes,
-        forces=[machine.node(node) for node in _forces(options)],
-        provenance=provenance(files, options),
-    )
+    parts: dict[str, Any] = {"": result}
+    if placement is not None and options.rank:
+        parts["placement"] = placement
+    if options.methods:
+        parts["methods"] = compare_methods(result)
+    stable = band(options.stability, "--stability")
+    small, ratios = None, _damping_ratios(options.damping)
     if options.keep_supports:
-        model = keep_supports(whole, places, result.masses.solution, modal_damping=reduced.damping)
-        reduced = dataclasses.replace(reduced, small=model, keeps_supports=True)
-    return _beside(reduced, machine, options)
+        small = keep_supports(whole, places, result.masses.solution, modal_damping=ratios)
+    elif options.response is not None or stable is not None or options.model or options.state_space or ratios:
+        small = small_of(result, ratios)
+    if options.response is not None and small is not None:
+        automatic = str(options.response) == "auto"
+        speeds = None if automatic else rising_speeds(options.response, "--response")
+        parts["response"] = compare_response(machine, small, speeds)
+    if stable is not None and small is not None:
+        parts["stability"] = compare_stability(machine, small, stable[1], lowest=stable[0])
+    return parts | ({} if small is None else {"small_model": small}), files
 
 
 def _places(
@@ -263,7 +371,6 @@ def _places(
             if options.candidates is None
             else nodes(options.candidates, "--candidates"),
             speed=speed,
-            normalise=options.normalise,
             rows=options.rows,
         )
     if options.nodes is not None:
@@ -286,7 +393,7 @@ def _places(
     )
 
 
-def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reduction, tuple[Path, ...]]:
+def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.reduction import reduce_measured
     from rotorid.tables.data.modes_table import read_compliance, read_modes
@@ -316,30 +423,11 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
         used,
         nodes=wanted,
         seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
+        rows=options.rows,
+        nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
-        **how,
     )
     return result, (Path(options.compliance), Path(options.measured))
-
-
-def _beside(reduced: ReducedRotor, rotor: Rotor, options: ReduceOptions) -> ReducedRotor:
-    """With other methods, response and stability as asked for."""
-    from rotorid.reduction import compare_methods, compare_response, compare_stability
-
-    beside: dict[str, Any] = {}
-    if options.methods:
-        beside["methods"] = compare_methods(reduced.result)
-    stable = band(options.stability, "--stability")
-    if reduced.damping or options.response is not None or stable is not None:
-        reduced = reduced.with_small()
-        assert reduced.small is not None
-        if options.response is not None:
-            automatic = str(options.response) == "auto"
-            speeds = None if automatic else rising_speeds(options.response, "--response")
-            beside["response"] = compare_response(rotor, reduced.small, speeds)
-        if stable is not None:
-            beside["stability"] = compare_stability(rotor, reduced.small, stable[1], lowest=stable[0])
-    return dataclasses.replace(reduced, **beside)
 
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:
@@ -379,7 +467,7 @@ def input_errors(
     return InputErrors(**stated) if stated else None
 
 
-def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
+def _damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
     """Read "1,0.5", in percent, as damping ratios."""
     if not isinstance(given, str):
         return given or ()

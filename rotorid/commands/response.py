@@ -12,9 +12,7 @@ from rotorid.base.json import cell
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.commands.input_checks import file_of
 from rotorid.commands.moving import moving
-from rotorid.commands.outcome import Outcome, command, log_rotor, phase, provenance
 from rotorid.commands.quantities import (
     Band,
     Sensor,
@@ -23,10 +21,11 @@ from rotorid.commands.quantities import (
     nodes,
     number,
     one_of,
-    one_speed,
     rising_speeds,
     sensors,
 )
+from rotorid.report.options import file_of
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY = 9.80665  # m/s²
 _AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
 """Relative distances from a critical speed of a small model at which its response is computed."""
-View = Literal["bode", "polar", "orbits", "shape"]
+View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
 _KEYS = (
     *("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor"),
@@ -61,17 +60,14 @@ class ResponseOptions:
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
     view
-        What --plot draws; shape: the deflected rotor.
-    at : SPEED
-        Speed of the orbits or of the shape that are drawn, 5800rpm; default: at the largest reading.
+        What --plot draws; orbits: where the largest reading is.
     """
 
     speeds: Speeds
     sensors: str | Sequence[Sensor] | None = None
     operating: Band | None = None
     view: View = "bode"
-    at: str | float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Output": "view at"}
+    panels: ClassVar[Mapping[str, str]] = {"Output": "view"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -230,7 +226,7 @@ class Vibration:
             columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
         return Table("amplitude and phase (lead)", tuple(columns))
 
-    def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
+    def pictures(self, view: View) -> dict[str, Callable[[], Figure]]:
         """What draws amplitude and phase over speed, polar curves, or orbits."""
         from fem.plots import bode_figure, orbits_figure, polar_figure
 
@@ -242,35 +238,9 @@ class Vibration:
                 lambda: bode_figure(finer, places, self.peaks, operating=self.operating),
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
-            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
-            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
+            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._loudest())),
         }
-        others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
-        return dict(draw[name] for name in (view, *others))
-
-    def shape_figure(self, at: int | None) -> Figure:
-        """The deflected rotor at a speed."""
-        from fem.plots import draw_deflected_shape
-        from rotorid.base.plot_style import on_figure
-
-        shape = self._deflected(at)
-        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
-
-    def shape(self, at: int | None) -> tuple[Table, ...]:
-        """The orbit of each node at a speed; nothing without a steady response."""
-        if not self.finer.steady.any():
-            return ()
-        from rotorid.base.rpm import phase_deg
-
-        shape = self._deflected(at)
-        columns = (
-            Column("node", shape.nodes),
-            Column("position, m", shape.rotor.positions, "{:.4f}".format),
-            Column("µm peak", 1e6 * shape.major[0], figures),
-            Column("minor axis", 1e6 * shape.minor[0], figures),
-            Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
-        )
-        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
+        return dict(draw[name] for name in (view, "bode"))
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
@@ -298,13 +268,6 @@ class Vibration:
         return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
 
     @property
-    def drawn(self) -> bool:
-        """Whether it is a rotor's, not a small model's."""
-        from fem import Rotor
-
-        return isinstance(self.response.rotor, Rotor)
-
-    @property
     def labels(self) -> list[str]:
         """Names of the sensors."""
         from fem import label
@@ -325,19 +288,13 @@ class Vibration:
             (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
         ]
 
-    def _deflected(self, at: int | None) -> Response:
-        """The response of all nodes at a speed."""
-        import fem
-
-        finer = self.finer
-        return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
-
-    def _speed_of(self, at: int | None) -> int:
+    def _loudest(self) -> int:
+        """Which of the speeds has the largest reading."""
         steady = self.finer.steady
         if not steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
         sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        return int((sizes * steady).argmax()) if at is None else at
+        return int((sizes * steady).argmax())
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
@@ -388,7 +345,6 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     import numpy as np
 
     import fem
-    from rotorid.commands.cross_coupling import mid_span
 
     head, _, planes = given.partition("@")
     times = number(head.partition(":")[2] or "1")
@@ -400,7 +356,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
     if not planes:
         total = sum(loads[node] for node in journals)
-        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
+        return {_mid_span(rotor): times * fem.api_unbalance(total, highest)}
     mounted: dict[int, complex] = {}
     for plane in planes.split(","):
         (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
@@ -410,6 +366,16 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
         load = loads[journals[int(np.argmin(apart))]]
         mounted[node] = sign * times * fem.api_unbalance(load, highest)
     return mounted
+
+
+def _mid_span(rotor: Rotor) -> int:
+    """The node next to the middle between the outer bearings."""
+    import numpy as np
+
+    ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
+    ends = ends or [rotor.positions[-1]]
+    middle = (min(ends) + max(ends)) / 2 if ends[1:] else ends[0] / 2
+    return int(np.argmin(np.abs(rotor.positions - middle))) + 1
 
 
 @command
@@ -443,7 +409,6 @@ def response(
     """
     import fem
     from rotorid.commands.operating_range import critical_peaks
-    from rotorid.report.rotor_description import unbalance_table
     from rotorid.tables import read_unbalance
 
     source = moving(rotor)
@@ -471,8 +436,6 @@ def response(
     if isinstance(model, fem.Rotor):
         coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
     else:
-        if options.view == "shape":
-            raise ValueError("--view shape draws a rotor; a small model has nodes alone")
         by_node = {model.node(node): amount for node, amount in unbalance.items()}
         coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
     result = Vibration(
@@ -483,9 +446,8 @@ def response(
         peaks=peaks,
         operating=operating,
     )
-    at = None if options.at is None else _nearest(finer, options.at)
     chief, every = critical_peaks(result.labels, peaks), result.named()
-    mounted = unbalance_table(model, coarse.unbalance)
+    mounted = _mounted(model, coarse.unbalance)
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
@@ -494,7 +456,6 @@ def response(
             mounted,
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *(result.shape(at) if options.view == "shape" else ()),
         ),
         behind=(result.readings(),),
         file=result.file(),
@@ -503,16 +464,8 @@ def response(
         notes=tuple(
             f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in every if peak.note
         ),
-        pictures=result.pictures(options.view, at),
+        pictures=result.pictures(options.view),
         title="Unbalance response",
-        rotor={
-            "rotor": model,
-            "planes": sorted(coarse.unbalance),
-            "sensors": places,
-            "meaning": "unbalance",
-        }
-        if result.drawn
-        else {},
         provenance=provenance(files, options, **asked),
     )
 
@@ -536,10 +489,8 @@ def _of_rotor(
 
     kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
     kept |= dict.fromkeys(support.node for support in model.supports)
-    with phase(f"response at {counted(len(speeds), 'speed')}"):
-        coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    with phase("peaks"):
-        finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
+    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
 
     def amplitudes(other: Rotor) -> FloatArray:
         new = other is not model
@@ -547,7 +498,6 @@ def _of_rotor(
         return np.abs(again.readings(places))
 
     std, doubts = error_band(model, "the amplitudes", amplitudes)
-    log_rotor(model, speeds=len(speeds))
     return coarse, replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
 
 
@@ -586,6 +536,26 @@ def _of_small_model(
     return coarse, finer, peaks, None
 
 
+def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
+    """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
+    from fem import Rotor
+    from rotorid.base.rpm import phase_deg
+
+    each, along = sorted(unbalance.items()), list[Column]()
+    names = [str(node) for node, _ in each]
+    if isinstance(rotor, Rotor):
+        stations = [[name for name, at in rotor.stations.items() if at == node] for node, _ in each]
+        names = [f"{node} {', '.join(known)}".strip() for node, known in zip(names, stations, strict=True)]
+        along = [Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format)]
+    columns = (
+        Column("node", names),
+        *along,
+        Column("unbalance, g·mm", [1e6 * abs(u) for _, u in each], "{:.6g}".format),
+        Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in each], "{:.6g}".format),
+    )
+    return Table("what is mounted", columns)
+
+
 def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
     """Where to read the vibration."""
     if given is not None:
@@ -596,15 +566,3 @@ def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> 
         return rotor.nodes
     held = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]
-
-
-def _nearest(response: Response, at: str | float) -> int:
-    """The speed nearest to one asked for, which must lie among them."""
-    wanted = one_speed(at, "--at")
-    low, high = response.speeds[0], response.speeds[-1]
-    if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
-        raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
-    k = int(abs(response.speeds - wanted).argmin())
-    if not response.steady[k]:
-        raise ValueError(f"--at {at}: there is no steady response, so no orbit to draw; take another speed")
-    return k

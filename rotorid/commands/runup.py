@@ -12,12 +12,11 @@ from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.commands.input_checks import file_of
-from rotorid.commands.modes import NO_MODES, ModesOutcome, bands
-from rotorid.commands.outcome import USUAL, command, provenance
-from rotorid.commands.outcome import phase as timed
+from rotorid.commands.modes import NO_MODES, bands
 from rotorid.commands.quantities import Band, Names, Speeds, names, number, one_of, one_speed
 from rotorid.commands.quantities import speeds as read_speeds
+from rotorid.report.options import file_of
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,11 +24,8 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.identify.modes_result import FittedModes, Readings
 
-FEW_TURNS = 10.0
-"""In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""
 TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]
-View = Literal["bode", "polar"]
 
 
 @dataclass(frozen=True)
@@ -51,16 +47,13 @@ class RunUpOptions:
     acceleration : A
         Where the table has no times: 50rpm/s, or -50rpm/s down; 0: the speed is held for each vector.
     bands : LIST
-        Around each critical speed, one mode in each and nothing else counts: 700:1200,2000:3000; default:
-        around each peak.
+        Around each critical speed, one mode in each: 700:1200,2000:3000; default: around each peak.
     slow_roll : SPEED|FILE
         Run-out is the mean at or below this speed, or a runs table of one run; default: fit, what no speed
         changes.
     speeds : SPEEDS
         Vectors of every run when it passes these, 900,1500 or 600:3000:300; --output is then their runs
         table, for `balance`, instead of the modes.
-    view
-        What --plot draws.
     """
 
     phase: Phase | None = None
@@ -72,10 +65,8 @@ class RunUpOptions:
     bands: str | Sequence[Band] | None = None
     slow_roll: str | float | Path = "fit"
     speeds: Speeds | None = None
-    view: View = "bode"
     panels: ClassVar[Mapping[str, str]] = {
         "Vectors at some speeds, to balance with": "speeds",
-        "Output": "view",
     }
     to: ClassVar[Sequence[str]] = USUAL
 
@@ -90,7 +81,7 @@ class SlowRoll(NamedTuple):
 
 
 @command
-def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = None) -> ModesOutcome:
+def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = None) -> Outcome:
     """Critical speeds and damping of a run-up, its acceleration in the model, with ±.
 
     The table of modes (--output) is for `reduce --measured` and `calibrate`, if sensors are named as nodes or
@@ -114,7 +105,6 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     from rotorid.identify.modes import fit_sweep
 
     options = options or RunUpOptions()
-    one_of(options.view, "--view", get_args(View))
     files: list[Path] = []
     notes = []
     if isinstance(data, Path | str):
@@ -129,17 +119,16 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     rate = _rate(options.acceleration)
     sweeps = [_timed(sweep, rate) for sweep in sweeps]
     modes, why = None, ""
-    with timed("modes"):
-        try:
-            modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
-        except ValueError as error:
-            why = str(error)
+    try:
+        modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
+    except ValueError as error:
+        why = str(error)
     turned = () if modes is None else _turned(sweeps[0], modes)
     fit = None if modes is None or modes.undetermined or turned else modes
     roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
     passed = None
     if options.speeds is not None:
-        passed = _passed(sweeps, options, fit, rate == 0.0, around)
+        passed = _passed(sweeps, options, fit, rate == 0.0)
     acceleration, time = 0.0 if rate == 0.0 else None, sweeps[0].time
     if acceleration is None and time is not None and len(time) > 1:
         acceleration = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
@@ -147,7 +136,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     steady = None if modes is None else modes.steady
     why = why or next(iter(turned or (() if modes is None else modes.undetermined)), "")
     warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.warnings)
-    warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
+    warnings = (*warnings, *roll.warnings)
     estimate = None if modes is None else modes.fit.estimate
     document = {
         "run": sweeps[0].run,
@@ -162,17 +151,16 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
         "warnings": warnings,
     }
     of_modes = fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES
-    return ModesOutcome(
+    return Outcome(
         result=modes,
         sentences=(_sentence(sweeps[0].run, fit),),
         tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweeps[0])] if slow else [])),
         more=(passed,) if passed else (),
         file=passed or of_modes,
-        lacking="" if passed else why,
+        lacking=f"there is no table of modes: {why}" if why and not passed else "",
+        title="Run-up",
         keys=dict(plain(document)),
-        pictures={
-            "Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll, options.view)
-        },
+        pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll)},
         warnings=warnings,
         notes=(f"slow roll {roll.words}", *_course(acceleration), *notes, *(fit.notes if fit else ())),
         provenance=provenance(files, options),
@@ -259,24 +247,6 @@ def _turned(sweep: Readings, modes: FittedModes) -> tuple[str, ...]:
     return (f"phases are read as {sweep.labels.phase}s; modes explain them as {sign}s (--phase {sign})",)
 
 
-def _hasty(fit: FittedModes) -> list[str]:
-    """Say which modes are passed so fast that vectors flatten them: their ± may hold in half of the cases."""
-    import numpy as np
-
-    from rotorid.identify.answers import SweptAnswers
-
-    if not isinstance(fit.answers, SweptAnswers):
-        return []
-    omega, zeta = fit.values[:2]
-    rate = np.abs(fit.answers.speed.derivative()(fit.answers.at(omega).time))
-    turns = zeta * omega**2 / np.pi / np.maximum(rate, 1e-12)  # 2ζω / rate seconds of ω / 2π turns
-    return [
-        f"mode {mode + 1} is passed within {turns[mode]:.2g} turns of its half-power band: vectors, means "
-        "over turns, flatten it, and ± of its damping are too small; let the speed change more slowly"
-        for mode in np.flatnonzero(turns < FEW_TURNS)
-    ]
-
-
 def _slow_roll(
     sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
 ) -> SlowRoll:
@@ -305,7 +275,6 @@ def _passed(
     options: RunUpOptions,
     fit: FittedModes | None,
     steady: bool,
-    around: Sequence[tuple[float, float]],
 ) -> Table:
     """The runs table of every run at the speeds asked for, the slow roll not taken off."""
     from contextlib import suppress
@@ -318,8 +287,8 @@ def _passed(
     speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))
     parts = []
     for k, sweep in enumerate(sweeps):
-        modes = None if k or around else fit  # with bands they count only there
-        if k and not around:
+        modes = None if k else fit
+        if k:
             with suppress(ValueError):
                 other = fit_sweep(sweep, steady=steady)
                 modes = None if other.undetermined else other
@@ -416,11 +385,11 @@ def _course(rate: float | None) -> list[str]:
     ] * bool(rate)
 
 
-def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll, view: View) -> Figure:
-    """Amplitude and phase over speed, or vectors as paths in the plane, less the slow roll."""
+def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll) -> Figure:
+    """Amplitude and phase over speed, less the slow roll."""
     import numpy as np
 
-    from rotorid.identify.plots import bode_plot, polar_plot
+    from rotorid.identify.plots import bode_plot
 
     vectors = np.zeros(len(sweeps[0].sensors), dtype=complex) if roll.vectors is None else roll.vectors
-    return polar_plot(sweeps, vectors) if view == "polar" else bode_plot(sweeps, vectors, fit)
+    return bode_plot(sweeps, vectors, fit)

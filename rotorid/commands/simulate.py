@@ -13,8 +13,6 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
 from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.fit import Values, sigmas
-from rotorid.commands.input_checks import file_of, refuse
-from rotorid.commands.outcome import Outcome, command, phase, provenance
 from rotorid.commands.quantities import (
     Speeds,
     Times,
@@ -27,6 +25,8 @@ from rotorid.commands.quantities import (
     speeds,
     times,
 )
+from rotorid.report.options import file_of, refuse
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray
@@ -138,9 +138,8 @@ def simulate(
     if options.digits is not None and not 1 <= options.digits <= 15:
         raise ValueError(f"--digits takes a number from 1 to 15, not {options.digits}")
     files = [Path(given) for given in (model, options.input_record) if isinstance(given, Path | str)]
-    with phase("simulation"):
-        solve = _amplitudes if way in ("frequencies", "modes") else _record
-        values, told, about, notes = solve(model, options, noisy)
+    solve = _amplitudes if way in ("frequencies", "modes") else _record
+    values, told, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
     columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in told)

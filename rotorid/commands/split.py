@@ -1,17 +1,17 @@
-"""`split`: one given weight in holes, at two free angles, as material taken away, or rounded to a scale."""
+"""`split`: one given weight in holes, as two fixed weights at free angles, or drilled away."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.tables import Column, Table
-from rotorid.commands.input_checks import changed, refuse
 from rotorid.commands.option_quantities import size, vectors, weight, weights
-from rotorid.commands.outcome import USUAL, Outcome, command, provenance
-from rotorid.commands.quantities import degrees, option_name, pairs
+from rotorid.commands.quantities import degrees, pairs
+from rotorid.report.options import changed, refuse
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,32 +20,17 @@ if TYPE_CHECKING:
     from balancing.one_weight import OneWeight
     from rotorid.commands.option_quantities import Amount, Vector
 
-_WAYS = ("holes", "two", "drill", "grind")
-_HOLES = (
-    "first_hole",
-    "pieces",
-    "stock",
-    "per_hole",
-    "most_pieces",
-    "good_enough",
-    "taken",
-    "max_mass",
-)
-_BELONGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(_HOLES, ("holes",)),
-    "density": ("drill",),
-    "step": ("holes", ""),
-    "angle_step": ("",),
-}
-"""Options that mean something only with one of these ways ("": none of them, one weight)."""
+_WAYS = ("holes", "two", "drill")
+_OF_HOLES = ("first_hole", "pieces", "per_hole", "taken")
 _APART = 1e-3
 """Degrees between holes that count as one."""
-_GOOD_ENOUGH = 20.0
+_GOOD_ENOUGH = 0.2
+"""The fewest pieces whose error is at most this, or at most 1.2 times the least."""
 
 
 @dataclass(frozen=True)
 class SplitOptions:
-    """Options of `split`: angles in degrees, `good_enough` in percent, `density` in kg/m³.
+    """Options of `split`: angles in degrees.
 
     Attributes
     ----------
@@ -55,35 +40,18 @@ class SplitOptions:
         Angle of hole 1 of equally spaced ones; default: 0.
     pieces : 10g,20g
         Available pieces; without them amounts are free.
-    stock : 8,4
-        How many there are of each of the pieces.
-    per_hole : N
+    per_hole : N from 1
         Pieces in one hole, at most; default: 1.
-    most_pieces : N
-        Pieces altogether, at most.
-    good_enough : PERCENT
-        The fewest pieces whose error is at most this, or at most 1.2 times the least; 0 for the nearest;
-        default: 20.
     taken : HOLE:WEIGHT,…
         Holes in which something is mounted already, such as 3:10g,7:20g.
-    max_mass : WEIGHT
-        Largest weight of the plane, as a vector sum.
-    step : 0.5g
-        Smallest step of free amounts in holes, or of the scale for one weight.
-    angle_step : DEG
-        Step of the angle for one weight.
     mounted : VECTOR
         What is mounted already and counts towards VECTOR, such as 10g@30+20g@200 (trim).
     two : 20g,30g
         Angles of two fixed weights instead of holes.
     drill : DIAMETER
-        Drill one radial hole opposite to VECTOR instead, such as 8mm.
-    grind
-        Grind it off opposite to VECTOR instead.
+        Drill one radial hole in steel opposite to VECTOR instead, such as 8mm.
     radius : LENGTH
         Where the masses stand; the surface that is drilled.
-    density : KG/M3
-        Of the material drilled; default: 7850.
     angles : WAY
         "with rotation" or "against rotation", of all angles.
     """
@@ -91,33 +59,24 @@ class SplitOptions:
     holes: str | int | Sequence[float] | None = None
     first_hole: float | None = None
     pieces: str | Sequence[float] | None = None
-    stock: str | Sequence[int] | None = None
     per_hole: int | None = None
-    most_pieces: int | None = None
-    good_enough: float | None = None
     taken: str | Mapping[str, float] | None = None
-    max_mass: Amount | None = None
-    step: Amount | None = None
-    angle_step: float | None = None
     mounted: Vector | None = None
     two: str | Sequence[float] | None = None
     drill: Amount | None = None
-    grind: bool = False
     radius: Amount | None = None
-    density: float | None = None
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "mounted radius angles",
-        "Holes": "holes pieces stock per_hole first_hole taken most_pieces good_enough",
-        "Limits and steps": "max_mass step angle_step",
-        "Instead of holes": "two drill density grind",
+        "Holes": "holes pieces per_hole first_hole taken",
+        "Instead of holes": "two drill",
     }
     to: ClassVar[Sequence[str]] = USUAL
 
 
 @command
 def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
-    """Mount one given weight: in holes, at two angles, or by drilling or grinding.
+    """Mount one given weight: in holes, as two weights, or by drilling.
 
     Example: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
 
@@ -142,30 +101,27 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
 
     options = options or SplitOptions()
     labels, each = vectors(vector, options.angles)
-    way = _way(options, single=len(each) == 1)
+    ways = [name for name in _WAYS if name in changed(options)]
+    if len(ways) != 1:
+        raise ValueError("say how to mount the weight, in one way: --holes, --two or --drill")
+    if ways != ["holes"]:
+        refuse(options, _OF_HOLES, "means something only with --holes")
     if options.mounted is not None:
         other, there = vectors(options.mounted, options.angles, "--mounted")
         if labels.unbalances != other.unbalances:
             raise ValueError("--mounted: write it as VECTOR is written, both masses or both unbalances")
         each = [*each, *(-weight for weight in there)]
     target = combine(each)
-    if target == 0 and way:
+    if target == 0:
         raise ValueError("there is nothing to mount: the weight is 0")
     radius = None if options.radius is None else size(options.radius, "--radius")
-    how: Callable[[_Wanted], OneWeight] = {
-        "holes": _in_holes,
-        "two": _at_two_angles,
-        "drill": _removed,
-        "grind": _removed,
-        "": _rounded,
-    }[way]
-    placed = how(_Wanted(target, labels, radius, options))
+    how = {"holes": _in_holes, "two": _at_two_angles, "drill": _drilled}[ways[0]]
+    placed = how(target, labels, radius, options)
     keys = placed.to_dict(labels)
     rows, below = _rows(keys), placed.lines(labels) if isinstance(placed, Split) else []
     return Outcome(
         result=placed,
         sentences=(placed.sentence(labels), *below),
-        tables=(),
         file=Table("weight", tuple(Column(name, [row[name] for row in rows]) for name in rows[0])),
         keys=keys,
         pictures={"": lambda: _figure(placed, labels, target)},
@@ -173,96 +129,37 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     )
 
 
-class _Wanted(NamedTuple):
-    """A weight, how it is printed, and where it stands (m; None: nobody says)."""
-
-    target: complex
-    labels: Labels
-    radius: float | None
-    options: SplitOptions
-
-
-def _way(options: SplitOptions, *, single: bool) -> str:
-    """The one way to mount the weight ("": as one weight); no option may mean nothing with it."""
-    given = changed(options)
-    ways = [name for name in _WAYS if name in given]
-    if len(ways) > 1:
-        raise ValueError(
-            f"{' and '.join(map(option_name, ways))} are different ways to mount a weight: give one of them"
-        )
-    if not ways and single and given.keys().isdisjoint(("mounted", "step", "angle_step")):
-        raise ValueError(
-            "say how to mount the weight: --holes, --two, --drill or --grind "
-            "(or --step, to round it to a scale)"
-        )
-    way = ways[0] if ways else ""
-    for name, belongs in _BELONGS.items():
-        if way not in belongs:
-            needed = " or ".join(option_name(one) for one in belongs if one)
-            how = f"only with {needed}" if needed else f"not with {option_name(way)}"
-            refuse(options, (name,), f"means something {how}")
-    return way
-
-
-def _in_holes(wanted: _Wanted) -> OneWeight:
+def _in_holes(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
     from balancing.one_weight import split as in_holes
 
-    options = wanted.options
-    good_enough = _GOOD_ENOUGH if options.good_enough is None else options.good_enough
-    if not 0 <= good_enough <= 100:
-        raise ValueError(f"--good-enough: {good_enough:g} is no error from 0 to 100 percent")
-    return in_holes(
-        wanted.target, _holes(wanted), most_pieces=options.most_pieces, good_enough=good_enough / 100
-    )
+    return in_holes(target, _holes(labels, radius, options), good_enough=_GOOD_ENOUGH)
 
 
-def _at_two_angles(wanted: _Wanted) -> OneWeight:
+def _at_two_angles(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
     from balancing.one_weight import two_positions
 
-    labels, target, given = wanted.labels, abs(wanted.target), wanted.options.two
-    assert given is not None
-    masses = weights(given, "--two", labels, wanted.radius)
+    masses = weights(options.two or "", "--two", labels, radius)
     if len(masses) != 2:
-        raise ValueError(f"--two {given!r}: give two weights, such as 20g,30g")
+        raise ValueError(f"--two {options.two!r}: give two weights, such as 20g,30g")
     low, high = abs(masses[0] - masses[1]), sum(masses)
-    if not low * (1 - 1e-12) <= target <= high * (1 + 1e-12):
-        words = [labels.weight_words(weight) for weight in (low, high, target)]
+    if not low * (1 - 1e-12) <= abs(target) <= high * (1 + 1e-12):
+        words = [labels.weight_words(weight) for weight in (low, high, abs(target))]
         raise ValueError(
             f"--two: these together make from {words[0]} to {words[1]}, not {words[2]}; use other weights"
         )
-    return two_positions(wanted.target, *masses)
+    return two_positions(target, *masses)
 
 
-def _removed(wanted: _Wanted) -> OneWeight:
-    from balancing.one_weight import STEEL, drill, grind
+def _drilled(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
+    from balancing.one_weight import drill
 
-    options, radius = wanted.options, wanted.radius
     if radius is None:
-        way = "--grind" if options.drill is None else "--drill"
-        raise ValueError(f"{way} needs --radius, such as --radius 100mm")
-    unbalance = wanted.target * (1.0 if wanted.labels.unbalances else radius)
-    if options.drill is None:
-        return grind(unbalance, radius)
-    diameter = size(options.drill, "--drill", "8mm")
-    return drill(unbalance, radius, diameter, STEEL if options.density is None else options.density)
+        raise ValueError("--drill needs --radius, such as --radius 100mm")
+    unbalance = target * (1.0 if labels.unbalances else radius)
+    return drill(unbalance, radius, size(options.drill or "", "--drill", "8mm"))
 
 
-def _rounded(wanted: _Wanted) -> OneWeight:
-    import numpy as np
-
-    from balancing.one_weight import rounded
-
-    options, angle = wanted.options, wanted.options.angle_step or 0.0
-    if not 0 <= angle <= 360:
-        raise ValueError(f"--angle-step: {angle:g} is no step of an angle, 0 to 360 degrees")
-    step = 0.0
-    if options.step is not None:
-        step = weight(options.step, "--step", wanted.labels, wanted.radius, "0.5g")
-    # steps count from the job's 0° either way, so the sign of the angle does not matter
-    return rounded(wanted.target, step, float(np.radians(angle)))
-
-
-def _holes(wanted: _Wanted) -> Holes:
+def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes:
     """The holes of the plane.
 
     Raises
@@ -274,7 +171,6 @@ def _holes(wanted: _Wanted) -> Holes:
 
     from balancing import equal_holes, from_list
 
-    _, labels, radius, options = wanted
     given = options.holes
     if given is None or isinstance(given, int) or (isinstance(given, str) and "," not in given):
         count = str(given).strip()
@@ -286,27 +182,19 @@ def _holes(wanted: _Wanted) -> Holes:
         counted = equal_holes(int(count), np.radians(degrees(options.first_hole or 0.0, "--first-hole")))
     else:
         counted = np.radians(_listed(given))
-    angles = labels.with_rotation(counted)
-    if options.pieces is not None and options.step is not None:
-        raise ValueError("give either --pieces or a --step of free amounts, not both")
-    mounted = np.zeros(len(angles))
-    numbers = {str(h): h - 1 for h in range(1, len(angles) + 1)}
+    mounted = np.zeros(len(counted))
     taken: dict[str, str | float] = pairs(
         options.taken or {}, "--taken", lambda _, text: text, "3:10g", sign=":"
     )
     for name, amount in taken.items():
-        if name not in numbers:
-            raise ValueError(f"--taken: {name!r} is not the number of a hole, 1 to {len(angles)}")
-        mounted[numbers[name]] = weight(amount, "--taken", labels, radius, "3:10g")
-    most, step = options.max_mass, options.step
+        if name not in map(str, range(1, len(mounted) + 1)):
+            raise ValueError(f"--taken: {name!r} is not the number of a hole, 1 to {len(mounted)}")
+        mounted[int(name) - 1] = weight(amount, "--taken", labels, radius, "3:10g")
     return from_list(
-        angles,
+        labels.with_rotation(counted),
         () if options.pieces is None else weights(options.pieces, "--pieces", labels, radius),
-        per_hole=1 if options.per_hole is None else options.per_hole,
-        step=0.0 if step is None else weight(step, "--step", labels, radius, "0.5g"),
+        per_hole=options.per_hole or 1,
         taken=mounted,
-        stock=None if options.stock is None else _whole(options.stock),
-        max_weight=np.inf if most is None else weight(most, "--max-mass", labels, radius),
     )
 
 
@@ -319,15 +207,6 @@ def _listed(given: str | Sequence[float]) -> list[float]:
             f"--holes {given!r}: list each hole once, in the order of their angles, within one turn"
         )
     return angles
-
-
-def _whole(given: str | Sequence[int]) -> list[int]:
-    if not isinstance(given, str):
-        return list(given)
-    parts = [part.strip() for part in given.split(",")]
-    if not all(part.isascii() and part.isdecimal() and len(part) < 10 for part in parts):
-        raise ValueError(f"--stock {given!r}: give a whole number for each of the pieces, such as 8,4")
-    return [int(part) for part in parts]
 
 
 def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -344,11 +223,8 @@ def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             for k, solution in enumerate(found["solutions"], start=1)
             for angle, size in zip(solution["angles_deg"], found["masses"], strict=True)
         ]
-    if method in ("drilling", "grinding"):
-        grams, radius = 1e3 * found["mass_kg"], 1e3 * found["radius_m"]
-        depth = {"depth_mm": 1e3 * found["depth_m"]} if method == "drilling" else {}
-        return [{"angle_deg": found["angle_deg"], "mass_g": grams, "radius_mm": radius, **depth}]
-    return [{"angle_deg": found["weight"]["angle_deg"], mass: found["weight"]["mass"]}]
+    grams, radius, depth = 1e3 * found["mass_kg"], 1e3 * found["radius_m"], 1e3 * found["depth_m"]
+    return [{"angle_deg": found["angle_deg"], "mass_g": grams, "radius_mm": radius, "depth_mm": depth}]
 
 
 def _pieces(row: Mapping[str, Any]) -> str:
@@ -357,14 +233,11 @@ def _pieces(row: Mapping[str, Any]) -> str:
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:
     """A disc for each solution."""
-    from balancing.one_weight import Removal, Rounded, Split, TwoPositions
+    from balancing.one_weight import Split, TwoPositions
     from balancing.plots import weight_figure
 
     if isinstance(placed, Split):
         return weight_figure(labels, target, holes=placed.holes, mounting=placed.mounting)
     if isinstance(placed, TwoPositions):
         return weight_figure(labels, target, *map(tuple, placed.weights()))
-    if isinstance(placed, Rounded):
-        return weight_figure(labels, target, (placed.weight,) if placed.weight else ())
-    assert isinstance(placed, Removal)
     return weight_figure(labels, target, (target,), remove=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
-from rotorid.commands.outcome import USUAL, Found, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     from balancing import Tolerance
@@ -44,7 +44,7 @@ class ToleranceOptions:
 
 
 @command
-def tolerance(options: ToleranceOptions) -> Found:
+def tolerance(options: ToleranceOptions) -> Outcome:
     """Permissible residual unbalance of a rigid rotor (ISO 21940-11), plane by plane.
 
     Positions count along the shaft from any point. Two planes without positions share it in equal parts.
@@ -64,7 +64,12 @@ def tolerance(options: ToleranceOptions) -> Found:
     ValueError
         For an option that cannot be.
     """
-    return Found(found=permissible(options), provenance=provenance((), options))
+    from balancing.plots import draw_tolerance
+    from rotorid.base.plot_style import on_figure
+
+    result = permissible(options)
+    pictures = {"Permissible unbalance.": lambda: on_figure(lambda ax: draw_tolerance(result, ax))}
+    return outcome_of(result, provenance((), options), pictures=pictures, title="Tolerance")
 
 
 def permissible(options: ToleranceOptions, names: tuple[str, str] = ("--mass", "--speed")) -> Tolerance:

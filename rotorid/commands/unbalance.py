@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.coefficients import computed
-from rotorid.commands.input_checks import check_choices, job_source, refuse
-from rotorid.commands.outcome import USUAL, Found, command, provenance
 from rotorid.commands.quantities import Nodes, nodes
+from rotorid.report.options import job_source
+from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Unbalance
     from fem import Rotor
-    from rotorid.base.registry import Method
     from rotorid.tables import Job
-
-
-def choices() -> dict[str, Sequence[Method[Any]]]:
-    """What `method` chooses from."""
-    from balancing import UNBALANCE_METHODS
-
-    return {"method": UNBALANCE_METHODS}
 
 
 @dataclass(frozen=True)
@@ -36,28 +28,10 @@ class UnbalanceOptions:
     ----------
     stations : LIST
         Nodes or stations where unbalance may be: 6,9,12.
-    method : METHOD
-        How the unbalance follows from the readings.
-    ridge : STRENGTH from 0
-        For ridge; default: from the errors.
     """
 
     stations: Nodes
-    method: str = "minimum-norm"
-    ridge: float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "method ridge"}
     to: ClassVar[Sequence[str]] = USUAL
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class UnbalanceOfRun(Found):
-    """The unbalance, and the rotor that it stands in."""
-
-    rotor: Rotor
-
-    def figure(self) -> Figure:
-        """The unbalances over the rotor."""
-        return unbalance_figure(self.found, self.rotor)
 
 
 def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
@@ -98,7 +72,7 @@ def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
 
 
 @command
-def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceOfRun:
+def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Outcome:
     """Unbalance along a rotor model, from the readings of one run, without trial weights.
 
     The model counts as exact: ± are those of the readings.
@@ -119,16 +93,15 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceOfRu
     """
     from balancing import unbalance_of_run
 
-    check_choices(options, choices())
-    if options.method != "ridge":
-        refuse(options, ("ridge",), "is an option of --method ridge")
     read = job_source(job)
-    if read.rotor is None:
+    rotor = read.rotor
+    if rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
     asked = nodes(options.stations, "--stations")
-    places = {str(node): read.rotor.node(node) for node in asked}
+    places = {str(node): rotor.node(node) for node in asked}
     if len(set(places.values())) < len(asked):
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
     influence = computed(read, 0.0, places)
-    result = unbalance_of_run(influence, read.trials, method=options.method, ridge=options.ridge)
-    return UnbalanceOfRun(found=result, rotor=read.rotor, provenance=provenance(read.files, options))
+    result = unbalance_of_run(influence, read.trials)
+    pictures = {"Unbalance along the rotor.": lambda: unbalance_figure(result, rotor)}
+    return outcome_of(result, provenance(read.files, options), pictures=pictures, title="Unbalance")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotorid.base.json import plain
 from rotorid.base.result import Column as Told
@@ -13,14 +13,13 @@ from rotorid.base.result import rows
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, listing
-from rotorid.commands.outcome import USUAL, Outcome, command, phase, provenance
-from rotorid.commands.quantities import Names, Speeds, names, one_of, speeds
+from rotorid.commands.quantities import Names, Speeds, names, speeds
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
     from rotorid.waveforms.vectors import Vectors
 
 Phase = Literal["lead", "lag"]
-Edge = Literal["leading", "trailing", "rising", "falling", "centre"]
 
 
 @dataclass(frozen=True)
@@ -36,13 +35,8 @@ class VectorsOptions:
     unit : UNIT
         Of the numbers in the records, peak values: um, mm_s, g, V; where neither a channel's name nor the
         waveforms file says.
-    amplitude : UNIT
-        Of the vectors: um_pp, mm_s_rms; default: the sensors'. A displacement of an accelerometer is
-        integrated.
     pulses : N
         Of the tacho a turn; default: 1.
-    edge
-        What of a mark is angle 0; default: leading.
     rate : HZ
         Samples a second, where the records do not say.
     phase
@@ -57,16 +51,13 @@ class VectorsOptions:
     tacho: str | None = None
     sensors: Names | None = None
     unit: str | None = None
-    amplitude: str | None = None
     pulses: int | None = None
-    edge: Edge | None = None
     rate: float | None = None
     phase: Phase | None = None
     orders: str | Sequence[int] | None = None
     speeds: Speeds | None = None
     panels: ClassVar[Mapping[str, str]] = {
-        "Input": "tacho sensors unit amplitude phase",
-        "Tacho": "pulses edge rate",
+        "Input": "tacho sensors unit phase pulses rate",
         "Vectors": "orders speeds",
     }
     to: ClassVar[Sequence[str]] = USUAL
@@ -97,24 +88,18 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     from rotorid.waveforms.plots import figure_tacho
 
     options = options or VectorsOptions()
-    if options.edge is not None:
-        one_of(options.edge, "--edge", get_args(Edge))
     given = WaveformWishes(
         tacho=options.tacho,
         sensors=names(options.sensors),
         unit=options.unit,
-        amplitude=options.amplitude,
         pulses=options.pulses,
-        edge=options.edge,
         phase=options.phase,
-        orders=_orders(options.orders),
         rate=options.rate,
+        orders=_orders(options.orders),
         speeds=None if options.speeds is None else speeds(options.speeds),
     )
-    with phase("reading"):
-        waveforms = read_waveforms([Path(record) for record in records], given)
-    with phase("vectors"):
-        each = find_each(waveforms)
+    waveforms = read_waveforms([Path(record) for record in records], given)
+    each = find_each(waveforms)
     columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
     many, first = len(each) > 1, waveforms.records[0]
@@ -159,6 +144,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         keys=dict(plain(document)),
         pictures={"The tacho of the first record.": lambda: figure_tacho(signal, first.rate, tachos[0])},
         warnings=tuple(words),
+        title="Vectors",
         provenance=provenance(waveforms.files, options),
     )
 

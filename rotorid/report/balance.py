@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.rpm import RPM
-from rotorid.base.text import sentence
-from rotorid.files import units
+from rotorid.base.text import capital, sentence
 from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import plane_figure
-from rotorid.report.number_tables import every_warning
-from rotorid.report.page import inline_svg, render_report
+from rotorid.report.balance_tables import sheet_tables
+from rotorid.report.document import Document
+from rotorid.report.page import every_warning, inline_svg, render_report
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from balancing import Correction, Influence, Mounted
+    from balancing import Correction, Influence, LeftToDo, Mounted
     from rotorid.tables import Job
 
 _SOURCES = {
@@ -37,7 +36,7 @@ _SOURCES = {
 
 def balance_report(
     document: Mapping[str, Any],
-    parts: Mapping[str, Any],
+    made: tuple[Correction, Mounted | None, LeftToDo | None],
     influence: Influence,
     job: Job,
     provenance: Mapping[str, Any],
@@ -50,9 +49,8 @@ def balance_report(
     document
         What `rotorid balance --json` prints, without its provenance. The sheet holds it as JSON, with what
         only the sheet shows under the key "sheet".
-    parts
-        What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
-        "mounting" (`Mounted`), "left_to_do" (`LeftToDo`), "verdict" (`Verdict`, whose tolerances are drawn).
+    made
+        What it is made of: the correction, pieces in holes, what is left to do after a check run.
     influence, job
         Coefficients and job of the correction.
     provenance
@@ -67,41 +65,36 @@ def balance_report(
     """
     from balancing.plots import residual_figure
 
-    result, mounted = (parts[key] for key in ("", "mounting"))
+    result, mounted, left = made
     labels = result.labels
-    sheet = sheet_data(result, influence, job, mounted)
-    whole = {**document, "sheet": sheet}
+    whole = Document({**document, "sheet": sheet_data(result, job, mounted)})
     known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
-    runs = sheet["runs"]
-    left, source = parts["left_to_do"], result.influence.reading.source
-    text: dict[str, Any] = {
-        "vibration": labels.vibration_in,
-        "weight": labels.weight_in,
-        "seen": conventions_explained.seen_from(labels),
-        "method": _method(result),
-        "errors": _SOURCES.get(source, source),
-        "coefficients": _coefficients(influence, job, provenance),
-        "turn": _turn(result),
-        "turning": labels.turning_in_words(),
-        "speed": labels.speed_in,
-        "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
-    }
-    discs = [] if left is not None else _discs(result, job, mounted, text["seen"])
+    source, seen = result.influence.reading.source, conventions_explained.seen_from(labels)
+    discs = [] if left is not None else _discs(result, job, mounted, seen)
     if left is not None and left.word == "trim":
         add = dict(zip(left.planes, left.trim.tolist(), strict=True))
         trim = replace(left.correction, weights=np.array([add[plane] for plane in left.correction.planes]))
-        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, text["seen"])
+        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, seen)
     return render_report(
         "balance.html",
-        whole,
+        whole.data,
         title=f"Balancing sheet: {_name(job)}",
         warnings=[sentence(words) for words in every_warning(document)],
         judgement=judgement.splitlines(),
         provenance=provenance,
         job_files=[path.name for path in job.files],
-        text=text,
+        about=[job.machine, job.date],
+        vibration=labels.vibration_in,
+        weight=labels.weight_in,
+        seen=seen,
+        turning=capital(labels.turning_in_words()),
+        method=_method(result),
+        errors=_SOURCES.get(source, source),
+        coefficients=_coefficients(influence, job, provenance),
+        turn=_turn(result),
+        tables=sheet_tables(whole, labels),
         conventions=conventions_explained.words(labels, places, key_phasor),
         rotor_figure=inline_svg(
             conventions_explained.rotor_figure(labels, places, key_phasor),
@@ -112,12 +105,7 @@ def balance_report(
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
         discs=discs,
-        residual_figure=inline_svg(
-            residual_figure(result, mounted),
-            "Vibration before and predicted after",
-        ),
-        influence_planes=influence.planes,
-        several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
+        residual_figure=inline_svg(residual_figure(result, mounted), "Vibration before and predicted after"),
         forbidden=result.limits is not None and any(result.limits.forbidden),
         unsplit=[p for p in result.planes if p in job.holes] if mounted is None and left is None else [],
     )
@@ -155,20 +143,12 @@ def _turn(result: Correction) -> str:
     return "is added to" if result.labels.phase_sign == result.labels.angle_sign else "is taken from"
 
 
-def _discs(result: Correction, job: Job, mounted: Mounted | None, seen: str) -> list[tuple[str, Markup]]:
-    """Each plane with its picture."""
+def _discs(result: Correction, job: Job, mounted: Mounted | None, seen: str) -> list[Markup]:
+    """A picture of each plane."""
     return [
-        (
-            plane,
-            inline_svg(
-                plane_figure(
-                    result,
-                    plane,
-                    holes=job.holes.get(plane),
-                    mounted=mounted,
-                ),
-                f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
-            ),
+        inline_svg(
+            plane_figure(result, plane, holes=job.holes.get(plane), mounted=mounted),
+            f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
         )
         for plane in result.planes
     ]

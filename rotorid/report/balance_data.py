@@ -1,9 +1,8 @@
-"""Data that only the balancing sheet shows, in the job's units: runs, coefficients, 95 % widths."""
+"""Data that only the balancing sheet shows, in the job's units: runs, what to mount, 95 % widths."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,21 +11,18 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import rpm
 from rotorid.files import units
-from rotorid.regression import coverage_factor, region_radius
 
 if TYPE_CHECKING:
-    from balancing import Correction, Influence, Mounted, Trials
+    from balancing import Correction, Mounted, Trials
     from rotorid.tables import Job
 
 
-def sheet_data(
-    result: Correction, influence: Influence, job: Job, mounted: Mounted | None = None
-) -> dict[str, Any]:
+def sheet_data(result: Correction, job: Job, mounted: Mounted | None = None) -> dict[str, Any]:
     """What stands under the key "sheet" of the document in a balancing sheet.
 
     Parameters
     ----------
-    result, influence, job
+    result, job
         Of one and the same job.
     mounted
         Pieces in holes, where they were chosen.
@@ -34,13 +30,12 @@ def sheet_data(
     Returns
     -------
     dict
-        machine, runs, slow_roll, influence, corrections, add, residuals; what is unknown is None.
+        machine, runs, slow_roll, corrections, add, residuals; what is unknown is None.
     """
     return {
         "machine": _machine(result, job),
         "runs": _runs(job.trials),
         "slow_roll": _slow_roll(job),
-        "influence": _influence(influence),
         "corrections": _corrections(result, job),
         "add": _add(result, job),
         "residuals": _residuals(result, mounted),
@@ -48,7 +43,7 @@ def sheet_data(
 
 
 def _machine(c: Correction, job: Job) -> dict[str, Any]:
-    labels, limits = c.labels, c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
+    limits = c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
     planes = []
     for plane in c.planes:
         holes = job.holes.get(plane)
@@ -64,17 +59,7 @@ def _machine(c: Correction, job: Job) -> dict[str, Any]:
                 "node": job.plane_nodes.get(plane),
             }
         )
-    unit = units.SPEED[labels.speed_unit]
-    return {
-        "planes": planes,
-        "sensors": [
-            {"sensor": s, "node": None if (at := job.sensor_places.get(s)) is None else at.node}
-            for s in c.sensors
-        ],
-        "speeds_rpm": [rpm(w) for w in c.speeds],
-        "speed_unit": labels.speed_unit,
-        "speeds": [float(f"{w * unit.scale:.12g}") for w in c.speeds],
-    }
+    return {"planes": planes}
 
 
 def _runs(trials: Trials) -> list[dict[str, Any]]:
@@ -124,45 +109,6 @@ def _mounted(trials: Trials, weights: ComplexArray) -> list[dict[str, Any]]:
             Column("angle_deg", angle),
         )
     )
-
-
-def _influence(f: Influence) -> dict[str, Any]:
-    """Vibration caused by a weight of one at 0°, phase as the job counts it; half widths of 95 %."""
-    size = np.abs(f.W) * (f.labels.vibration_scale / f.labels.weight_scale)
-    along, across = _widths(f)
-    share = 100 * along / np.where(np.abs(f.W) > 0, np.abs(f.W), np.nan)
-    readings = _places(f.speeds, f.sensors)
-    table = (
-        *(replace(column, values=np.repeat(list(column.values), len(f.planes))) for column in readings),
-        Column("plane", f.planes * (len(f.speeds) * len(f.sensors))),
-        Column("influence", size.ravel()),
-        Column("phase_deg", f.labels.vibration(f.W)[1].ravel()),
-        Column("influence_95_percent", share.ravel()),
-        Column("phase_95_deg", across.ravel()),
-    )
-    return {"unit": f.unit, "rows": rows(table)}
-
-
-def _widths(f: Influence) -> tuple[FloatArray, FloatArray]:
-    """Half widths (S, C, P) of 95 % intervals: of sizes, and of phases in degrees (NaN: not determined)."""
-    dof = f.reading.dof if np.isfinite(f.reading.dof) else None
-    factor = coverage_factor(dof)
-    if not f.known_errors or factor is None:
-        unknown: FloatArray = np.full(f.W.shape, np.nan)
-        return unknown, unknown
-    S, C, P = f.W.shape
-    own = f.channels()[..., 2:, 2:].reshape(S, C, P, 2, P, 2)
-    blocks = np.stack([own[:, :, p, :, p, :] for p in range(P)], axis=2)
-    unit = np.where(np.abs(f.W) > 0, f.W, 1.0) / np.where(np.abs(f.W) > 0, np.abs(f.W), 1.0)
-    found = []
-    for way in (unit, 1j * unit):
-        u = np.stack((way.real, way.imag), axis=-1)
-        variance = np.einsum("scpi,scpij,scpj->scp", u, blocks, u)
-        found.append(factor * np.sqrt(np.maximum(variance, 0.0)))
-    along, across = found
-    clear = np.abs(f.W) > region_radius(dof) / factor * np.maximum(along, across)
-    angle = np.degrees(across / np.where(np.abs(f.W) > 0, np.abs(f.W), 1.0))
-    return along, np.where(clear, angle, np.nan)
 
 
 def _corrections(c: Correction, job: Job) -> list[dict[str, Any]]:

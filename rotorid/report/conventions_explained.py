@@ -55,34 +55,25 @@ def words(
     key_phasor
         Direction of the key phasor, degrees with the rotation from x; None where nobody states it.
     """
-    found = [("Rotation", _rotation(labels)), ("Angles of weights", _angles(labels))]
-    found.append(("Phase", _phase(labels)))
+    key, sensors = (
+        "Its place is not stated.",
+        "their directions are not stated: they stay as during the runs.",
+    )
     if key_phasor is not None:
-        at = _stated(labels, key_phasor)
-        found.append(
-            ("Key phasor", f"at {at} from x. It gives a pulse when the mark on the rotor passes it.")
-        )
-    else:
-        found.append(
-            (
-                "Key phasor",
-                "gives a pulse when the mark on the rotor passes it. Its place is not stated.",
-            )
-        )
+        key = f"It stands at {_stated(labels, key_phasor)} from x."
     if places:
         at = "; ".join(f"{name} at {_stated(labels, angle)}" for name, angle in places.items())
-        found.append(("Sensors", f"{at}; from x, in the direction in which weights are counted."))
-    else:
-        found.append(
-            (
-                "Sensors",
-                "their directions are not stated: they stay as during the runs.",
-            )
-        )
-    found.append(("Vibration", _amplitude(labels)))
-    found.append(("Weights", _weight(labels)))
-    assumed = {"Phase": "phase" in labels.assumed, "Angles of weights": "angles" in labels.assumed}
-    return [(term, said + (_ASSUMED if assumed.get(term) else "")) for term, said in found]
+        sensors = f"{at}; from x, in the direction in which weights are counted."
+    said = {
+        "Rotation": _rotation(labels),
+        "Angles of weights": _angles(labels) + _ASSUMED * ("angles" in labels.assumed),
+        "Phase": _phase(labels) + _ASSUMED * ("phase" in labels.assumed),
+        "Key phasor": f"gives a pulse when the mark on the rotor passes it. {key}",
+        "Sensors": sensors,
+        "Vibration": _amplitude(labels),
+        "Weights": _weight(labels),
+    }
+    return [*said.items()]
 
 
 def _rotation(labels: Labels) -> str:
@@ -148,7 +139,7 @@ def rotor_figure(
     Parameters
     ----------
     labels, places, key_phasor
-        As of `words`. Sensors without a direction are drawn once, dashed, anywhere.
+        As of `words`.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle
@@ -192,41 +183,22 @@ def _weight_at(ax: Axes, mark: float, count: int) -> None:
 
 
 def _sensors(ax: Axes, labels: Labels, places: Mapping[str, float] | None, key_phasor: float | None) -> None:
+    """The key phasor, and the sensors whose directions are stated; several at one angle have one label."""
     drawn = labels.drawn_sign
     key = np.exp(1j * drawn * np.radians(key_phasor or 0.0))
     _line(ax, _KEY * key, marker=(3, 0, 90 + np.degrees(np.angle(key))), color="black", mfc="white", ms=11)
-    beside = abs(key.real) > 0.5
-    at = complex(
-        (1.18 if beside else 1.0) * key.real, 1.15 * key.imag - 0.2 - 0.1 * max(0.0, -float(key.imag))
-    )
-    _say(ax, at, "key phasor", ha=_beside(key.real), va="top")
+    _say(ax, 1.18 * key - 0.2j, "key phasor", ha=_beside(key.real), va="top")
     by_angle: dict[float, list[str]] = {}
     for name, angle in (places or {}).items():
         by_angle.setdefault(float(np.mod(angle, 360.0)), []).append(name)
-    if key_phasor is not None and 0.0 not in by_angle and key_phasor % 360:
-        ax.annotate("", (1.9, 0), (1.4, 0), arrowprops={"arrowstyle": "->", "lw": 0.8})
-        _say(ax, 1.95, "x", ha="left")
-    if not by_angle:
-        away = -45.0 if abs((np.degrees(np.angle(key)) + 135 + 180) % 360 - 180) < 60 else -135.0
-        _probe(ax, away, "sensor, place\nnot stated", dashed=True)
     for angle, names in by_angle.items():
-        shown = "\n".join(_short(name) for name in names[:2])
-        if len(names) > 2:
-            shown = f"{_short(names[0])} …\n{_short(names[-1])}"
-        _probe(ax, drawn * angle, f"{shown}\n{_stated(labels, angle)}", dashed=False)
-
-
-def _short(name: str) -> str:
-    return plain(name if len(name) <= 12 else f"{name[:11]}…")
-
-
-def _probe(ax: Axes, paper: float, text: str, *, dashed: bool) -> None:
-    """A sensor that looks at the shaft from an angle on the paper, degrees."""
-    way = np.exp(1j * np.radians(paper))
-    color = "0.55" if dashed else "black"
-    _line(ax, [_INNER * way, _OUTER * way], color=color, lw=6, solid_capstyle="butt")
-    level = "center" if abs(way.imag) < 0.5 else "bottom" if way.imag > 0 else "top"
-    _say(ax, (_OUTER + 0.07) * way, text, ha=_beside(way.real), va=level)
+        first, *more = names
+        shown = plain(first if len(first) <= 12 else f"{first[:11]}…") + " …" * bool(more)
+        way = np.exp(1j * np.radians(drawn * angle))
+        _line(ax, [_INNER * way, _OUTER * way], color="black", lw=6, solid_capstyle="butt")
+        level = "center" if abs(way.imag) < 0.5 else "bottom" if way.imag > 0 else "top"
+        words = f"{shown}\n{_stated(labels, angle)}"
+        _say(ax, (_OUTER + 0.07) * way, words, ha=_beside(way.real), va=level)
 
 
 def _beside(across: float) -> str:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import UserDict
-from collections.abc import Iterable
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -16,30 +14,8 @@ NOTHING = "–"
 """Printed where the document has no number (null)."""
 
 
-@dataclass(frozen=True)
-class Cells:
-    """A column of a table.
-
-    Attributes
-    ----------
-    head
-        Over it, with the unit.
-    cells
-        One a row: texts, or numbers of the document as `Document.show` prints them.
-    words
-        Whether it holds words; numbers stand at the right.
-    """
-
-    head: str
-    cells: tuple[str, ...]
-    words: bool = False
-
-
 class Document(UserDict[str, Any]):
-    """What `--json` prints, as JSON types, and its numbers as a sheet shows them.
-
-    A number that is not printed in the document's unit carries the factor as `data-scale`.
-    """
+    """What `--json` prints, as JSON types, and its numbers as a sheet shows them."""
 
     def show(
         self,
@@ -49,8 +25,6 @@ class Document(UserDict[str, Any]):
         decimals: int | None = None,
         unit: str = "",
         trim: bool = False,
-        scale: float = 1.0,
-        sign: bool = False,
     ) -> Markup:
         """Print the number at a path as `<span data-key="path">number</span>`.
 
@@ -66,10 +40,6 @@ class Document(UserDict[str, Any]):
             Printed behind the number (inside the element, after a narrow space; "°" without one).
         trim
             Whether zeros at the end are left out: 3.36 with five digits, not 3.3600.
-        scale
-            What one unit of the document is in the unit printed.
-        sign
-            Whether a + stands before numbers above zero.
 
         Raises
         ------
@@ -82,47 +52,11 @@ class Document(UserDict[str, Any]):
         if value is None:
             text = NOTHING
         else:
-            value *= scale
             text = significant(value, digits) if decimals is None else fixed(value, decimals, unit == "°")
             if trim and "." in text and "e" not in text:
                 text = text.rstrip("0").rstrip(".")
-            text = f"+{text}" if sign and value > 0 and float(text) else text
             text += unit if unit in ("", "°") else f"\u202f{unit}"
-        factor = Markup("") if scale == 1.0 else Markup(' data-scale="{}"').format(repr(scale))
-        return Markup('<span data-key="{}"{}>{}</span>').format(key, factor, text.replace("-", "−"))
-
-    def column(
-        self,
-        head: str,
-        path: str,
-        digits: int = 6,
-        *,
-        rows: Iterable[int] | None = None,
-        **options: Any,  # noqa: ANN401  as for one number
-    ) -> Cells:
-        """Print one number a row.
-
-        Parameters
-        ----------
-        head
-            Over the column.
-        path
-            Such as "critical_speeds_rad_s.*": `*` is the number of the row, from 0.
-        rows
-            Which of them; None: all that the document has.
-        digits, options
-            As for one number.
-        """
-        before, _, after = path.partition("*")
-        if rows is None:
-            rows = range(len(self.found(before.rstrip("."))))
-        return Cells(head, tuple(self.show(f"{before}{row}{after}", digits, **options) for row in rows))
-
-    def listed(self, path: str, *, decimals: int) -> Markup:
-        """Print the numbers of a list, path as for a column, in one cell."""
-        from markupsafe import Markup
-
-        return Markup(", ").join(self.column("", path, decimals=decimals).cells)
+        return Markup('<span data-key="{}">{}</span>').format(key, text.replace("-", "−"))
 
     def value(self, key: str) -> float | None:
         """Return the number at a path; None where the document says null.

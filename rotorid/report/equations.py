@@ -1,4 +1,4 @@
-"""Equations of a result as a textbook writes them, in symbols and in numbers: text, LaTeX and JSON.
+"""Equations of a result as a textbook writes them, in symbols and in numbers: text and JSON.
 
 Sympy sorts the factors of a product by name: a name that begins with `BEHIND` comes last, as ω and the
 amplitudes do in a book. No text shows that letter.
@@ -7,7 +7,6 @@ amplitudes do in a book. No text shows that letter.
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +16,7 @@ import numpy as np
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
+from rotorid.base.result import Column, text
 from rotorid.base.text import cut
 
 Expression = Any
@@ -27,18 +26,7 @@ Terms = Sequence[tuple[Expression, Expression]]
 
 BEHIND = "\ue000"
 _LONGEST = 20
-_GREEK = re.compile("[α-ωΑ-Ω]")
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-_DOCUMENT = r"""\documentclass{article}
-\usepackage{amsmath,booktabs,longtable}
-\usepackage[landscape,margin=1.5cm]{geometry}
-\allowdisplaybreaks
-\begin{document}
-\begin{align*}
-%s
-\end{align*}
-%s
-\end{document}"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +37,9 @@ class Row:
     left: Terms
     right: Terms
 
-    def written(self, *, latex: bool = False) -> str:
-        """As a line of text, or as a formula of LaTeX."""
-        return " = ".join(_sum(side, latex=latex) for side in (self.left, self.right))
+    def written(self) -> str:
+        """As a line of text."""
+        return " = ".join(map(_sum, (self.left, self.right)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +76,7 @@ class Equations:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        symbols = [
-            {"row": row.name, "text": row.written(), "latex": row.written(latex=True)}
-            for row in self.symbolic
-        ]
+        symbols = [{"row": row.name, "text": row.written()} for row in self.symbolic]
         numbers = {name: getattr(self, name) for name in ("rows", "columns", "matrix", "right", "solution")}
         return plain({"title": self.title, "symbolic": symbols, **numbers, "notes": self.notes})
 
@@ -103,17 +88,6 @@ class Equations:
         symbols = [re.sub(r"\b(Re|Im) (?!eq)", "\\1\u00a0", line) for line in symbols]
         found = ["\n".join([f"{self.title}:", *symbols]), *self._tables(), self._solution()]
         return Answer(told.judgement, "\n\n".join(found), told.warnings, (*self.notes, *told.notes))
-
-    def latex(self) -> str:
-        """A whole document: symbols, the matrix beside the right side, the solution, notes."""
-        rows = "\\\\\n".join(
-            rf"\text{{{row.name}}}\quad & {row.written(latex=True)}" for row in self.symbolic
-        )
-        said = Column(self.title, (self._solution(), *self.notes))
-        tables = [_latex_table(self._system())] if self.rows else []
-        tables.append(_latex_table([said], r"p{0.9\linewidth}"))
-        body = _GREEK.sub(lambda c: rf"\ensuremath{{{_formula_of(c[0])}}}", "\n".join(tables))
-        return _DOCUMENT % (rows, body)
 
     def _system(self) -> list[Column]:
         """Name of each row, the matrix, the right side."""
@@ -142,12 +116,6 @@ class Equations:
         return f"{self.names[1]}: {', '.join(told)}"
 
 
-def _latex_table(columns: Sequence[Column], layout: str | None = None) -> str:
-    """A table that may go over pages, every text in it escaped; the bar of plain text is left out."""
-    how: dict[str, Any] = {"index": False, "float_format": "%.6g", "column_format": layout}
-    return str(frame(columns).to_latex(escape=True, longtable=True, **how)).replace("& | ", "& ")
-
-
 def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
@@ -155,13 +123,6 @@ def _words(expression: Expression) -> str:
     told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
     told = re.sub(r"\*\*(\d+)(?![\w.])", lambda found: found[1].translate(_RAISED), told)
     return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
-
-
-def _formula(expression: Expression) -> str:
-    from sympy import latex
-
-    names = {symbol: _formula_of(symbol.name) for symbol in expression.free_symbols}
-    return str(latex(expression, symbol_names=names))
 
 
 def _decimals(expression: Expression) -> Expression:
@@ -172,9 +133,8 @@ def _decimals(expression: Expression) -> Expression:
     return whole.xreplace({q: Float(q, 6) for q in whole.atoms(Rational) if q.q > 100})
 
 
-def _sum(terms: Terms, *, latex: bool) -> str:
+def _sum(terms: Terms) -> str:
     """Coefficient times factor, term by term; 0 and 1 are not written."""
-    write, times, brackets = (_formula, r" \cdot ", r"\left({}\right)") if latex else (_words, "·", "({})")
     told = []
     for pair in terms:
         parts = [*map(_decimals, pair)]
@@ -183,25 +143,9 @@ def _sum(terms: Terms, *, latex: bool) -> str:
         inside = [one for one in parts if one not in (1, -1)]
         sign = "-" if len([one for one in parts if one == -1]) == 1 else ""
         alone = len(inside) == 1 and not sign
-        whole = (alone or not (one.is_Add or (one.is_Mul and one is parts[1])) for one in inside)
-        forms = zip(("{}" if bare else brackets for bare in whole), map(write, inside), strict=True)
-        told.append(sign + (times.join(form.format(shown) for form, shown in forms) or "1"))
+        bare = [alone or not (one.is_Add or (one.is_Mul and one is parts[1])) for one in inside]
+        words = (
+            _words(one) if plain else f"({_words(one)})" for one, plain in zip(inside, bare, strict=True)
+        )
+        told.append(sign + ("·".join(words) or "1"))
     return " + ".join(told).replace("+ -", "- ") or "0"
-
-
-def _formula_of(name: str) -> str:
-    """LaTeX of a name: a parameter, "Re X", a derivative "∂x/∂k", "dx/dt" or "d(∂x/∂k)/dt"."""
-    from sympy import Symbol, latex
-
-    if found := re.fullmatch(f"{BEHIND}*(R|I)[em] (.+)", name):
-        return rf"{{{_formula_of(found[2])}}}^{{({found[1].lower()})}}"
-    if found := re.fullmatch(r"d\(?(.+?)\)?/dt", name):
-        return rf"\frac{{d}}{{dt}} {_formula_of(found[1])}"
-    if found := re.fullmatch("∂(.+)/∂(.+)", name):
-        return rf"\frac{{\partial {_formula_of(found[1])}}}{{\partial {_formula_of(found[2])}}}"
-    return str(latex(Symbol(_GREEK.sub(_spelt, name.replace(BEHIND, "")))))
-
-
-def _spelt(letter: re.Match[str]) -> str:
-    name = unicodedata.name(letter[0]).split()[-1]
-    return name.title() if letter[0].isupper() else name.lower()

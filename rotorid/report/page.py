@@ -9,14 +9,21 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.tables import html
+from rotorid.base.tables import Table, html
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.report.document import Document
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
+
+WIDTH, LETTERS = 6.0, 9.0
+"""Of a picture on a page: inches and points."""
+ABREAST = 9
+"""Columns of a table that stand side by side."""
 
 
 def render_report(
@@ -32,8 +39,8 @@ def render_report(
 
     The template gets `document`, `title`, `warnings`, `provenance`, `context`, and the functions
     `show("corrections.0.mass", digits=4)`, which prints a number of the document (`Document.show`),
-    `found("corrections.0.mass")`, what it holds there, and `html(table)`. The document
-    itself, with its provenance, lies in the sheet as JSON in the element "result".
+    `found("corrections.0.mass")`, what it holds there. The document itself, with its provenance, lies in the
+    sheet as JSON in the element "result".
 
     Parameters
     ----------
@@ -67,10 +74,42 @@ def render_report(
         json_text=json_inside(whole.data),
         show=whole.show,
         found=whole.found,
-        html=html,
         **context,
     )
     return text.encode("utf-8", "replace")  # names of files may be anything
+
+
+def every_warning(document: Mapping[str, Any]) -> list[str]:
+    """All warnings of a document and its parts, in the order of the document, each once."""
+    every: list[str] = []
+    for key, value in document.items():
+        if key == "warnings":
+            every += map(str, value)
+        elif isinstance(value, Mapping):
+            every += every_warning(value)
+    return list(dict.fromkeys(every))
+
+
+def block(table: Table | str) -> Markup:
+    """A table, those too wide in parts that repeat its first two columns; or text as it stands."""
+    from markupsafe import Markup
+
+    if isinstance(table, str):
+        return Markup("<pre>{}</pre>").format(table)
+    first, others, step = table.columns[:2], table.columns[2:], ABREAST - 2
+    parts = [(*first, *others[k : k + step]) for k in range(0, max(len(others), 1), step)]
+    return Markup("\n").join(html(Table(table.name, part, table.note)) for part in parts)
+
+
+def drawn(draw: Callable[[], Figure], caption: str) -> Markup:
+    """A picture as wide as a telephone."""
+    import matplotlib as mpl
+
+    with mpl.rc_context({"font.size": LETTERS, "hatch.linewidth": 0.6}):
+        figure = draw()
+        wide, high = figure.get_size_inches()
+        figure.set_size_inches(WIDTH, high * min(1.0, WIDTH / wide))
+        return inline_svg(figure, caption)
 
 
 def json_inside(document: Mapping[str, Any]) -> Markup:

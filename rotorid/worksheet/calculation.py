@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.commands.balance import Balance
-    from rotorid.commands.outcome import Delivered
+    from rotorid.report.outcome import Outcome
     from rotorid.tables import Job
 
 KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
@@ -73,7 +73,7 @@ def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]
 def _balance(job: str, version: int, kind: str) -> Balance:
     """The job as it is now, balanced; once for each version of its files."""
     from rotorid.base.answer import kinds
-    from rotorid.workflows import BalanceOptions, balance
+    from rotorid.commands import BalanceOptions, balance
 
     if kind not in _kept or _kept[kind][0] != version:
         options = BalanceOptions(**KINDS[kind.removesuffix(UNCHECKED)])
@@ -100,7 +100,7 @@ def _without_check(path: Path) -> Job:
     return job_of(path, written.top(problems), written.tables, Overrides(), problems)
 
 
-def told(outcome: Delivered) -> dict[str, Any]:
+def told(outcome: Outcome) -> dict[str, Any]:
     """The document of `--json`, and what a person reads."""
     answer = outcome.answer
     words = {"judgement": answer.judgement, "found": answer.found}
@@ -158,7 +158,7 @@ def whole(job: str, version: int, kind: str) -> str:
 
 def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, Any]:
     """A first trial weight, with the job's coefficients or from the load alone."""
-    from rotorid.workflows import TrialWeightOptions, trial_weight
+    from rotorid.commands import TrialWeightOptions, trial_weight
 
     found = told(made := trial_weight(None if job is None else Path(job), TrialWeightOptions(**options)))
     to_draw = all(one["angle_deg"] is not None for one in found["document"]["trial_weights"])

@@ -71,9 +71,9 @@ def test_frames(correction):
 def test_the_text_fits_a_terminal(correction):
     text, whole = correction.answer.brief(), correction.answer.whole()
     assert max(map(len, text.splitlines())) <= 100
-    for words in ("2.951", "50.2°", "bare rotor", "13.5"):
+    for words in ("2.951", "50.2°", "bare rotor"):
         assert words in text
-    for words in ("rank 2 of 2", "condition number 2.48", *correction.answer.tables):
+    for words in ("13.5", "rank 2 of 2", "condition number 2.48", *correction.answer.tables):
         assert words in whole
     assert ("95 %" in text) == correction.region_known
 
@@ -103,7 +103,7 @@ def test_speeds_in_the_unit_of_the_readings():
     turns = replace(trials, speeds=np.array([20.0, 25.5]) * 2 * np.pi)
     hertz = replace(turns, labels=replace(trials.labels, speed_unit="Hz"))
     told, usual = (correct(estimate_influence(made)).answer for made in (hertz, turns))
-    assert " at 20 Hz " in told.brief()
+    assert " at 20 Hz " in told.whole()
     assert " rpm" not in told.whole()
     [table] = [one for one in told.tables if one.startswith("Vibration")]
     head, *rows = table.splitlines()[1:]

@@ -30,9 +30,9 @@ from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters
 from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
+from rotorid.commands import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
 from rotorid.tables import Conventions, Job
-from rotorid.workflows import Balance, balance
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]

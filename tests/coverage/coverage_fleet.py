@@ -25,8 +25,8 @@ from balancing import (
     correct,
 )
 from balancing.regions import NORMAL_RADIUS
-from rotorid.commands.type_coefficients import LEVEL
 from rotorid.fleet import MachineRecord, MachineType, fit_type, update
+from rotorid.fleet.type_coefficients import LEVEL
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]

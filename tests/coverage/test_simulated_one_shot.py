@@ -9,8 +9,8 @@ from repetitions import FULL, of_a_spread
 import fem
 from fem.parameters import with_parameters
 from rotorid import read_job
+from rotorid.commands import balance
 from rotorid.samples import sample_data
-from rotorid.workflows import balance
 
 FOLDER = sample_data() / "calibration"
 

@@ -6,7 +6,7 @@ from repetitions import FULL
 from scipy.stats import binomtest
 from studies.drawn import STUDY, write
 
-from rotorid.workflows import StudyOptions, study
+from rotorid.study import StudyOptions, study
 
 TWO = STUDY.replace(
     "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
@@ -26,7 +26,7 @@ def test_small_errors_within_the_model_are_covered(tmp_path):
     text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 1").replace("corrections = 3", "corrections = 1")
     samples, errors = 400 if FULL else 200, "[readings]\namplitude_percent = 0.5\nphase_deg = 0.3\n"
     found = run(write(tmp_path, text + errors), samples=samples)
-    good, n = found.held.sum(axis=0).tolist()
+    good, n = found.result.held.sum(axis=0).tolist()
     assert n > 0.975 * samples
     low, high = binomtest(good, n).proportion_ci(0.999)
     assert low < 0.95 < high

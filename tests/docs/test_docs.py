@@ -30,7 +30,7 @@ PACKAGES = (
     "rotorid.reduction",
     "rotorid.calibration",
     "rotorid.tables",
-    "rotorid.workflows",
+    "rotorid.commands",
 )
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source|video|audio|object|embed)[^>]+(?:src|data)=\"(?:https?:)?//"

@@ -7,9 +7,9 @@ from repetitions import FULL
 
 from golden.cases import CASES
 from golden.running import run
-from rotorid.base.answer import COLUMNS, LINES
+from rotorid.base.answer import COLUMNS
+from rotorid.commands import BalanceOptions, balance
 from rotorid.samples import sample_data
-from rotorid.workflows import BalanceOptions, balance
 
 FEW = (
     "turbo",
@@ -23,6 +23,7 @@ FEW = (
 """Cases whose texts are read; `make test-full` reads all that are answers."""
 NAMES = [n for n, case in CASES.items() if case.group not in ("usage", "demos", "fleet")] if FULL else FEW
 NO_ANSWER = ("schema", "demo")
+MOST = 24
 """What they print is no answer."""
 JUDGEMENTS = {
     "balance": r"(Mount|Remove) (these|this|nothing)|Do not mount|Measure again|"
@@ -48,7 +49,7 @@ def printed():
 
 def complaints(words, output):
     lines = output.rstrip("\n").splitlines()
-    found = [f"{len(lines)} lines"] if len(lines) > LINES and "--table" not in words else []
+    found = [f"{len(lines)} lines"] if len(lines) > MOST and "--table" not in words else []
     found += [f"{len(line)} columns: {line}" for line in lines if len(line) > COLUMNS]
     found += [f"a token for a unit: {line}" for line in lines if re.search(r"\d (g_mm|um_pp)", line)]
     if not re.match(JUDGEMENTS.get(words[0], ""), lines[0]):
@@ -79,7 +80,7 @@ def test_what_does_not_fit_is_found(output, words):
 
 
 JOBS = {
-    "job.toml": {"best_planes": 2},
+    "job.toml": {"planes": ("left", "right")},
     "checked.toml": {"limit": ("2",)},
     "holes.toml": {"split": True},
 }
@@ -89,8 +90,8 @@ JOBS = {
 def test_nothing_is_lost_and_nothing_printed_twice(job):
     found = balance(sample_data() / "turbo_job" / job, BalanceOptions(**JOBS[job]))
     answer, whole = found.answer, found.answer.whole()
-    assert found.summary() == answer.brief()
-    assert len(answer.tables) >= 3
+    assert found.summary() == answer.brief(found.lines)
+    assert len(answer.tables) >= 2
     for table in answer.tables:
         assert whole.count(table) == 1
         assert table not in found.summary()

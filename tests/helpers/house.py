@@ -22,7 +22,7 @@ CEILINGS = (  # places, units, issue whose end puts it in force; only an issue t
     ("rotorid/identify", 41_500, "25a"),
     ("rotorid/reduction rotorid/motion", 33_500, "25b"),
     ("rotorid/calibration rotorid/waveforms", 12_500, "25c"),
-    ("rotorid/workflows rotorid/cli rotorid/commands rotorid/report", 48_000, "26"),
+    ("rotorid/cli rotorid/commands rotorid/report", 48_000, "26"),
     ("rotorid/tables rotorid/files", 47_500, "27"),
     ("rotorid/worksheet", 12_500, "28"),
     ("rotorid/fleet rotorid/study", 7_000, "28"),

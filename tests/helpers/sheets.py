@@ -26,7 +26,7 @@ COMMANDS = {
     "balance": "balance turbo_job/job.toml",
     "balance holes": "balance turbo_job/holes.toml --split",
     "balance two planes": "balance bk_two_plane/job.toml",
-    "critical": "critical compressor/rotor.toml -n 4 --map --mesh-check --operating 4000:6500rpm",
+    "critical": "critical compressor/rotor.toml -n 4 --map --operating 4000:6500rpm",
     "critical table": "critical rotor23.csv -n 5",
     "response": COMPRESSOR + " --sensors probe_DE:45,probe_NDE:45",
     "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --rank --response auto "
@@ -34,15 +34,12 @@ COMMANDS = {
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
     "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv --sigma auto",
-    "fit stopped": "fit fit/quasilinearization/model.toml fit/quasilinearization/record_noisy.csv "
-    "--max-iterations 1",
     "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --amplitude-error 2 "
     "--phase-error 1",
     "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",
     "identify singular": "identify identify/task_4_1/model.toml identify/task_4_1/data.csv",
 }
 """Sheets by name: the command, its files in the sample data, _ for a blank in a name."""
-ESTIMATES = tuple(name for name in COMMANDS if name.split()[0] in ("fit", "identify"))
 
 NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 ROUNDED = 3  # significant digits that a whole number with zeros at its end has at least

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import mutants
 
-BELOW = ("base", "regression", "harmonic", "identify", "reduction", "motion", "tables", "workflows")
+BELOW = ("base", "regression", "harmonic", "identify", "reduction", "motion", "tables", "commands")
 PACKAGES = ("fem", "balancing", *(f"rotorid/{name}" for name in BELOW))
 WORD = re.compile(r"(?<![\w{'-])[a-z]{5,}(?![\w}'(-])")
 

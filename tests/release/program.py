@@ -9,8 +9,8 @@ import numpy as np
 import balancing
 import fem
 import rotorid
+from rotorid.commands import BalanceOptions, balance
 from rotorid.samples import sample_data
-from rotorid.workflows import BalanceOptions, balance
 
 
 def lowest(path: Path) -> float:

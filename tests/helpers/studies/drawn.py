@@ -4,7 +4,7 @@ import os
 import signal
 from pathlib import Path
 
-from rotorid.workflows.studies.chunks import Task
+from rotorid.study.chunks import Task
 
 ROTOR = """element,length_m,diameter_m,support_stiffness_N_per_m,mass_kg
 1,0.2,0.04,1e7,0

@@ -163,11 +163,33 @@ def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):
     assert any("predicted to pass its limit" in w for w in found["warnings"])
 
 
-def test_best_planes_are_used_and_leave_out_what_the_job_leaves_out(answers, tmp_path):
-    found = answers(JOB, "--best-planes", "2")
-    assert [c["plane"] for c in found["corrections"]] == ["left", "right"]
-    job = job_with(tmp_path, "[planes.left]\nuse = false\n")
-    assert answers(job, "--best-planes", "2")["best_planes"]["choices"] == 1
+@pytest.mark.full
+@pytest.mark.parametrize("method", FEW_DRAWS)
+def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
+    job = job_with(tmp_path, "")
+    job.write_text((TURBO / "holes.toml").read_text() + '\n[sensors."probe 4"]\nweight = 0\n')
+    free = answers(job, "--split", "--method", method)
+    size = max(r["after"] for r in free["mounting"]["residuals"] if r["sensor"] == "probe 4")
+    held = answers(job, "--split", "--method", method, "--limit", f"probe 4={1.1 * size}")
+    assert max(r["after"] for r in held["mounting"]["residuals"] if r["sensor"] == "probe 4") <= 1.1 * size
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("balance", JOB, "--method", "magic"), "one of weighted, least-squares, minmax"),
+        (("balance", JOB, "--coefficients", "guessed"), "one of measured, computed, combined"),
+        (("balance", JOB, "--coefficients", "computed"), "rotor"),
+        (("balance", JOB, "--max-mass", "heavy"), "heavy"),
+        (("balance", JOB, "--planes", ""), "names with commas"),
+        (("balance", JOB, "--ridge", "0"), "above 0"),
+        (("unbalance", JOB, "--stations", "6"), "rotor"),
+        (("unbalance", MODEL, "--stations", "6,6"), "only once"),
+    ],
+)
+def test_options_that_cannot_be_meant(cli, args, words):
+    outcome = cli(*args)
+    assert (outcome.code, words in outcome.err) == (2, True)
 
 
 @pytest.mark.full
@@ -189,36 +211,5 @@ def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, w
     held = held or answers(*args, "--limit", f"probe 4={limit}")
     assert all(r["after"] <= limit * (1 + 1e-9) for r in held["residuals"] if ignored(r))
     assert any("largest amplitude" in words for words in held["limits_that_bind"])
-    for more in (("--best-planes", "2"), ("--max-mass", "300")):
+    for more in (("--planes", "left,right"), ("--max-mass", "300")):
         assert cli("balance", *args, *more).code == 0
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("method", FEW_DRAWS)
-def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
-    job = job_with(tmp_path, "")
-    job.write_text((TURBO / "holes.toml").read_text() + '\n[sensors."probe 4"]\nweight = 0\n')
-    free = answers(job, "--split", "--method", method)
-    size = max(r["after"] for r in free["mounting"]["residuals"] if r["sensor"] == "probe 4")
-    held = answers(job, "--split", "--method", method, "--limit", f"probe 4={1.1 * size}")
-    assert max(r["after"] for r in held["mounting"]["residuals"] if r["sensor"] == "probe 4") <= 1.1 * size
-
-
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (("balance", JOB, "--method", "magic"), "one of weighted, least-squares, minmax"),
-        (("balance", JOB, "--coefficients", "guessed"), "one of measured, computed, combined"),
-        (("balance", JOB, "--coefficients", "computed"), "rotor"),
-        (("balance", JOB, "--max-mass", "heavy"), "heavy"),
-        (("balance", JOB, "--model-error", "5"), "--coefficients computed"),
-        (("balance", JOB, "--planes", ""), "names with commas"),
-        (("balance", JOB, "--ridge", "0"), "above 0"),
-        (("unbalance", JOB, "--stations", "6"), "rotor"),
-        (("unbalance", MODEL, "--stations", "6,6"), "only once"),
-        (("unbalance", MODEL, "--stations", "6,12", "--ridge", "0.1"), "--method ridge"),
-    ],
-)
-def test_options_that_cannot_be_meant(cli, args, words):
-    outcome = cli(*args)
-    assert (outcome.code, words in outcome.err) == (2, True)

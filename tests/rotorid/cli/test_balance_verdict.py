@@ -78,16 +78,6 @@ def test_check_runs_refine_the_coefficients(cli):
     assert "no check runs" in outcome.err
 
 
-def test_positions_share_the_tolerance(cli):
-    places = ("--positions", "left=0.8m,right=2.5m", "--bearings", "0.318m,2.9m", "--centre", "1.6m")
-    base = ("balance", TURBO / "checked.toml", "--planes", "left,right", *GRADE, *places)
-    rows = cli(*base, "--json").json["verdict"]["rows"]
-    bearings = [r["limit"] for r in rows if r["kind"] == "bearing"]
-    # by the distance of the centre of mass: (2.9 − 1.6)/(2.9 − 0.318) of 397.9 g·mm at A
-    assert bearings == pytest.approx([397.887 * 1.3 / 2.582, 397.887 * 1.282 / 2.582], rel=1e-4)
-    assert "must name the planes" in cli(*base[:-6], "--positions", "left=1m", *places[2:]).err
-
-
 def test_pieces_do_not_go_with_ridge(cli):
     outcome = cli("balance", TURBO / "holes.toml", "--split", "--ridge", "0.1")
     assert (outcome.code, "would undo" in outcome.err) == (2, True)

@@ -6,10 +6,10 @@ import pytest
 
 import fem
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from rotorid.commands import BearingsOptions, bearings
 from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor, write_rotor
-from rotorid.workflows import BearingsOptions, bearings
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 SPEEDS = ("--speeds", "1000:9000:1000rpm")
@@ -68,7 +68,7 @@ def test_other_forces_are_listed_and_explained():
         MuszynskaSeal(3, "seal", 1e6, 100.0, 2.0, 0.4, 1e-3),
     ]
     found = bearings(shaft(forces, [fem.Support(5, 1e8)]), BearingsOptions(speeds=[100.0, 200.0]))
-    assert found.labels == ["squeeze film at node 1", "seal"]
+    assert found.result.labels == ["squeeze film at node 1", "seal"]
     assert [row["sommerfeld"] for row in found.to_dict()["bearings"]] == [None] * 4
     said = found.summary()
     assert "Warning: the squeeze film at node 1: stiffness and damping are those at its centre" in said
@@ -79,7 +79,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     forces = [JournalBearing(node, "", **BEARING) for node in (1, 5)]
     light = fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, density=0.0, forces=forces)
     found = bearings(light, BearingsOptions(speeds=[100.0]))
-    assert found.found[0].eccentricity == pytest.approx(0)
+    assert found.result.found[0].eccentricity == pytest.approx(0)
     assert found.figure().axes[0].get_title().startswith("no load")
 
 
@@ -170,4 +170,4 @@ def test_a_shaft_that_rests_on_its_stop_is_told(cli, tmp_path):
     rigid = SmallModel((1,), [20.0], [200.0], np.zeros((1, 1)), forces=[film, ring])
     found = bearings(rigid, BearingsOptions(speeds=[100.0, 200.0]))
     assert "the shaft rests on the stop 'ring' at node 1" in found.warnings
-    assert found.found[0].position == pytest.approx([-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6)
+    assert found.result.found[0].position == pytest.approx([-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6)

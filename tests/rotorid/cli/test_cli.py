@@ -113,7 +113,7 @@ def test_pictures_and_tables_are_written_and_named(cli, tmp_path, command):
             ("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "5:1:1"),
             "step must be positive",
         ),
-        (("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "nan"), "finite"),
+        (("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "nan"), "is not a range"),
         (("balance", TURBO, "--planes", "Z9"), "Z9"),
         (("balance", TURBO, "--speeds", "17rpm"), "17"),
         (("balance", TURBO, "--phase", "leading"), "leading"),

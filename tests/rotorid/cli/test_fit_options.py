@@ -54,16 +54,6 @@ def test_starting_values_and_iterations(cli):
     assert options == {"start": "m1=10, c1=0.2"}
 
 
-def test_seeds_choose_other_places(cli, tmp_path):
-    model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
-    none, zero, one = (
-        cli("fit", model, record, "--starts", 4, *seed, "--json").json
-        for seed in ((), ("--seed", 0), ("--seed", 1))
-    )
-    assert none["minima"] == zero["minima"]
-    assert sum(m["starts"] for m in one["minima"]) == 4
-
-
 @each_of(
     ("arguments", "said"),
     [
@@ -75,9 +65,6 @@ def test_seeds_choose_other_places(cli, tmp_path):
         (("--start", "lambda="), "lambda = '' is no number"),
         (("--start", "x0=1,x0=2"), "x0 stands twice"),
         (("--method", "gauss-newtom"), "did you mean 'gauss-newton'?"),
-        (("--rtol", "0"), "--rtol takes a number from 1e-13 to 0.01, not 0"),
-        (("--rtol", "nan"), "--rtol takes a finite number, not nan"),
-        (("--rtol", "1e-8", "--integrator", "rk4"), "rk4 has none"),
         (("--sigma", "y=1"), "--sigma: 'y' is no output of the model; outputs are x"),
         (("--sigma", "x=-1"), "--sigma: x = -1 is no number above 0; use y1=0.01,y2=0.02"),
         (("--sigma", "much"), "--sigma: x = much is no number above 0"),
@@ -87,7 +74,6 @@ def test_seeds_choose_other_places(cli, tmp_path):
         (("--method", "gauss-newton", "--loss", "huber"), "robust loss"),
         (("--tolerance", "1e-3"), "--tolerance belongs to --method gauss-newton or quasilinearization"),
         (("--tolerance", "-2", "--method", "gauss-newton"), "a number above 0, not -2"),
-        (("--max-iterations", "0"), "--max-iterations"),
     ],
 )
 def test_options_that_cannot_be_meant_are_refused(cli, arguments, said):

@@ -3,17 +3,15 @@
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import pytest
-import typer
+import typer.main
 from golden.cases import CASES, STORED
 from repetitions import FULL
 from typer.core import TyperOption
 
 from rotorid.base.answer import COLUMNS
 from rotorid.cli import app
-from rotorid.commands.app import INPUT, command
 from rotorid.samples import sample_data
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))
@@ -68,19 +66,6 @@ def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain
         assert ("─ Output ─" in text) == (not plain)
 
 
-def test_an_option_that_no_panel_names_stands_in_the_first():
-    @command(panels={"Method": "second"}, to=("json",))
-    def one(
-        first: Annotated[int, typer.Option()] = 1, second: Annotated[int, typer.Option()] = 2, *, to: object
-    ):
-        """Nothing."""
-
-    parameters = one.__signature__.parameters
-    assert list(parameters) == ["first", "second", "json"]
-    panels = [p.annotation.__metadata__[0].rich_help_panel for p in parameters.values()]
-    assert panels == [INPUT, "Method", "Output"]
-
-
 @pytest.mark.full
 @pytest.mark.parametrize(("name", "line"), EXAMPLES, ids=[f"{n}-{i}" for i, (n, _) in enumerate(EXAMPLES)])
 def test_every_example_runs_as_typed(cli, checkout, name, line):
@@ -102,18 +87,17 @@ def test_rotorid_alone_shows_the_jobs_with_examples_that_run(cli, checkout):
     outcome = cli()
     lines = outcome.out.splitlines()
     assert outcome.code == 0
-    assert len(lines) <= len(COMMANDS) + 7  # a line each, five jobs, a long example; and no answer
+    assert len(lines) <= 24
     assert max(map(len, lines)) <= COLUMNS
-    told = [line[2:14].strip() for line in lines if line.startswith("  ") and "rotorid " not in line]
-    assert sorted(told) == sorted(COMMANDS)
-    examples = [line[line.index("rotorid ") :] for line in lines[1:] if "rotorid " in line]
-    assert [example.split()[1] for example in examples] == [
-        "balance",
-        "critical",
-        "reduce",
-        "identify",
-        "demo",
-    ]
+    words = set(outcome.out.replace(",", " ").replace(";", " ").split())
+    assert {name.split()[0] for name in COMMANDS} <= words
+    examples = [line.strip() for line in lines if line.startswith("  rotorid ")]
+    assert [example.split()[1] for example in examples] == ["balance", "critical", "reduce", "identify"]
     for example in examples:
-        found = cli(*shlex.split(example)[1:])
-        assert found.code == 0, example
+        assert cli(*shlex.split(example)[1:]).code == 0, example
+
+
+def test_the_help_of_balance_is_one_to_read(cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(COLUMNS))
+    monkeypatch.setattr(COMMANDS["balance"], "rich_markup_mode", "rich")
+    assert len(cli("balance", "--help").out.splitlines()) <= 60

@@ -28,25 +28,6 @@ def book(which, modes, *more):
     )  # fmt: skip
 
 
-def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
-    for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
-        assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
-    few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
-    assert few["placement"]["considered"] == 4
-
-
-def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):
-    base = f'shaft = "{ROTOR}"\n[[seal]]\nnode = 12\nstiffness_N_per_m = 2e6\n'
-    path = tmp_path / "sealed.toml"
-    path.write_text(base)
-    plain = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--json")
-    apart = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--supports-apart", "--json")
-    assert plain.code == apart.code == 0, plain.err + apart.err
-    assert apart.json["seal_stiffness_N_per_m"] == [0.0, 2e6, 0.0]
-    # other rows of the same equations: the seal stands in the compliance, or beside it
-    np.testing.assert_allclose(apart.json["masses_kg"], plain.json["masses_kg"], rtol=0.01)
-
-
 def test_measured_modes_of_a_rotor_are_used_and_compared(cli):
     own = cli("reduce", ROTOR, "--measured", BOOK / "modes.csv", "--json").json
     assert own["nodes"] == [7, 12, 18]
@@ -86,11 +67,6 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=x"), "compliance=x is no NAME=NUMBER"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=1,compliance=2"), "stands twice"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=-1"), "from 0 to 100 percent"),
-        ((ROTOR, "--nodes", "7,12", "--damping", "1"), "--damping does nothing without --model"),
-        (
-            (ROTOR, "--nodes", "7,12,18", "--damping", "1,x", "--model", "m.toml"),
-            "percent of critical damping",
-        ),
         ((ROTOR, "--nodes", "7,12,18", "--stability", "100"), "--stability '100' is not a range"),
         ((ROTOR, "--nodes", "7,12", "--compliance", BOOK / "compliance.csv"), "takes the place of a rotor"),
         ((ROTOR, "--nodes", "7,12", "--state-space", "x.csv"), "cannot write this kind of file"),
@@ -153,7 +129,6 @@ def test_measured_shapes_are_compared_with_the_rotor():
     ("more", "message"),
     [
         (("--masses", 4), "--masses does nothing without --rank or --place"),
-        (("--both-planes",), "--both-planes does nothing without --model"),
         (("--force", "7"), "--force does nothing without --model"),
         (("--measured", BOOK / "modes.csv", "--methods"), "--methods compares with the computed rotor"),
         (("--response", "1:2"), "--response '1:2' is not a range"),
@@ -183,20 +158,6 @@ def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeyp
     for name in ("masses", "weight", "stiffness", "damping"):
         stated = getattr(theirs, name)
         np.testing.assert_allclose(getattr(mine, name), stated, rtol=1e-7, atol=1e-9 * np.abs(stated).max())
-
-
-def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
-    document = cli("reduce", MOTION / "rotor.toml", "--place", "book", "--keep-supports", "--json").json
-    assert document["small_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
-    assert sum(document["small_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
-    ranked = cli("reduce", MOTION / "rotor.toml", "--rank", "--masses", 2, "--keep-supports", "--json").json
-    assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
-    path = tmp_path / "small.toml"
-    more = ("--keep-supports", "--damping", "1,2", "--model", path, "--report", tmp_path / "page.html")
-    cli("reduce", ROTOR, "--nodes", "7,12,18", *more)
-    model = read_small_model(path)
-    assert model.supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
-    assert model.damping.any()
 
 
 @pytest.mark.parametrize("kept", [(), ("--keep-supports",)])
@@ -279,7 +240,10 @@ def test_what_is_not_linear_is_not_fitted(cli):
             (ROTOR, "--nodes", "7", "--keep-supports", "--stability", "0:9"),
             "--stability asks for the rotor on",
         ),
-        ((ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"), "leave out --keep-supports"),
+        (
+            (ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"),
+            "--state-space asks for the rotor on",
+        ),
         (("--compliance", ROTOR, "--measured", ROTOR, "--keep-supports"), "--keep-supports needs a rotor"),
     ],
 )
@@ -289,3 +253,39 @@ def test_kept_supports_are_refused(cli, tmp_path, monkeypatch, arguments, messag
     assert refused.code == 2
     assert message in " ".join(refused.err.split())
     assert not (tmp_path / "m.toml").exists()
+
+
+def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
+    for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
+        assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
+    few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
+    assert few["placement"]["considered"] == 4
+    document = cli("reduce", ROTOR, "--rank", "--json").json
+    assert document["nodes"] == [4, 10, 16]
+    assert document["placement"]["best_by_frequency"]["nodes"] == [3, 11, 14]
+    assert document["placement"]["book_rule"]["nodes"] == [7, 12, 18]
+
+
+def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
+    kept = ("--nodes", "7,12,18", "--keep-supports")
+    document = cli("reduce", MOTION / "rotor.toml", *kept, "--json").json
+    assert document["small_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
+    assert sum(document["small_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
+    ranked = cli("reduce", MOTION / "rotor.toml", "--rank", "--masses", 2, "--keep-supports", "--json").json
+    assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
+    path = tmp_path / "small.toml"
+    cli("reduce", ROTOR, *kept, "--model", path, "--report", tmp_path / "page.html")
+    model = read_small_model(path)
+    assert model.supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
+
+
+def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):
+    base = f'shaft = "{ROTOR}"\n[[seal]]\nnode = 12\nstiffness_N_per_m = 2e6\n'
+    path = tmp_path / "sealed.toml"
+    path.write_text(base)
+    plain = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--json")
+    apart = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--supports-apart", "--json")
+    assert plain.code == apart.code == 0, plain.err + apart.err
+    assert apart.json["seal_stiffness_N_per_m"] == [0.0, 2e6, 0.0]
+    # other rows of the same equations: the seal stands in the compliance, or beside it
+    np.testing.assert_allclose(apart.json["masses_kg"], plain.json["masses_kg"], rtol=0.01)

@@ -67,26 +67,6 @@ def test_a_window_of_instability_between_the_speeds_that_used_to_be_looked_at(cl
     assert cli(*beside, "--json").json["warnings"] == []
 
 
-def test_nothing_is_taken_from_a_window(cli, window):
-    command = ("response", window / "win.toml", "--unbalance", window / "u.csv", "--speeds", "120:280:4")
-    outside = cli(*command, "--json", "--plot", window / "b.png").json
-    speeds = [row["speed_rad_s"] for row in (*outside["largest"], *outside["peaks"])]
-    speeds += outside["bearing_forces"]["largest_at_rad_s"]
-    assert not [v for v in speeds if 142.9 < v < 187.1]
-    assert (
-        len(cli("campbell", window / "win.toml", "--speeds", "10:1000:30", "--json").json["unstable_speeds"])
-        == 1
-    )
-    inside = (*command[:-1], "150:180:5")
-    document = cli(*inside, "--json").json
-    assert {row["amplitude_m"] for row in document["largest"]} == {None}
-    assert document["bearing_forces"]["largest_N"] == [None] * 3
-    orbits = ("--view", "orbits", "--plot", window / "o.png")
-    assert "no orbit to draw" in cli(*inside, *orbits).err
-    assert "no steady response" in cli(*command, *orbits, "--at", "164").err
-    assert cli(*command, *orbits).code == 0
-
-
 def test_both_crossings_within_one_interval(cli, crossings):
     expected = [100.20, 149.80]
     one = cli("critical", crossings, "-n", 1, "--json").json
@@ -207,3 +187,22 @@ def test_a_model_of_few_modes_shows_those_that_exist(cli, crossings):
     plain.write_text(crossings.read_text().split("[[bearing]]")[0] + bearings)
     assert cli("critical", plain, "--json").json["critical_speeds_rad_s"] == pytest.approx([100.0], rel=1e-5)
     assert "2 critical speeds cannot be found: the model has 1 to 1" in cli("critical", plain, "-n", 2).err
+
+
+def test_nothing_is_taken_from_a_window(cli, window):
+    command = ("response", window / "win.toml", "--unbalance", window / "u.csv", "--speeds", "120:280:4")
+    outside = cli(*command, "--json", "--plot", window / "b.png").json
+    speeds = [row["speed_rad_s"] for row in (*outside["largest"], *outside["peaks"])]
+    speeds += outside["bearing_forces"]["largest_at_rad_s"]
+    assert not [v for v in speeds if 142.9 < v < 187.1]
+    assert (
+        len(cli("campbell", window / "win.toml", "--speeds", "10:1000:30", "--json").json["unstable_speeds"])
+        == 1
+    )
+    inside = (*command[:-1], "150:180:5")
+    document = cli(*inside, "--json").json
+    assert {row["amplitude_m"] for row in document["largest"]} == {None}
+    assert document["bearing_forces"]["largest_N"] == [None] * 3
+    orbits = ("--view", "orbits", "--plot", window / "o.png")
+    assert "no orbit to draw" in cli(*inside, *orbits).err
+    assert cli(*command, *orbits).code == 0

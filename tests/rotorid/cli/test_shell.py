@@ -66,7 +66,12 @@ def test_a_closed_pipe_ends_quietly():
 
 @pytest.mark.parametrize("redirection", ["2>/dev/full", pytest.param("2>&-", marks=pytest.mark.full)])
 @pytest.mark.parametrize(
-    "words", ["critical nofile.csv", "critical --nope", "critical {} -n 99", "{} --verbose"]
+    "words",
+    [
+        "critical nofile.csv",
+        "critical --nope",
+        "critical {} -n 99",
+    ],
 )
 def test_a_complaint_that_nobody_can_read_keeps_its_status(redirection, words):
     words = words.format(ROTOR)

@@ -1,7 +1,5 @@
 """`rotorid split`: what it prints and writes, and what it refuses."""
 
-import math
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,7 +18,7 @@ def vector(rows):
 
 
 def test_holes_pieces_and_what_is_taken(run, tmp_path):
-    args = ("35g@120", "--holes", "24", "--pieces", "10g,20g", "--taken", "9:10g", "--most-pieces", "3")
+    args = ("35g@120", "--holes", "24", "--pieces", "10g,20g", "--taken", "9:10g")
     document = run(*args, "--json").json
     assert document["method"] == "holes"
     assert document["unit"] == "g"
@@ -40,10 +38,9 @@ def test_holes_pieces_and_what_is_taken(run, tmp_path):
 
 
 def test_against_the_rotation_is_the_same_split_with_the_same_numbers(run):
-    args = ("35g@122", "--holes", "24", "--first-hole", "7.5", "--pieces", "10g,20g", "--good-enough", "3")
+    args = ("35g@122", "--holes", "24", "--first-hole", "7.5", "--pieces", "10g,20g")
     one, other = (run(*args, "--angles", way, "--json").json for way in ("with rotation", "against rotation"))
     assert one["mounted"]["mass"] == pytest.approx(other["mounted"]["mass"], rel=1e-9)
-    assert one["relative_error"] <= 0.03
     assert [r["angle_deg"] for r in one["holes"]] == pytest.approx([r["angle_deg"] for r in other["holes"]])
     assert other["angles"] == "against rotation"
 
@@ -79,7 +76,7 @@ def test_two_weights_at_free_angles(run, tmp_path):
 
 
 def test_drilling_takes_away_opposite(run, tmp_path):
-    args = ("3g@120", "--drill", "8mm", "--radius", "100mm", "--density", "7800")
+    args = ("3g@120", "--drill", "8mm", "--radius", "100mm")
     document = run(*args, "--json").json
     assert document["target"] == {"mass": pytest.approx(3), "angle_deg": pytest.approx(120)}
     assert document["angle_deg"] == pytest.approx(300)
@@ -88,7 +85,7 @@ def test_drilling_takes_away_opposite(run, tmp_path):
     # what the drill takes, a cylinder and the cone of its tip, 118° wide
     cone, depth = 0.004 / np.tan(np.radians(59)), document["depth_m"]
     assert document["tip_depth_m"] - depth == pytest.approx(cone, rel=1e-9)
-    area = 7800 * np.pi * 0.004**2
+    area = 7850 * np.pi * 0.004**2
     assert document["mass_kg"] == pytest.approx(area * (depth + cone / 3), rel=1e-9)
     moment = area * (depth * (0.1 - depth / 2) + cone / 3 * (0.1 - depth - cone / 4))
     assert moment == pytest.approx(0.003 * 0.1, rel=1e-9)
@@ -97,37 +94,21 @@ def test_drilling_takes_away_opposite(run, tmp_path):
     assert row == pytest.approx({"angle_deg": 300, "mass_g": grams, "radius_mm": 100, "depth_mm": depth_mm})
 
 
-def test_combining_trimming_and_rounding(run):
-    both = run("3g@0+4g@90", "--json").json
-    assert both["weight"] == {
-        "mass": pytest.approx(5),
-        "angle_deg": pytest.approx(math.degrees(math.atan2(4, 3))),
-    }
-    rest = run("3g@0+4g@90", "--mounted", "3g@0", "--json").json
-    assert rest["weight"] == {"mass": pytest.approx(4), "angle_deg": pytest.approx(90)}
-    rounded = run("34.7g@121.3", "--step", "0.5g", "--angle-step", "5", "--json").json
-    assert rounded["weight"] == {"mass": 34.5, "angle_deg": pytest.approx(120)}
-    assert rounded["error"]["mass"] == pytest.approx(
-        abs(34.5 * np.exp(1j * np.radians(120)) - 34.7 * np.exp(1j * np.radians(121.3)))
-    )
-    assert rounded["error"]["mass"] <= rounded["largest_possible_error"]
-
-
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        ("35@120 --grind", "a weight needs its unit, such as 35g@120"),
-        ("35g --grind", "a weight at an angle in degrees"),
-        ("35gg@120 --grind", "expected a unit of weight"),
-        ("-35g@120 --grind", "No such option"),
-        ("35g@500 --grind", "no angle from -360 to 360"),
-        ("1e999g@1 --grind", "expected a finite number"),
-        ("3g@0+4g_mm@90", "cannot be added"),
+        ("35@120 --drill 8mm", "a weight needs its unit, such as 35g@120"),
+        ("35g --drill 8mm", "a weight at an angle in degrees"),
+        ("35gg@120 --drill 8mm", "expected a unit of weight"),
+        ("-35g@120 --drill 8mm", "No such option"),
+        ("35g@500 --drill 8mm", "no angle from -360 to 360"),
+        ("1e999g@1 --drill 8mm", "expected a finite number"),
         ("35g@120", "say how to mount the weight"),
         ("0g@120 --holes 4", "there is nothing to mount"),
-        ("35g@120 --holes 4 --two 3g,4g", "different ways to mount a weight"),
+        ("35g@120 --holes 4 --two 3g,4g", "in one way: --holes, --two or --drill"),
+        ("3g@0+4g_mm@90 --holes 4", "cannot be added"),
+        ("35g@120 --holes 4 --mounted 3g_mm@0", "both masses or both unbalances"),
         ("35g@120 --two 20g,30g --pieces 3g", "--pieces means something only with --holes"),
-        ("35g@120 --grind --step 3g", "--step means something only with --holes"),
         ("35g@120 --holes 0,90,30", "in the order of their angles"),
         ("35g@120 --holes 0,90,90", "list each hole once"),
         ("35g@120 --holes 0,90,360", "within one turn"),
@@ -136,22 +117,15 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),
         ("35g@120 --holes 4 --pieces 10", "a weight needs its unit"),
         ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),
-        ("35g@120 --holes 4 --pieces 10g --step 1g", "either --pieces or a --step"),
         ("35g@120 --holes 4 --pieces 10g_mm", "converts only with --radius"),
-        ("35g@120 --holes 4 --pieces 10g --stock x", "a whole number for each of the pieces"),
-        ("35g@120 --holes 4 --pieces 10g --most-pieces 0", "1 or more"),
-        ("35g@120 --holes 4 --pieces 10g --good-enough -1", "no error from 0 to 100"),
         ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),
         ("35g@120 --holes 4 --taken 1:10g,1:3g", "1 stands twice"),
         ("35g@120 --holes 2 --taken 1:3g,2:3g", "nothing can be mounted"),
-        ("35g@120 --holes 0,10 --taken 1:3g --max-mass 1g", "no admissible weight at all"),
         ("35g@120 --drill 8mm --radius 0mm", "expected a value above 0"),
         ("35g@120 --drill 8mm", "--drill needs --radius"),
         ("35g@120 --drill 8 --radius 100mm", "--drill '8': a number with its unit (m, mm, um, mil, in)"),
         ("35g@120 --drill 8mm --radius 100mm", "use a larger drill, or share the weight (--holes)"),
         ("35g@120 --two 2g", "give two weights"),
-        ("35g@120 --mounted 3g_mm@0", "both masses or both unbalances"),
-        ("35g@120 --step 1g --angle-step 400", "no step of an angle"),
     ],
 )
 def test_bad_input_gives_one_message(run, args, words):
@@ -163,7 +137,7 @@ def test_bad_input_gives_one_message(run, args, words):
 
 
 def test_wrong_way_of_angles(run):
-    outcome = run("35g@120", "--grind", "--radius", "1m", "--angles", "sideways")
+    outcome = run("35g@120", "--drill", "8mm", "--radius", "1m", "--angles", "sideways")
     assert (outcome.code, "--angles 'sideways' is not known" in outcome.err) == (2, True)
 
 
@@ -175,11 +149,8 @@ def test_vectors_are_read_exactly():
     assert several == [0.002, -0.003j]
 
 
-def test_grinding_and_rounding_in_the_table_and_in_words(run, tmp_path):
-    path = tmp_path / "t.csv"
-    run("3500g_mm@120", "--grind", "--radius", "100mm", "--output", path)
-    (row,) = pd.read_csv(path, encoding="utf-8-sig").to_dict("records")
-    assert row == pytest.approx({"angle_deg": 300, "mass_g": 35, "radius_mm": 100})
-    run("34.7g@121.3", "--step", "0.5g", "--angle-step", "5", "--output", path)
-    (row,) = pd.read_csv(path, encoding="utf-8-sig").to_dict("records")
-    assert row == pytest.approx({"mass_g": 34.5, "angle_deg": 120})
+def test_weights_are_added_and_what_is_mounted_counts(run):
+    both = run("3g@0+4g@90", "--two", "3g,4g", "--json").json
+    assert both["target"]["mass"] == pytest.approx(5)
+    rest = run("3g@0+4g@90", "--mounted", "3g@0", "--holes", "4", "--json").json
+    assert rest["target"] == {"mass": pytest.approx(4), "angle_deg": pytest.approx(90)}

@@ -88,9 +88,3 @@ def test_the_sheet_begins_with_the_judgement(cli, tmp_path):
     assert balance(cli, "alike_planes", "--report", tmp_path / "sheet.html").code == 0
     page = (tmp_path / "sheet.html").read_text()
     assert 0 < page.index("Do not mount these weights") < page.index('id="warnings"')
-
-
-def test_best_planes_leave_out_the_one_that_fights(cli):
-    row = balance(cli, "alike_planes", "--best-planes", "1", "--json").json["best_planes"]["rows"][0]
-    assert row["rms_expected"] > row["rms_after"]
-    assert "expected" in balance(cli, "alike_planes", "--best-planes", "1", "--table").out

@@ -42,8 +42,6 @@ BAD = [
     (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "prope"), "no station is called 'prope'"),
     (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "probe:400"), "-360 to 360"),
     (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "1,,2"), "with commas"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "300"), "asked for from 100 to 200 rad/s"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "100,110"), "--at takes one speed"),
     (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--view", "3d"), "--view"),
     (("influence", "R", "--planes", "wheel", "--sensors", "99:45", *OK_SPEEDS), "node 99 does not exist"),
 ]

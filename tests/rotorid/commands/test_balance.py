@@ -5,9 +5,9 @@ import math
 import pytest
 from documents import same
 
+from rotorid.commands import Balance, BalanceOptions, balance
 from rotorid.samples import sample_data
 from rotorid.tables import job_from_files, read_job
-from rotorid.workflows import Balance, BalanceOptions, balance
 
 TURBO = sample_data() / "turbo_job"
 TABLES = [TURBO / "runs.csv", TURBO / "weights.csv"]
@@ -44,22 +44,18 @@ UM_PP = 0.5e-6
         ),
         pytest.param(
             [TURBO / "job.toml"],
-            "--best-planes 2 --ridge 0.03 --method least-squares",
-            {"best_planes": 2, "ridge": 0.03, "method": "least-squares"},
+            "--planes left,right --ridge 0.03 --method least-squares",
+            {"planes": ["left", "right"], "ridge": 0.03, "method": "least-squares"},
             id="planes",
         ),
         pytest.param(
             [TURBO / "checked.toml"],
-            "--planes left,right --grade G2.5 --rotor-mass 500kg --service-speed 3000rpm "
-            "--positions left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm",
+            "--planes left,right --grade G2.5 --rotor-mass 500kg --service-speed 3000rpm",
             {
                 "planes": ["left", "right"],
                 "grade": "G2.5",
                 "rotor_mass": 500.0,
                 "service_speed": 3000 * RPM,
-                "positions": {"left": 0.1, "right": 0.6},
-                "bearings": (0.0, 0.7),
-                "centre": 0.32,
             },
             id="grade",
         ),
@@ -90,7 +86,7 @@ def test_a_job_that_was_read(tmp_path):
     assert assumed["other_readings"] == []
     assert balance(TABLES).document["other_readings"] != []
     with pytest.raises(ValueError, match="files of a job"):
-        found.table_file(tmp_path / "sheet.xlsx")
+        found.written(tmp_path / "sheet.xlsx")
 
 
 @pytest.mark.parametrize(
@@ -100,7 +96,7 @@ def test_a_job_that_was_read(tmp_path):
         {"ridge": math.inf},
         {"split": True, "ridge": 0.1},
         {"grade": "G2.5"},
-        {"centre": 0.0},
+        {"rotor_mass": 5.0},
     ],
 )
 def test_options_that_cannot_be(options):

@@ -102,10 +102,10 @@ def test_unbalance_is_a_vector_at_each_station():
     ax = next(ax for ax in figure.axes if ax.get_ylabel() == "unbalance, g·mm")
     assert ax.get_aspect() == 1
     arrows = ax.collections[0]
-    assert pytest.approx(found.found.unbalance * 1e6) == arrows.U + 1j * arrows.V
+    assert pytest.approx(found.result.unbalance * 1e6) == arrows.U + 1j * arrows.V
     edges = [line for line in ax.lines if line.get_color() == "black"]
     assert len(edges) == 3
     tip = arrows.X[0] + arrows.U[0] + 1j * arrows.V[0]
     reach = np.abs(edges[0].get_xdata() + 1j * edges[0].get_ydata() - tip)
-    std = found.found.std[0] * 1e6
+    std = found.result.std[0] * 1e6
     assert np.hypot(reach.min(), reach.max()) / np.sqrt(2) == pytest.approx(2.4477 * std, rel=0.01)

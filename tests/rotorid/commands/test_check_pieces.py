@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.workflows import BalanceOptions, balance
+from rotorid.commands import BalanceOptions, balance
 
 HEAD = "run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg\n"
 WEIGHTS = "run,plane,mass_g,angle_deg\n"

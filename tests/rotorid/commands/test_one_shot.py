@@ -9,10 +9,10 @@ import pytest
 import fem
 from fem.parameters import with_parameters
 from rotorid import read_job, read_rotor
+from rotorid.commands import BalanceOptions, balance
 from rotorid.commands.coefficients import choose
 from rotorid.commands.one_shot import counted_before
 from rotorid.samples import sample_data
-from rotorid.workflows import BalanceOptions, balance
 
 FOLDER = sample_data() / "calibration"
 

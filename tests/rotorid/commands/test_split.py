@@ -23,26 +23,13 @@ def test_arrays_are_lists():
     ("args", "options"),
     [
         (
-            "--holes 24 --pieces 10g,20g --taken 9:10g --most-pieces 3 --stock 2,2 --per-hole 2 "
-            "--max-mass 60g",
-            SplitOptions(
-                holes=24,
-                pieces=[0.01, 0.02],
-                taken={"9": 0.01},
-                most_pieces=3,
-                stock=[2, 2],
-                per_hole=2,
-                max_mass=0.06,
-            ),
+            "--holes 24 --pieces 10g,20g --taken 9:10g --per-hole 2",
+            SplitOptions(holes=24, pieces=[0.01, 0.02], taken={"9": 0.01}, per_hole=2),
         ),
-        ("--holes 0,40,75,200 --step 0.5g", SplitOptions(holes=[0, 40, 75, 200], step=5e-4)),
+        ("--holes 0,40,75,200", SplitOptions(holes=[0, 40, 75, 200])),
         ("--two 20g,30g --angles againstrotation", SplitOptions(two=[0.02, 0.03], angles="against rotation")),
-        (
-            "--drill 16mm --radius 100mm --density 7800",
-            SplitOptions(drill=0.016, radius=0.1, density=7800),
-        ),
-        ("--grind --radius 100mm", SplitOptions(grind=True, radius=0.1)),
-        ("--mounted 10g@0 --angle-step 5", SplitOptions(mounted=0.01, angle_step=5)),
+        ("--drill 16mm --radius 100mm", SplitOptions(drill=0.016, radius=0.1)),
+        ("--mounted 10g@0 --holes 12", SplitOptions(mounted=0.01, holes=12)),
     ],
 )
 def test_from_python_as_from_the_command_line(cli, args, options):

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy.io import wavfile
 
+from rotorid.commands import BalanceOptions, VectorsOptions, balance, vectors
 from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
-from rotorid.workflows import BalanceOptions, VectorsOptions, balance, vectors
 
 SAMPLE = sample_data() / "waveforms"
 RATE = 2048
@@ -41,8 +41,6 @@ def test_the_table_is_what_balance_reads(tmp_path):
     typed = balance(job, BalanceOptions()).to_dict()
     assert direct["corrections"] == typed["corrections"]
     assert direct["warnings"] == typed["warnings"]
-    other = balance(job, BalanceOptions(waveforms=SAMPLE / "waveforms.toml")).to_dict()
-    assert other["corrections"] == typed["corrections"]
 
 
 def test_the_sample_is_balanced_by_its_records():
@@ -70,21 +68,6 @@ def test_phase_is_written_as_asked(tmp_path, word):
     assert row["speed_rpm"] == pytest.approx(17.3 * 60, rel=1e-4)
 
 
-def test_units_of_vectors(tmp_path):
-    file = write(tmp_path / "a.wav", offset=1.5)
-    options = VectorsOptions(tacho="1", unit="um", phase="lead", amplitude="um_pp")
-    (row,) = vectors([file], options).to_dict()["rows"]
-    assert row["amplitude_um_pp"] == pytest.approx(0.4, rel=1e-3)
-    assert row["overall_um_pp"] == pytest.approx(0.4, rel=0.03)
-    assert row["gap_um"] == pytest.approx(1.5, rel=1e-3)
-    speed = 2 * np.pi * 17.3
-    options = VectorsOptions(tacho="1", unit="um", phase="lead", amplitude="mm_s_rms")
-    (row,) = vectors([file], options).to_dict()["rows"]
-    assert row["amplitude_mm_s_rms"] == pytest.approx(0.2e-3 * speed / np.sqrt(2), rel=1e-3)
-    assert row["phase_deg"] == pytest.approx(np.degrees(0.6) + 90, abs=0.5)
-    assert row["gap_mm_s"] is None
-
-
 def test_command_line(cli, tmp_path):
     result = cli("vectors", SAMPLE / "waveforms.toml", "--json", "--output", tmp_path / "runs.csv")
     assert result.code == 0, result.err
@@ -105,11 +88,6 @@ def test_command_line(cli, tmp_path):
         (("--tacho", "1", "--orders", "0"), "--orders takes whole numbers from 1 to 20"),
         (("--tacho", "1", "--speeds", "9000rpm"), "there is no speed of 9000 rpm"),
         (("--tacho", "1", "--pulses", "0"), "pulses"),
-        (("--tacho", "1", "--edge", "left"), "leading"),
-        (
-            ("--tacho", "1", "--amplitude", "um", "--unit", "V"),
-            "a unit that can become that of the amplitudes",
-        ),
     ],
 )
 def test_what_cannot_be_is_told_in_one_message(cli, words, message):

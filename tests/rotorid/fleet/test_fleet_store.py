@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from repetitions import FULL
 
+from rotorid.fleet.adding import fleet_add, read_jobs
+from rotorid.fleet.showing import FleetShowOptions, fleet_show
 from rotorid.samples import sample_data
 from rotorid.tables.fleet.fleet_store import FleetStore
 from rotorid.tables.fleet.fleet_tables import TABLES
-from rotorid.workflows.fleet.fleet_add import fleet_add, read_jobs
-from rotorid.workflows.fleet.fleet_show import FleetShowOptions, fleet_show
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 FANS = sample_data() / "fleet" / "fan-132"
@@ -26,7 +26,7 @@ def killed(*names):
     left[0] -= 1
     replace(*names)
 os.replace = killed
-from rotorid.workflows.fleet.fleet_add import fleet_add
+from rotorid.fleet.adding import fleet_add
 fleet_add("F", [sys.argv[2]])
 """
 
@@ -48,7 +48,7 @@ def test_the_same_job_twice_changes_nothing_wherever_it_lies(tree, cli, monkeypa
     shutil.copytree(tree / "fan" / "132-08", tree / "elsewhere")
     read = []
     monkeypatch.setattr(
-        "rotorid.workflows.fleet.fleet_add.read_jobs", lambda found, _: read.extend(found) or ()
+        sys.modules["rotorid.fleet.adding"], "read_jobs", lambda found, _: read.extend(found) or ()
     )
     again = cli("fleet", "add", "F", "tree", "tree/fan").out
     assert read == []  # what its files hold says it, before they are read as a job
@@ -67,7 +67,7 @@ def test_a_job_that_changed_stands_in_place_of_the_older(tree):
         'check = "check.csv"\ncheck_weights = "check_weights.csv"\n' + job.read_text("utf-8"), "utf-8"
     )
     added = fleet_add("F", [tree])
-    assert (added.jobs, added.known) == (1, 1)
+    assert (added.result.jobs, added.result.known) == (1, 1)
     new = store.table("jobs")
     assert len(new) == len(old) == 2
     assert new.set_index("machine")["check_runs"].to_dict() == {"132-01": 1, "132-08": 1}
@@ -83,9 +83,9 @@ def test_what_another_writer_has_added_meanwhile_is_known(tree, monkeypatch):
         FleetStore(tree.parent / "F").append(rows[:1])
         return rows
 
-    monkeypatch.setattr("rotorid.workflows.fleet.fleet_add.read_jobs", slow)
+    monkeypatch.setattr(sys.modules["rotorid.fleet.adding"], "read_jobs", slow)
     added = fleet_add("F", [tree])
-    assert (added.jobs, added.vectors, added.known) == (1, 12, 1)
+    assert (added.result.jobs, added.result.vectors, added.result.known) == (1, 12, 1)
 
 
 def test_tables_are_plain_parquet(tree):
@@ -128,15 +128,15 @@ def test_damaged_files_are_named_and_spoil_nothing(tree, cli):
 
 def test_other_jobs_at_the_same_place_of_two_trees_are_named(tree):
     other = shutil.copytree(tree, tree.parent / "other")
-    assert fleet_add("F", [tree, other]).known == 2  # the same jobs
+    assert fleet_add("F", [tree, other]).result.known == 2  # the same jobs
     for k, said in enumerate(("", 'machine = "X"\n')):
         job = other / "fan" / "132-08" / "job.toml"
         job.write_text(said + job.read_text("utf-8"), "utf-8")
         runs = job.with_name("runs.csv")
         runs.write_bytes(runs.read_bytes() + b"\n")
         added = fleet_add("F", [tree, other])
-        assert (added.jobs, len(added.damaged)) == (k, 1 - k)
-        assert all("at the same place below its tree" in reason for reason in added.damaged.values())
+        assert (added.result.jobs, len(added.result.damaged)) == (k, 1 - k)
+        assert all("at the same place below its tree" in reason for reason in added.result.damaged.values())
     assert set(FleetStore(tree.parent / "F").table("jobs")["machine"]) == {"132-01", "132-08", "X"}
 
 
@@ -150,7 +150,7 @@ def test_a_killed_writer_leaves_nothing_and_its_lock_goes_with_it(tree):
             fleet_show("F")
     own = tree.parent / "F" / "jobs" / "mine.parquet"  # of somebody else
     own.touch()
-    assert fleet_add("F", [tree / "fan" / "132-01"]).jobs == 1
+    assert fleet_add("F", [tree / "fan" / "132-01"]).result.jobs == 1
     assert own.exists()
     own.unlink()
     assert len(list((tree.parent / "F").rglob("*.parquet"))) == len(TABLES)

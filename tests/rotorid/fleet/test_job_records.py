@@ -11,10 +11,10 @@ from cases import each_of
 from workbook_jobs import as_workbook
 
 from balancing import estimate_influence
+from rotorid.fleet.adding import FleetAddOptions, fleet_add
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.tables.fleet.fleet_store import FleetStore, trials_of
-from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 FLEET = sample_data() / "fleet"
@@ -26,7 +26,7 @@ def fans(tmp_path_factory):
     """The sample, as a store."""
     folder = tmp_path_factory.mktemp("fleet") / "fans"
     added = fleet_add(folder, [FLEET])
-    assert (added.jobs, added.known, added.damaged) == (9, 0, {})
+    assert (added.result.jobs, added.result.known, added.result.damaged) == (9, 0, {})
     return FleetStore(folder)
 
 
@@ -145,7 +145,7 @@ def test_trials_come_back_as_they_were_read(tmp_path):
     (uneven / "runs.csv").write_text("\n".join(rows[:-1]) + "\n", "utf-8")
     names = ("rk4", "waveforms", "turbo_job", "left_in")
     added = fleet_add(tmp_path / "F", [tmp_path / "tree", *(sample_data() / name for name in names)])
-    assert added.damaged == {}
+    assert added.result.damaged == {}
     store = FleetStore(tmp_path / "F")
     jobs = store.table("jobs")
     places = {"uneven": uneven, **{name: sample_data() / name for name in names}}
@@ -212,7 +212,7 @@ def test_workbooks_are_jobs_with_machine_and_date_in_their_cells(tmp_path):
         made["settings"].append([key, value])
     made.save(book)
     added = fleet_add(tmp_path / "F", [tmp_path / "tree", source / "checked.toml"])
-    assert (added.jobs, added.damaged) == (2, {})
+    assert (added.result.jobs, added.result.damaged) == (2, {})
     store = FleetStore(tmp_path / "F")
     jobs = store.table("jobs")
     assert jobs["machine"].tolist() == ["4711", "turbo_job"]
@@ -241,4 +241,4 @@ def test_machine_type_and_date(tmp_path, folders, said, option, expected):
     added = fleet_add(tmp_path / "F", [tmp_path / "tree"], FleetAddOptions(machine_type=option or None))
     (job,) = FleetStore(tmp_path / "F").table("jobs").to_dict("records")
     assert (job["machine"], job["machine_type"], job["date"]) == expected
-    assert added.untyped == (not expected[1])
+    assert added.result.untyped == (not expected[1])

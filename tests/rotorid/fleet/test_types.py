@@ -7,13 +7,13 @@ import pandas as pd
 import pytest
 
 from balancing import UndeterminedError
+from rotorid.commands import balance
 from rotorid.commands.balance import BalanceOptions
-from rotorid.commands.type_coefficients import type_coefficients
+from rotorid.fleet.adding import FleetAddOptions, fleet_add
+from rotorid.fleet.fitting import FleetFitOptions, fleet_fit
+from rotorid.fleet.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.workflows import balance
-from rotorid.workflows.fleet.fleet_add import FleetAddOptions, fleet_add
-from rotorid.workflows.fleet.fleet_fit import FleetFitOptions, fleet_fit
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
@@ -79,7 +79,7 @@ def fleet(tmp_path_factory):
         for day in range(3 if k < 5 else 1):
             machine.job(folder / "tree" / "fan" / f"F{k}" / f"2026-01-0{day + 1}", within=0.03)
     added = fleet_add(folder / "store", [folder / "tree"])
-    assert (added.jobs, added.damaged) == (35, {})
+    assert (added.result.jobs, added.result.damaged) == (35, {})
     return folder, machines
 
 
@@ -90,7 +90,7 @@ def address(fleet):
 def test_a_fit_gives_back_what_was_drawn(fleet):
     found = fleet_fit(fleet[0] / "store", FleetFitOptions("fan"))
     table = found.to_frame()
-    assert len(found.known.kind.machines) == 25
+    assert len(found.result.known.kind.machines) == 25
     mean = Machine.MEAN.ravel()
     W = table["influence"] * np.exp(1j * np.radians(table["phase_deg"]))
     assert np.abs(W.to_numpy() / mean - 1).max() < 0.12  # 0.1/√25 and 10°/√25, four deviations
@@ -153,7 +153,7 @@ def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(
     machine = Machine(np.random.default_rng(28))
     own = machine.job(tmp_path / "tree" / "fan" / "N").parent
     store = shutil.copytree(fleet[0] / "store", tmp_path / "store")
-    assert fleet_add(store, [tmp_path / "tree"]).jobs == 1
+    assert fleet_add(store, [tmp_path / "tree"]).result.jobs == 1
     runs = own / "runs.csv"
     runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
     assert type_coefficients(read_job(own / "job.toml"), f"{store}:fan").earlier == 0
@@ -170,7 +170,7 @@ def test_copies_count_once_and_names_at_several_places_are_told(tmp_path):
         job = copy / "2026-02-03" / "job.toml"
         job.write_text(job.read_text() + f"floor = 0.0{k + 1}\n")
     fleet_add(tmp_path / "F", [tmp_path / "tree"], FleetAddOptions("fan"))
-    known = fleet_fit(tmp_path / "F", FleetFitOptions("fan")).known
+    known = fleet_fit(tmp_path / "F", FleetFitOptions("fan")).result.known
     assert set(known.kind.machines) == {"P1", "P2", "P3"}
     assert known.notes[0] == "2 jobs with the same coefficients as another left out"
     assert known.notes[1].startswith("'P1' counts as one machine: a/P1/2026-02-03 and b/P1/2026-02-03; if")
@@ -268,5 +268,5 @@ def test_unbalances_at_other_radii_are_the_same(tmp_path):
         weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
     fleet_add(tmp_path / "F", [tmp_path / "tree"])
     found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
-    assert found.known.labels.weight_unit == "g_mm"
+    assert found.result.known.labels.weight_unit == "g_mm"
     assert found.to_frame()["between_percent"].max() < 5

@@ -101,7 +101,7 @@ def test_document_frame_and_text(rotor):
 
 def test_the_text_has_the_numbers_of_the_result(rotor):
     found = reduce(rotor, (7, 12, 18), 2)
-    lines = found.summary().splitlines()
+    lines = found.answer.brief(24).splitlines()
     for node, place, mass in zip((7, 12, 18), (0.973, 1.658, 2.423), found.masses.values, strict=True):
         (line,) = [line for line in lines if line.split()[:1] == [str(node)]]
         assert line.split()[1:3] == [f"{place:.3f}", f"{mass:.3f}"]
@@ -128,7 +128,7 @@ def test_the_text_has_the_numbers_of_the_result(rotor):
 
 def test_modes_that_were_not_measured_or_do_not_vibrate_are_said(rotor):
     few = reduce_measured(COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2])
-    lines = few.summary().splitlines()
+    lines = few.answer.brief(24).splitlines()
     head = next(i for i, line in enumerate(lines) if line.startswith("  mode "))
     assert "measured, rpm" in lines[head]
     assert len(lines[head + 2].split()) == 7

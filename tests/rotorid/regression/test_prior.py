@@ -313,7 +313,7 @@ def test_the_other_outputs_tell_of_a_prior(tmp_path):
     start = {"theta1": 1.0, "theta2": -1.0, "theta3": -1.0}
     found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start))
     sheet = found.sheet().decode()
-    assert "% from the data" in sheet.partition("<script")[0].partition("What was found")[2][:20_000]
+    assert "% from the data" in sheet.partition("<script")[0]
     assert any("rows of [prior]" in note for note in found.equations.notes)
     assert not work(folder / "model.toml", folder / "record_noisy.csv").equations.notes
 

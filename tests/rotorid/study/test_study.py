@@ -14,13 +14,13 @@ from studies.drawn import SCATTER, STUDY, write
 import fem
 from balancing import Trials, correct, refine
 from rotorid import read_rotor
+from rotorid.commands import CalibrateOptions, calibrate
 from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
+from rotorid.study import StudyOptions, drawn_machine, study
+from rotorid.study.drawn_machine import UNSTABLE
+from rotorid.study.machine_counts import EDGES, UNDETERMINED
 from rotorid.tables.study_file import read_study
-from rotorid.workflows import CalibrateOptions, StudyOptions, calibrate, study
-from rotorid.workflows.studies import drawn_machine
-from rotorid.workflows.studies.drawn_machine import UNSTABLE
-from rotorid.workflows.studies.machine_counts import EDGES, UNDETERMINED
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
@@ -48,11 +48,11 @@ def test_the_probability_is_that_of_rayleigh(tmp_path):
     assert 0.2 < exact < 0.8
     assert document["probability"] == pytest.approx(exact, abs=4 * np.sqrt(exact * (1 - exact) / 5000))
     assert document["samples"] == 5000
-    met = int(found.met[0])
+    met = int(found.result.met[0])
     expected = binomtest(met, 5000).proportion_ci(0.95, "exact")
     assert document["interval"] == pytest.approx([expected.low, expected.high], rel=1e-9)
     # the picture: the same at the limit, and the median of the distribution where it belongs
-    shares = np.cumsum(found.ratios[0]) / 5000
+    shares = np.cumsum(found.result.ratios[0]) / 5000
     assert np.interp(1.0, EDGES[1:], shares) == pytest.approx(met / 5000)
     median = W * 500e-6 * np.sqrt(np.log(2)) / 10e-6
     assert np.interp(0.5, shares, EDGES[1:]) == pytest.approx(median, rel=0.05)
@@ -74,9 +74,9 @@ def test_without_errors_one_correction_is_enough(tmp_path):
     assert (shot.ratio_1 < 1e-6).all()
     assert (shot.runs_needed == 4).all()
     assert (table[table.ratio_0 <= 1].runs_needed == 1).all()
-    assert found.met.tolist() == [60 - len(shot), 60, 60, 60]
-    assert found.runs.tolist() == [1, 4, 5, 6]
-    assert (found.held == 0).all()
+    assert found.result.met.tolist() == [60 - len(shot), 60, 60, 60]
+    assert found.result.runs.tolist() == [1, 4, 5, 6]
+    assert (found.result.held == 0).all()
 
 
 def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
@@ -86,13 +86,13 @@ def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
     table = pd.read_parquet(tmp_path / "kept")
     assert table["sample"].tolist() == list(range(n))
     counts = [(table.runs_needed <= runs).sum() for runs in (1, 4, 5, 6)]
-    assert found.met.tolist() == counts
+    assert found.result.met.tolist() == counts
     assert counts[0] < counts[1] < counts[2] <= counts[3] < n
     for k, warned in enumerate((False, True)):
         own = table[table.warned == warned]
-        assert found.held[k].tolist() == [(own.held == True).sum(), len(own)]  # noqa: E712 - pandas
-    assert found.reasons == {UNDETERMINED: table.why.notna().sum()}
-    assert 0 < found.reasons[UNDETERMINED] < n / 2
+        assert found.result.held[k].tolist() == [(own.held == True).sum(), len(own)]  # noqa: E712 - pandas
+    assert found.result.reasons == {UNDETERMINED: table.why.notna().sum()}
+    assert 0 < found.result.reasons[UNDETERMINED] < n / 2
     rows = found.to_dict()["rows"]
     assert [row["probability"] for row in rows] == [count / n for count in counts]
     assert found.to_frame()["met"].tolist() == counts
@@ -138,9 +138,9 @@ def test_an_unstable_rotor_is_told(tmp_path):
     stable = (tmp_path / "rotor.toml").read_text().replace("9e5", "4e4")
     (tmp_path / "rotor.toml").write_text(stable)
     found = run(write(tmp_path, text + '[scatter]\n"seal.kxy" = 300\n'), samples=100)
-    assert list(found.reasons) == [UNSTABLE]
-    assert 0 < found.reasons[UNSTABLE] < 100
-    assert found.met[0] <= 100 - found.reasons[UNSTABLE]
+    assert list(found.result.reasons) == [UNSTABLE]
+    assert 0 < found.result.reasons[UNSTABLE] < 100
+    assert found.result.met[0] <= 100 - found.result.reasons[UNSTABLE]
 
 
 def test_what_the_model_leaves_out_is_told(tmp_path):
@@ -160,10 +160,10 @@ def test_starts_end_where_calibrate_does():
     found = run(SAMPLE / "starts.toml", samples=6)
     options = CalibrateOptions("bearing[*].kxx.scale", exact=True)
     rotor, data = (sample_data() / name for name in ("compressor/rotor.toml", "calibration/trial.toml"))
-    known = calibrate(rotor, data, options).found
-    assert found.found.tolist() == [6]
-    assert found.ends[0] == pytest.approx(known.fit.estimate.solution, rel=1e-4)
-    assert found.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
+    known = calibrate(rotor, data, options).result
+    assert found.result.found.tolist() == [6]
+    assert found.result.ends[0] == pytest.approx(known.fit.estimate.solution, rel=1e-4)
+    assert found.result.chi_square[0] == pytest.approx(known.chi_square, rel=1e-3)
     document = found.to_dict()
     assert (document["probability"], document["not_converged"]) == (1.0, 0)
     assert document["interval"][1] == 1.0
@@ -171,7 +171,7 @@ def test_starts_end_where_calibrate_does():
 
 
 def test_ends_of_searches_are_told_apart_by_their_numbers():
-    from rotorid.workflows.studies.calibration_starts import count_minima
+    from rotorid.study.calibration_starts import count_minima
 
     columns = {
         "converged": [True, True, True, False, True],
@@ -245,13 +245,13 @@ def test_a_number_that_is_called_as_another_column_is_refused(tmp_path, name):
     with pytest.raises(ValueError, match=f"{name!r} is another column"):
         run(file, samples=1)
     found = run(starts(tmp_path, ("bearing[*].kxx.scale", "k = bearing.kxx.scale")), samples=2)
-    assert found.names == ("k",)
+    assert found.result.names == ("k",)
     assert found.summary().startswith("2 starts of 2 end at")
 
 
 def test_the_command(cli, tmp_path, monkeypatch):
     file = write(tmp_path, TWO)
-    monkeypatch.setattr(sys.modules["rotorid.workflows.studies.study"], "MACHINES", 30)
+    monkeypatch.setattr(sys.modules["rotorid.study.studies"], "MACHINES", 30)
     outcome = cli("study", file, "--json", "--results", tmp_path / "kept", "--plot", tmp_path / "a.png")
     assert outcome.code == 0, outcome.err
     assert {"probability", "interval", "samples"} < set(outcome.json)

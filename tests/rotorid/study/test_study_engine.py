@@ -13,17 +13,16 @@ import numpy as np
 import pytest
 from studies.drawn import SCATTER, STUDY, fatal, kept, noted, task, write
 
-import rotorid.workflows.studies.chunks as chunks
-import rotorid.workflows.studies.study as module
+import rotorid.study.chunks as chunks
 from rotorid.base.worker_processes import single_threads
-from rotorid.workflows import StudyOptions, study
-from rotorid.workflows.studies.chunks import AHEAD_ELSEWHERE, SampleError, rows_in, run_study
+from rotorid.study import StudyOptions, study
+from rotorid.study.chunks import AHEAD_ELSEWHERE, SampleError, rows_in, run_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
 NUMBERS = [float(np.random.default_rng([7, k]).standard_normal()) for k in range(12)]
 
-SMALL = "import rotorid.workflows.studies.study as s, rotorid.cli; s.MACHINES = 50; rotorid.cli.main()"
+SMALL = "import sys, rotorid.cli; sys.modules['rotorid.study.studies'].MACHINES = 50; rotorid.cli.main()"
 """The command line with small parts."""
 
 
@@ -41,7 +40,7 @@ def threads():
 def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypatch, threads):
     distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
 
-    monkeypatch.setattr(module, "MACHINES", 20)
+    monkeypatch.setattr(sys.modules["rotorid.study.studies"], "MACHINES", 20)
     file = write(tmp_path, STUDY.replace("samples", "corrections = 2\nsamples") + SCATTER)
     found = [study(file, StudyOptions(workers=n, results=tmp_path / f"own{n}")) for n in (1, 2)]
     found.append(study(file, StudyOptions(results=tmp_path / "threads"), executor=threads))
@@ -61,7 +60,7 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, monkeypa
 def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads, monkeypatch):
     """The workers end with their parent."""
     file = write(tmp_path, STUDY.replace("= 60", "= 400") + '[scatter]\n"bearing[*].stiffness" = 20')
-    monkeypatch.setattr(module, "MACHINES", 50)
+    monkeypatch.setattr(sys.modules["rotorid.study.studies"], "MACHINES", 50)
     words = [file, "--workers", "2", "--results", tmp_path / "killed"]
     started = subprocess.Popen([sys.executable, "-c", SMALL, "study", *words], stderr=subprocess.DEVNULL)
     while not kept(tmp_path / "killed"):
@@ -134,7 +133,7 @@ def test_what_a_sample_raises_is_told_with_its_number_and_not_repeated(tmp_path,
 
 
 def test_more_samples_continue_a_study_and_a_damaged_part_is_made_anew(tmp_path, threads, monkeypatch):
-    monkeypatch.setattr(module, "MACHINES", 20)
+    monkeypatch.setattr(sys.modules["rotorid.study.studies"], "MACHINES", 20)
     file = write(tmp_path)
     for samples in (50, 90):
         grown = study(file, StudyOptions(samples=samples, results=tmp_path / "grown"), executor=threads)

@@ -1,1 +1,0 @@
-"""One module a command, and what only one of them needs."""

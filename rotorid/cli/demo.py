@@ -1,0 +1,91 @@
+"""`rotorid demo`: the files of the main job in a folder, and its commands run on them."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import shlex
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.commands.app import json_text
+
+_SOURCES = ("rotor23.csv", "turbo_job")
+_COPIED = (".csv", ".toml", ".md", ".txt")
+STEPS = {
+    "critical": "critical {}/rotor23.csv --plot {}/modes.png",
+    "balance": "balance {}/turbo_job/job.toml --plot {}/balance.png",
+    "reduce": "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --plot {}/reduction.png",
+}
+"""What is typed after `rotorid`, where {} is the folder, by the keys of the document."""
+_LINES = 6
+"""Of each answer."""
+
+
+def demo(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the sample job.")] = Path(
+        "rotorid-demo"
+    ),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="The documents of all commands.", rich_help_panel="Output")
+    ] = False,
+) -> None:
+    """Write a sample job to DIR, run the main commands on it, and say where the pictures are.
+
+    Example: rotorid demo demo
+    """
+    commands = {
+        key: [word.replace("{}", str(folder)) for word in line.split()] for key, line in STEPS.items()
+    }
+    pictures = [words[-1] for words in commands.values()]
+    _copy(folder, [Path(picture) for picture in pictures])
+    typed = [shlex.join(["rotorid", *words]) for words in commands.values()]
+    if as_json:
+        documents: dict[str, Any] = {
+            key: json.loads(_run([*words, "--json"])) for key, words in commands.items()
+        }
+        keys = {"folder": str(folder), "pictures": pictures, "commands": typed, **documents}
+        made = {"schema_version": SCHEMA_VERSION, "provenance": documents["balance"]["provenance"]}
+        typer.echo(json_text(keys | made))
+        return
+    for number, (line, words) in enumerate(zip(typed, commands.values(), strict=True), start=1):
+        typer.echo("\n".join([f"{number}. {line}", *_run(words).splitlines()[:_LINES]]))
+    typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")
+
+
+def _copy(folder: Path, pictures: list[Path]) -> None:
+    """Write the files of the job; what would be overwritten is refused before anything is written."""
+    from rotorid.files.table_writing import write_files
+    from rotorid.samples import sample_data
+
+    samples, remedy = sample_data(), "choose another folder: rotorid demo DIR"
+    places = [samples / name for name in _SOURCES]
+    sources = [f for place in places for f in ([place] if place.is_file() else sorted(place.iterdir()))]
+    copies = {folder / f.relative_to(samples): f.read_bytes() for f in sources if f.suffix in _COPIED}
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: this is a file; {remedy}")
+    if any(Path(os.path.realpath(path)).is_relative_to(samples.resolve()) for path in copies):
+        raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
+    theirs = [p for p, data in copies.items() if p.exists() and not (p.is_file() and p.read_bytes() == data)]
+    if not all(path.exists() for path in copies):  # no demo ran here before
+        theirs += [picture for picture in pictures if picture.exists()]
+    if theirs:
+        named = ", ".join(map(str, theirs))
+        raise ValueError(f"{named}: differs from the sample and would be overwritten; delete it, or {remedy}")
+    for path in copies:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_files({path: data for path, data in copies.items() if not path.exists()})
+
+
+def _run(words: list[str]) -> str:
+    """What one command prints."""
+    from rotorid.cli import app
+
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        app(words, prog_name="rotorid", standalone_mode=False)
+    return text.getvalue()

@@ -1,0 +1,141 @@
+"""Options of commands: checked as they enter, and as JSON has them; files, rotors and jobs that are named."""
+
+from __future__ import annotations
+
+import cmath
+import dataclasses
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rotorid.base.registry import Method, find
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from fem import Rotor
+    from rotorid.tables import Job
+
+_T = TypeVar("_T", bound="DataclassInstance")
+
+
+def option_name(field: str) -> str:
+    """As the command line writes it: "--first-hole"."""
+    return f"--{field.replace('_', '-')}"
+
+
+def checked(given: object, kind: type[_T]) -> _T:
+    """The same options with the numbers and lists of Python in place of those of NumPy.
+
+    Raises
+    ------
+    ValueError
+        For options of another command, what is no bool where one is needed, and a number that is not finite.
+    """
+    if not isinstance(given, kind):
+        raise ValueError(f"options are {kind.__name__}(...), not {given!r}")
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(given):
+        value = values[field.name] = _of_python(getattr(given, field.name))
+        if (str(field.type) == "bool") != isinstance(value, bool):
+            needed = "True or False is needed" if str(field.type) == "bool" else "this is no switch"
+            raise ValueError(f"{kind.__name__}({field.name}={value!r}): {needed}")
+        _check_finite(value, option_name(field.name))
+    return dataclasses.replace(given, **values)
+
+
+def changed(options: DataclassInstance) -> dict[str, object]:
+    """Options that differ from their defaults, without the files that a terminal's command writes."""
+    writes = getattr(options, "writes", ())
+    fields = [field for field in dataclasses.fields(options) if field.name not in writes]
+    given = {field: getattr(options, field.name) for field in fields}
+    return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
+
+
+def refuse(options: DataclassInstance, needless: Collection[str], why: str) -> None:
+    """Refuse the first of these options that is given: with the others it means nothing.
+
+    Raises
+    ------
+    ValueError
+        Its name and `why`.
+    """
+    for name in changed(options):
+        if name in needless:
+            raise ValueError(f"{option_name(name)} {why}")
+
+
+def check_choices(options: DataclassInstance, choices: Mapping[str, Sequence[Method[Any]]]) -> None:
+    """Refuse names that no registry has, with the nearest one; None is the default."""
+    for option, known in choices.items():
+        if (name := getattr(options, option)) is not None:
+            find(known, name, option_name(option))
+
+
+def plain(value: object) -> object:
+    """An option as JSON has it."""
+    value = _of_python(value)
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, str | int | float) or value is None:
+        return value
+    return [plain(item) for item in value] if isinstance(value, Collection) else str(value)
+
+
+def _of_python(value: object) -> object:
+    """Numbers and lists of NumPy and pandas as those of Python, also inside."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {_of_python(key): _of_python(item) for key, item in value.items()}
+    return type(value)(map(_of_python, value)) if isinstance(value, list | tuple) else value
+
+
+def _check_finite(value: object, what: str) -> None:
+    if isinstance(value, Mapping):
+        value = [*value.values()]
+    if isinstance(value, int | float | complex) and not cmath.isfinite(value):
+        raise ValueError(f"{what}: {value} is no finite number; leave out what has no bound")
+    for item in value if isinstance(value, Collection) and not isinstance(value, str) else ():
+        _check_finite(item, what)
+
+
+def rotor_source(given: Rotor | Path | str) -> tuple[Rotor, tuple[Path, ...]]:
+    """A rotor, and the files that it was read from."""
+    from fem import Rotor
+    from rotorid.tables import read_rotor, rotor_files
+
+    if isinstance(given, Rotor):
+        return given, ()
+    file = file_of(given, "a rotor")
+    return read_rotor(file), rotor_files(file)
+
+
+def job_source(given: Job | Path | str, phase: str | None = None, angles: str | None = None) -> Job:
+    """A job; `phase` and `angles` in place of what its file says.
+
+    Raises
+    ------
+    ValueError
+        For these with a job that is read already.
+    """
+    from rotorid.tables import Job, read_job
+
+    if not isinstance(given, Job):
+        return read_job(file_of(given, "a job"), phase=phase, angles=angles)
+    if phase is not None or angles is not None:
+        raise ValueError("the conventions of a job are stated where it is read")
+    return given
+
+
+def file_of(given: object, what: str) -> Path:
+    """The file that is named.
+
+    Raises
+    ------
+    ValueError
+        For what is no name of a file; says what is needed.
+    """
+    if not isinstance(given, Path | str):
+        raise ValueError(f"{what} or its path is needed, not {given!r}")
+    return Path(given)

@@ -1,1 +1,0 @@
-"""Workflows over the store of a fleet."""

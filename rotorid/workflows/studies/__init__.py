@@ -1,1 +1,0 @@
-"""Studies by simulation: samples drawn by number, in chunks on any executor, streamed to Parquet."""

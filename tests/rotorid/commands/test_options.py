@@ -1,0 +1,224 @@
+"""What a script gives to a workflow: numbers of NumPy, texts and values mixed; refusals in words."""
+
+import dataclasses
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotorid.commands as commands
+from rotorid.commands import (
+    BalanceOptions,
+    CampbellOptions,
+    CriticalOptions,
+    FitOptions,
+    IdentifyOptions,
+    InfluenceOptions,
+    ReduceOptions,
+    ResponseOptions,
+    SplitOptions,
+    ToleranceOptions,
+    TrialWeightOptions,
+    UnbalanceOptions,
+    balance,
+    campbell,
+    critical,
+    fit,
+    identify,
+    influence,
+    reduce,
+    response,
+    split,
+    tolerance,
+    trial_weight,
+    unbalance,
+)
+from rotorid.files.input_file import each_file_once
+from rotorid.report.options import changed, checked, plain
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+
+SAMPLES = sample_data()
+ROTOR = SAMPLES / "rotor23.csv"
+JOB = SAMPLES / "bk_two_plane" / "job.toml"
+MODEL = SAMPLES / "fit" / "run_down" / "model.toml"
+RECORD = SAMPLES / "fit" / "run_down" / "record.csv"
+KINDS = [getattr(commands, name) for name in commands.__all__ if name.endswith("Options")]
+NEEDED = {"speeds": (100.0,), "mass": 1.0, "speed": 1.0, "grade": 1.0, "stations": (6,), "planes": (7,)}
+
+
+def made(kind, **given):
+    needed = {
+        field.name: NEEDED.get(field.name, (2,))
+        for field in dataclasses.fields(kind)
+        if field.default is dataclasses.MISSING
+    }
+    return kind(**needed | given)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_switch_is_true_or_false_and_nothing_else_is(kind):
+    for field in dataclasses.fields(kind):
+        wrong = "no" if field.type == "bool" else True
+        with pytest.raises(ValueError, match=rf"{kind.__name__}\({field.name}=.*(needed|switch)"):
+            checked(made(kind, **{field.name: wrong}), kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), np.float64("-inf")])
+def test_no_option_is_a_number_that_json_has_not(kind, value):
+    for field in dataclasses.fields(kind):
+        for given in (value, [value], {"1": value}):
+            with pytest.raises(ValueError, match=r"is needed|no switch|no finite number"):
+                checked(made(kind, **{field.name: given}), kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_default_passes_and_is_not_recorded(kind):
+    options = checked(made(kind), kind)
+    required = {field.name for field in dataclasses.fields(kind) if field.default is dataclasses.MISSING}
+    assert changed(options).keys() == required
+
+
+def test_falsy_values_are_recorded_and_nested_ones_are_plain():
+    given = BalanceOptions(
+        limit=[], amplitude_error=0, ridge="", speeds=np.array([1.0]), phase_error=np.int64(2), refine=True
+    )
+    document = {name: plain(value) for name, value in changed(given).items()}
+    assert document == {
+        "amplitude_error": 0,
+        "ridge": "",
+        "speeds": [1.0],
+        "phase_error": 2,
+        "refine": True,
+    }
+    assert type(document["phase_error"]) is int
+    assert plain({1: (np.float32(2), Path("a"), np.bool_(True), 1j)}) == {"1": [2.0, "a", True, "1j"]}
+
+
+def same(one, other):
+    documents = [json.loads(json.dumps(found.document, allow_nan=False)) for found in (one, other)]
+    for document in documents:
+        assert all(type(value) is not str or "np." not in value for value in document["provenance"])
+        document.pop("provenance")
+    assert documents[0] == documents[1]
+
+
+@pytest.mark.parametrize(
+    ("work", "text", "values"),
+    [
+        (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": ["1=35"]}, {"limit": "1=35"}),
+        (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": "1=35"}, {"limit": {"1": "35"}}),
+        (
+            lambda o: balance(JOB, BalanceOptions(**o)),
+            {"max_mass": "9g"},
+            {"max_mass": {"1": "9g", "2": "9g"}},
+        ),
+        (
+            lambda o: critical(ROTOR, CriticalOptions(**o)),
+            {"number": 2, "operating": "500:600"},
+            {"number": np.int64(2), "operating": np.array([500.0, 600.0])},
+        ),
+        (
+            lambda o: critical(ROTOR, CriticalOptions(operating=o)),
+            "3000:6000rpm",
+            ("3000rpm", "6000rpm"),
+        ),
+        (
+            lambda o: campbell(ROTOR, CampbellOptions(o, number=2)),
+            "100,200",
+            ["100rad/s", 200],
+        ),
+        (
+            lambda o: response(ROTOR, {7: 1e-5}, ResponseOptions([100.0, 200.0, 300.0], sensors=o)),
+            "7,12",
+            np.array([7, 12]),
+        ),
+        (lambda o: influence(ROTOR, InfluenceOptions(o, [2], [100.0])), "7,12", np.array([7, 12])),
+        (
+            lambda o: reduce(ROTOR, ReduceOptions(nodes=[7, 12, 18], **o)),
+            {"modes": 2, "errors": "compliance=2"},
+            {"modes": np.int64(2), "errors": ["compliance=2"]},
+        ),
+        (lambda o: split("35g@120", SplitOptions(holes=12, taken=o)), "3:10g", {3: 0.01}),
+        (
+            lambda o: tolerance(ToleranceOptions(5, 100.0, 2.5, centre=0.3, planes=o)),
+            "a=100mm,b=600mm",
+            {"a": "100mm", "b": 0.6},
+        ),
+        (lambda o: fit(MODEL, o), [RECORD], str(RECORD)),
+    ],
+)
+def test_texts_and_what_they_stand_for_are_the_same(work, text, values):
+    same(work(text), work(values))
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (lambda: balance(None), "a job or its path is needed, not None"),
+        (lambda: balance(JOB, {"split": True}), r"options are BalanceOptions\(...\)"),
+        (lambda: balance(JOB, CriticalOptions()), r"options are BalanceOptions\(...\)"),
+        (lambda: balance(JOB, BalanceOptions(limit=[20])), "--limit .* texts are needed"),
+        (lambda: balance(JOB, BalanceOptions(planes=[])), "names .* are needed"),
+        (lambda: balance(JOB, BalanceOptions(max_mass=0)), "--max-mass '0': expected a value above 0"),
+        (lambda: balance(JOB, BalanceOptions(limit={"1": 0.0})), "--limit '0.0': expected a value above 0"),
+        (lambda: critical(5), "a rotor or its path"),
+        (lambda: critical(ROTOR, CriticalOptions(operating=(681, 555))), "--operating .* is not a range"),
+        (lambda: critical(ROTOR, CriticalOptions(operating=(555,))), "--operating .* is not a range"),
+        (lambda: campbell(ROTOR, None), r"options are CampbellOptions\(...\)"),
+        (lambda: response(ROTOR, None, ResponseOptions([100.0])), "unbalance"),
+        (lambda: response(ROTOR, {7: 1e-5}, ResponseOptions([100.0], sensors=[])), "--sensors"),
+        (lambda: unbalance(SAMPLES / "model_job" / "job.toml", UnbalanceOptions([])), "--stations"),
+        (lambda: reduce(ROTOR, ReduceOptions(rank=True, masses=0)), "the number of masses is 0"),
+        (lambda: trial_weight(5), "a job or its path"),
+        (lambda: trial_weight(JOB, TrialWeightOptions(plane=[])), "names .* are needed"),
+        (lambda: split(None, SplitOptions(holes=12)), "VECTOR"),
+        (lambda: identify(MODEL, options=IdentifyOptions(loss="hubr")), r"did you mean 'huber'"),
+        (lambda: identify(5, RECORD), "a model or its path"),
+        (lambda: fit(None, [RECORD]), "a model or its path"),
+        (lambda: fit(MODEL, None), "records or its path"),
+        (lambda: fit(MODEL, [RECORD], FitOptions(start={"d_x7": -1.0})), "outside its bounds"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_words(work, words):
+    with pytest.raises(ValueError, match=words):
+        work()
+
+
+def test_a_job_that_was_read_is_taken_as_it_is():
+    same(balance(read_job(JOB), BalanceOptions(planes="1")), balance(JOB, BalanceOptions(planes="1")))
+
+
+def test_a_file_is_read_anew_by_the_next_call_and_once_inside_another_one(tmp_path):
+    file = tmp_path / "rotor.csv"
+    text = ROTOR.read_text()
+    file.write_text(text)
+    first = critical(file)
+    with each_file_once():
+        critical(file)
+        file.write_text(text.replace(",0.11,", ",0.12,"))
+        same(critical(file), first)
+    changed_since = critical(file)
+    assert changed_since.provenance["inputs"] != first.provenance["inputs"]
+    assert changed_since.result.frequencies[0] != first.result.frequencies[0]
+
+
+def test_threads_do_not_meet():
+    alone = {"rotor": critical(ROTOR), "job": balance(JOB)}
+    found = {}
+    works = {"rotor": lambda: critical(ROTOR), "job": lambda: balance(JOB)}
+    threads = [
+        threading.Thread(target=lambda i=i, name=name: found.update({(name, i): works[name]()}))
+        for i in range(2)
+        for name in works
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 4
+    for (name, _), outcome in found.items():
+        same(outcome, alone[name])

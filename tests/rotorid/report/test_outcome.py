@@ -1,0 +1,58 @@
+"""The page of any command: the printed document inside, its numbers shown, nothing from outside."""
+
+import pytest
+from sheets import COMMANDS, disagreements, make, read_sheet
+
+from rotorid.commands import CriticalOptions, IdentifyOptions, critical, identify
+from rotorid.samples import sample_data
+
+MINE = [name for name in COMMANDS if not name.startswith("balance")]
+
+
+@pytest.mark.parametrize("name", MINE)
+def test_the_page_holds_the_printed_document_and_shows_its_numbers(name):
+    made = make(name)
+    sheet = read_sheet(made.html)
+    assert sheet.document == made.document
+    assert disagreements(sheet.shown, sheet.document) == []
+
+
+@pytest.mark.parametrize("name", MINE)
+def test_nothing_from_outside_and_ids_once(name):
+    sheet = read_sheet(make(name).html)
+    assert not [r for r in sheet.references if not r.startswith(("#", "data:"))]
+    assert sheet.text.replace('xmlns="http://www.w3.org/2000/svg"', "").count("http") == 0
+    assert len(sheet.ids) == len(set(sheet.ids))
+    assert [tag for tag, *_ in sheet.order].count("script") == 1
+
+
+def test_every_critical_speed_and_shape_is_shown():
+    sheet = read_sheet(make("critical table").html)
+    count, nodes = len(sheet.document["mode_shapes"]), len(sheet.document["positions_m"])
+    assert (count, nodes) == (5, 24)
+    assert {f"mode_shapes.{k}.{i}" for k in range(count) for i in range(nodes)} <= sheet.keys
+    for key in ("critical_speeds_rad_s", "critical_speeds_rpm"):
+        assert {f"{key}.{k}" for k in range(count)} <= sheet.keys
+
+
+def test_sentences_notes_and_pictures_of_the_outcome_stand_on_its_page():
+    outcome = critical(sample_data() / "rotor23.csv", CriticalOptions(number=2))
+    page = outcome.sheet().decode()
+    for text in (*outcome.sentences, *outcome.pictures, *outcome.warnings):
+        assert text in page.replace("&#39;", "'")
+    assert page.count("<svg") == len(outcome.pictures)
+
+
+def test_a_result_that_prints_its_own_tables_shows_these():
+    folder = sample_data() / "identify" / "task_5_1"
+    outcome = identify(folder / "model.toml", folder / "data.csv")
+    page = outcome.sheet().decode()
+    for block in (*outcome.tables, *outcome.more):
+        assert block.splitlines()[0] in page
+
+
+def test_without_data_there_is_no_page_no_picture_and_no_table():
+    outcome = identify(sample_data() / "identify" / "task_5_1" / "model.toml", None, IdentifyOptions())
+    for work in (outcome.sheet, outcome.figure, outcome.to_frame):
+        with pytest.raises(ValueError, match="give a table"):
+            work()
