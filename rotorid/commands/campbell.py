@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.commands.quantities import Band, Speeds, band, rising_speeds
+from rotorid.base.text import percent
+from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
 from rotorid.report.options import rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
 
@@ -34,11 +36,23 @@ class CampbellOptions:
         How many modes, by default 6; forward and backward whirl count apart.
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
+    heavy : VALUE
+        Logarithmic decrement above which a mode is heavily damped: others are listed before it, and it is
+        drawn pale.
+    mesh_check
+        Estimate by elements cut in two how far off the mesh makes frequencies and critical speeds.
+    cross_coupling : LEAST:MOST
+        Stability over added cross-coupling, N/m, at the mid span, 0:5e7, or at a node or station, 0:5e7@12;
+        at the highest operating speed, or else the last speed.
     """
 
     speeds: Speeds
     number: int | None = None
     operating: Band | None = None
+    heavy: float = 6.0
+    mesh_check: bool = False
+    cross_coupling: Span | None = None
+    panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
 @command
@@ -50,7 +64,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
 
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:9000:250rpm
-    --operating 5300:6500rpm --report whirl.html
+    --operating 5300:6500rpm --cross-coupling 0:1e7 --report whirl.html
 
     Parameters
     ----------
@@ -71,9 +85,11 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     from rotorid.commands.operating_range import Separation, unsearched
 
     operating = band(options.operating)
+    added = options.cross_coupling
+    span, place = (None, None) if added is None else span_at(added, "--cross-coupling", "0:5e7")
     model, files = rotor_source(rotor)
     speeds = rising_speeds(options.speeds)
-    solve = functools.partial(fem.campbell, speeds=speeds, n=options.number)
+    solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
     whirl = solve(model)
 
     def frequencies(other: Rotor) -> FloatArray:
@@ -92,8 +108,22 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     pictures: dict[str, Callable[[], Figure]] = {
         "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
     }
+    if span:
+        from rotorid.commands.cross_coupling import cross_coupling
+
+        coupling = cross_coupling(model, operating[1] if operating else speeds[-1], span, place)
+        beside["cross_coupling"] = coupling
+        pictures["Logarithmic decrements over added cross-coupling."] = coupling.figure
     sentences += [part.sentence() for part in beside.values()]
     keys = {**whirl.to_dict(), **{key: part.to_dict() for key, part in beside.items()}}
+    if options.mesh_check:
+        changes = whirl.mesh_change()
+        named = zip(("frequencies_change", "critical_speeds_change"), changes, strict=True)
+        keys["mesh_check"] = plain(dict(named))
+        sentences.append(
+            f"Elements cut in two change frequencies by at most {percent(changes[0])} %, damped critical "
+            f"speeds by at most {percent(changes[1])} %."
+        )
     criticals, every = whirl.tables()
     return Outcome(
         result=whirl,

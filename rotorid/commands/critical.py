@@ -28,6 +28,8 @@ class CriticalOptions:
     ----------
     number : -n N from 1
         How many critical speeds, by default 3; rigid-body motions come besides.
+    mesh_check
+        Estimate by refinement how far off the mesh makes each.
     speed_map : --map
         Critical speeds over the stiffness of the bearings, too; the picture is of them then.
     operating : A:B
@@ -35,9 +37,10 @@ class CriticalOptions:
     """
 
     number: int | None = None
+    mesh_check: bool = False
     speed_map: bool = False
     operating: Band | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "speed_map"}
+    panels: ClassVar[Mapping[str, str]] = {"Method": "speed_map mesh_check"}
 
 
 @command
@@ -73,6 +76,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     modes = fem.critical_speeds(model, options.number)
     speeds = modes.frequencies
     n = options.number or int((speeds > 0).sum()) or 1
+    mesh = fem.mesh_check(model, n) if options.mesh_check else None
     chart, left_out = _map(model, n) if options.speed_map else (None, [])
     std, doubts = error_band(
         model,
@@ -87,7 +91,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         doubt = unsearched(0.0, max(speeds.tolist(), default=0.0), operating) if more else ""
         apart = Separation(speeds.tolist(), operating, doubt and f"{doubt} (-n)")
     table, shapes = modes.tables()
-    beside = {"operating": apart, "map": chart}
+    beside = {"operating": apart, "mesh_check": mesh, "map": chart}
     asked = {key: result for key, result in beside.items() if result is not None}
     return Outcome(
         result=modes,

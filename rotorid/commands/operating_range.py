@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fem import LARGEST_MARGINS, Peak, Peaks, separation
+from fem import CRITICALLY_DAMPED, LARGEST_MARGINS, Peak, Peaks, separation
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
@@ -52,7 +52,9 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
 
 
 def open_question(peaks: Iterable[Peak], first: float, last: float, operating: tuple[float, float]) -> str:
-    """Why one cannot say that all critical speeds are far enough from the operating range.
+    """Why one cannot say that all critical speeds are far enough from the operating range, and what to do.
+
+    Empty where one can. Speeds were searched from `first` to `last`; all in rad/s.
 
     Parameters
     ----------
@@ -67,14 +69,23 @@ def open_question(peaks: Iterable[Peak], first: float, last: float, operating: t
     -------
     Clauses; empty where one can say it.
     """
-    near = (
-        peak
-        for peak in peaks
-        if peak.enough is None and separation(peak.speed, operating) < LARGEST_MARGINS[1]
-    )
     reasons = [unsearched(first, last, operating)]
-    reasons += [f"no amplification factor at {rpm_text(peak.speed)}: search wider" for peak in near]
-    return "; ".join(filter(None, reasons))
+    ends = [
+        first,
+        last,
+        operating[0] * (1 - LARGEST_MARGINS[0] / 100),
+        operating[1] * (1 + LARGEST_MARGINS[1] / 100),
+    ]
+    for peak in peaks:
+        if peak.enough is None and separation(peak.speed, operating) < LARGEST_MARGINS[1]:
+            reasons.append(f"no amplification factor at {rpm_text(peak.speed)}")
+            # What has not fallen to 0.707 over this distance is critically damped.
+            sides = {-1: peak.below, 1: peak.above}
+            ends += [peak.speed * (1 + way / CRITICALLY_DAMPED) for way in sides if sides[way] is None]
+    advice = f"give speeds from {min(ends) * RPM:.0f} to {max(ends) * RPM:.0f} rpm"
+    if (first, last) == (min(ends), max(ends)):
+        advice = "read it where it stands alone"
+    return "; ".join(filter(None, [*reasons, advice])) if any(reasons) else ""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ Times = str | Sequence[float]
 """As `times` reads them, or one by one, s."""
 Band = str | tuple[float | str, float | str]
 """As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
+Span = str | tuple[float, float]
+"""As `span_at` reads it, or the least and the most, in SI."""
 Nodes = str | Sequence[str | int]
 """As `nodes` reads them, or numbers of nodes and names of stations."""
 Sensor = str | int | tuple[str | int, float]
@@ -180,6 +182,15 @@ def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") ->
 
 def _others(unit: str) -> str:
     return " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != unit)
+
+
+def span_at(given: Span, what: str, example: str) -> tuple[tuple[float, float], str | None]:
+    """Read "0:5e7" or "0:5e7@impeller 3" as a range of numbers and where it is meant; None: nowhere said."""
+    text, _, place = given.partition("@") if isinstance(given, str) else ("", "", "")
+    ends = [number(part) for part in text.split(":")] if isinstance(given, str) else [*given]
+    if len(ends) != 2 or not 0 <= ends[0] < ends[1] < math.inf:
+        raise ValueError(f"{what} {given!r} is not a range: use LEAST:MOST, such as {example}")
+    return (ends[0], ends[1]), place.strip() or None
 
 
 def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[float]:

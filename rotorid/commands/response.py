@@ -21,6 +21,7 @@ from rotorid.commands.quantities import (
     nodes,
     number,
     one_of,
+    one_speed,
     rising_speeds,
     sensors,
 )
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY = 9.80665  # m/s²
 _AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
 """Relative distances from a critical speed of a small model at which its response is computed."""
-View = Literal["bode", "polar", "orbits"]
+View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
     *("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor"),
@@ -60,14 +61,17 @@ class ResponseOptions:
     operating : A:B
         Operating speeds, such as 5300:6500rpm.
     view
-        What --plot draws; orbits: where the largest reading is.
+        What --plot draws; shape: the deflected rotor.
+    at : SPEED
+        Speed of the orbits or of the shape that are drawn, 5800rpm; default: at the largest reading.
     """
 
     speeds: Speeds
     sensors: str | Sequence[Sensor] | None = None
     operating: Band | None = None
     view: View = "bode"
-    panels: ClassVar[Mapping[str, str]] = {"Output": "view"}
+    at: str | float | None = None
+    panels: ClassVar[Mapping[str, str]] = {"Output": "view at"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -226,7 +230,7 @@ class Vibration:
             columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
         return Table("amplitude and phase (lead)", tuple(columns))
 
-    def pictures(self, view: View) -> dict[str, Callable[[], Figure]]:
+    def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
         """What draws amplitude and phase over speed, polar curves, or orbits."""
         from fem.plots import bode_figure, orbits_figure, polar_figure
 
@@ -238,9 +242,35 @@ class Vibration:
                 lambda: bode_figure(finer, places, self.peaks, operating=self.operating),
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
-            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._loudest())),
+            "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
+            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
         }
-        return dict(draw[name] for name in (view, "bode"))
+        others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
+        return dict(draw[name] for name in (view, *others))
+
+    def shape_figure(self, at: int | None) -> Figure:
+        """The deflected rotor at a speed."""
+        from fem.plots import draw_deflected_shape
+        from rotorid.base.plot_style import on_figure
+
+        shape = self._deflected(at)
+        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
+
+    def shape(self, at: int | None) -> tuple[Table, ...]:
+        """The orbit of each node at a speed; nothing without a steady response."""
+        if not self.finer.steady.any():
+            return ()
+        from rotorid.base.rpm import phase_deg
+
+        shape = self._deflected(at)
+        columns = (
+            Column("node", shape.nodes),
+            Column("position, m", shape.rotor.positions, "{:.4f}".format),
+            Column("µm peak", 1e6 * shape.major[0], figures),
+            Column("minor axis", 1e6 * shape.minor[0], figures),
+            Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
+        )
+        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
@@ -268,6 +298,13 @@ class Vibration:
         return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
 
     @property
+    def drawn(self) -> bool:
+        """Whether it is a rotor's, not a small model's."""
+        from fem import Rotor
+
+        return isinstance(self.response.rotor, Rotor)
+
+    @property
     def labels(self) -> list[str]:
         """Names of the sensors."""
         from fem import label
@@ -288,13 +325,19 @@ class Vibration:
             (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
         ]
 
-    def _loudest(self) -> int:
-        """Which of the speeds has the largest reading."""
+    def _deflected(self, at: int | None) -> Response:
+        """The response of all nodes at a speed."""
+        import fem
+
+        finer = self.finer
+        return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
+
+    def _speed_of(self, at: int | None) -> int:
         steady = self.finer.steady
         if not steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
         sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        return int((sizes * steady).argmax())
+        return int((sizes * steady).argmax()) if at is None else at
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
@@ -345,6 +388,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     import numpy as np
 
     import fem
+    from rotorid.commands.cross_coupling import mid_span
 
     head, _, planes = given.partition("@")
     times = number(head.partition(":")[2] or "1")
@@ -356,7 +400,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
     loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
     if not planes:
         total = sum(loads[node] for node in journals)
-        return {_mid_span(rotor): times * fem.api_unbalance(total, highest)}
+        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
     mounted: dict[int, complex] = {}
     for plane in planes.split(","):
         (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
@@ -366,16 +410,6 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
         load = loads[journals[int(np.argmin(apart))]]
         mounted[node] = sign * times * fem.api_unbalance(load, highest)
     return mounted
-
-
-def _mid_span(rotor: Rotor) -> int:
-    """The node next to the middle between the outer bearings."""
-    import numpy as np
-
-    ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
-    ends = ends or [rotor.positions[-1]]
-    middle = (min(ends) + max(ends)) / 2 if ends[1:] else ends[0] / 2
-    return int(np.argmin(np.abs(rotor.positions - middle))) + 1
 
 
 @command
@@ -436,6 +470,8 @@ def response(
     if isinstance(model, fem.Rotor):
         coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
     else:
+        if options.view == "shape":
+            raise ValueError("--view shape draws a rotor; a small model has nodes alone")
         by_node = {model.node(node): amount for node, amount in unbalance.items()}
         coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
     result = Vibration(
@@ -446,6 +482,7 @@ def response(
         peaks=peaks,
         operating=operating,
     )
+    at = None if options.at is None else _nearest(finer, options.at)
     chief, every = critical_peaks(result.labels, peaks), result.named()
     mounted = _mounted(model, coarse.unbalance)
     return Outcome(
@@ -456,6 +493,7 @@ def response(
             mounted,
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
+            *(result.shape(at) if options.view == "shape" else ()),
         ),
         behind=(result.readings(),),
         file=result.file(),
@@ -464,7 +502,7 @@ def response(
         notes=tuple(
             f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in every if peak.note
         ),
-        pictures=result.pictures(options.view),
+        pictures=result.pictures(options.view, at),
         title="Unbalance response",
         provenance=provenance(files, options, **asked),
     )
@@ -566,3 +604,15 @@ def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> 
         return rotor.nodes
     held = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*held] or [*range(1, rotor.n_nodes + 1)]
+
+
+def _nearest(response: Response, at: str | float) -> int:
+    """The speed nearest to one asked for, which must lie among them."""
+    wanted = one_speed(at, "--at")
+    low, high = response.speeds[0], response.speeds[-1]
+    if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
+        raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
+    k = int(abs(response.speeds - wanted).argmin())
+    if not response.steady[k]:
+        raise ValueError(f"--at {at}: there is no steady response, so no orbit to draw; take another speed")
+    return k

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.identify.modes_result import FittedModes, Readings
 
+FEW_TURNS = 10.0
+"""In the half-power band of a mode: vectors, means over turns, flatten one that is passed within fewer."""
 TABLES = (".csv", ".xlsx", ".txt")
 Phase = Literal["lead", "lag"]
 
@@ -136,7 +138,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     steady = None if modes is None else modes.steady
     why = why or next(iter(turned or (() if modes is None else modes.undetermined)), "")
     warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.warnings)
-    warnings = (*warnings, *roll.warnings)
+    warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
     estimate = None if modes is None else modes.fit.estimate
     document = {
         "run": sweeps[0].run,
@@ -245,6 +247,24 @@ def _turned(sweep: Readings, modes: FittedModes) -> tuple[str, ...]:
         return ()
     sign = "lag" if sweep.labels.phase == "lead" else "lead"
     return (f"phases are read as {sweep.labels.phase}s; modes explain them as {sign}s (--phase {sign})",)
+
+
+def _hasty(fit: FittedModes) -> list[str]:
+    """Say which modes are passed so fast that vectors flatten them: their ± may hold in half of the cases."""
+    import numpy as np
+
+    from rotorid.identify.answers import SweptAnswers
+
+    if not isinstance(fit.answers, SweptAnswers):
+        return []
+    omega, zeta = fit.values[:2]
+    rate = np.abs(fit.answers.speed.derivative()(fit.answers.at(omega).time))
+    turns = zeta * omega**2 / np.pi / np.maximum(rate, 1e-12)  # 2ζω / rate seconds of ω / 2π turns
+    return [
+        f"mode {mode + 1} is passed within {turns[mode]:.2g} turns of its half-power band: vectors, means "
+        "over turns, flatten it, and ± of its damping are too small; let the speed change more slowly"
+        for mode in np.flatnonzero(turns < FEW_TURNS)
+    ]
 
 
 def _slow_roll(

@@ -546,8 +546,8 @@ def _warnings(result: Reduction) -> list[str]:
     if masses.condition_number > BADLY:
         warnings.append(
             f"the regression is ill-conditioned (condition number {masses.condition_number:.1f}): errors of "
-            f"1 % in the compliances and shapes can move the masses by up to {masses.condition_number:.0f} %; "
-            "more modes make them firmer"
+            "1 % in the compliances and shapes can move the masses by up to "
+            f"{masses.condition_number:.0f} %; more modes make them firmer"
         )
     return warnings
 

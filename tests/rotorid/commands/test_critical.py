@@ -20,9 +20,10 @@ def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
     np.testing.assert_allclose(np.diff(np.log(stiffness)), np.log(250 * 100) / (len(stiffness) - 1))
 
 
-def test_critical_with_directions_and_map(cli, files, tmp_path):
-    document = cli("critical", files[0], "-n", 2, "--map", "--json").json
+def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):
+    document = cli("critical", files[0], "-n", 2, "--mesh-check", "--map", "--json").json
     assert len(document["direction"]) == 2
+    assert np.abs(document["mesh_check"]["relative_error"]).max() < 1e-3
     curves = np.array(document["map"]["critical_speeds_rad_s"])
     assert curves.shape == (2, len(document["map"]["stiffness_N_per_m"]))
     assert (np.diff(curves[0]) > 0).all()

@@ -213,6 +213,7 @@ def test_unbalance_of_a_small_model(cli, tmp_path):
     assert document["sensors"] == [2, 1, 3]
     amplitude = document["amplitude_m"][0][5]
     assert amplitude == pytest.approx(1e-4 * w**2 / abs(k - m * w**2), rel=1e-2)
+    assert "--view shape draws a rotor" in cli(*how, "own", "--view", "shape").err
 
 
 COMPRESSOR = sample_data() / "compressor"
@@ -238,7 +239,7 @@ def test_one_row_for_each_critical_speed_and_the_limit_beside_the_readings(cli):
 
 def test_what_is_not_known_says_what_to_do(cli):
     text = cli(*PROBES, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm").out
-    assert "only speeds from 2000 to 6000 rpm were searched" in " ".join(text.split())
+    assert "give speeds from 2000 to 8190 rpm" in " ".join(text.split())
 
 
 @pytest.mark.parametrize(
@@ -266,3 +267,14 @@ def test_no_unbalance_of_the_standard(cli, given):
     found = cli("response", COMPRESSOR / "rotor.toml", "--unbalance", given, "--speeds", "5000:6000:500rpm")
     assert found.code == 2
     assert ("--unbalance" if ":" in given else "nowhere") in found.err
+
+
+def test_the_deflected_shape_is_that_of_all_nodes(cli, files, model, tmp_path):
+    command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--sensors", "wheel")
+    shape = tmp_path / "shape.png"
+    text = cli(*command, "--table", "--view", "shape", "--at", "300", "--plot", shape).out
+    rows = [line.split() for line in text.split("Deflected shape at")[1].splitlines()[2:] if line]
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [300.0])
+    sizes = [float(row[2]) for row in rows[: model.n_nodes]]
+    np.testing.assert_allclose(sizes, 1e6 * expected.major[0], rtol=2e-3)
+    assert shape.read_bytes().startswith(b"\x89PNG")

@@ -1,5 +1,6 @@
 """`rotorid runup`: what it prints and writes, what reads it, pictures, and options that cannot be."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -146,3 +147,19 @@ def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
     assert bottom > top
     phase = np.concatenate([line.get_ydata() for line in below.lines[:1]])
     assert np.abs(np.diff(phase)).max() < 180
+
+
+def test_vectors_of_python(rotor_and_sweep):
+    rotor, sweep = rotor_and_sweep
+    found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
+    assert len(found.document["modes"]) == 1
+    assert json.dumps(found.document)
+
+
+def test_a_mode_that_is_passed_within_few_turns_is_said(tmp_path, cli):
+    """ζω²/(πα): of this rotor 5 turns at 300 rpm a second, 16 at 100."""
+    for rate, many in ((300.0, True), (100.0, False)):
+        rotor, sweep = drawn(rate=rate)
+        warnings = cli("runup", table(tmp_path / "v.csv", [sweep]), "--json").json["warnings"]
+        turns = rotor.zeta * rotor.omega**2 / (np.pi * rate / RPM)
+        assert any("is passed within" in words for words in warnings) == many == (turns.min() < 6)
