@@ -268,13 +268,6 @@ GALLERY = (
         dense=True,
     ),
     Picture(
-        "run-up-polar",
-        "instruments",
-        f"runup {RUN_UP} --view polar",
-        "The same as polar plots: each mode a loop, the speed at its marks.",
-        dense=True,
-    ),
-    Picture(
         "tacho",
         "instruments",
         f"vectors {RUN_UP}",

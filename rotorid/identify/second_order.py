@@ -17,6 +17,8 @@ from rotorid.identify.ode import OdeModel, check_known, ode_model, read_expressi
 if TYPE_CHECKING:
     from fem import StateSpace
 
+__all__ = ["second_order", "state_space"]
+
 Matrix = Sequence[Sequence[float | str]] | FloatArray
 """Numbers or expressions of parameters, (n, n)."""
 
