@@ -1,4 +1,4 @@
-"""What the worksheet shows, computed by workflows in a process of its own: one JSON line a request.
+"""What the worksheet shows, computed by the commands in a process of its own: one JSON line a request.
 
     python -m rotorid.worksheet.calculation
 
