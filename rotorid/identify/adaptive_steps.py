@@ -1,6 +1,6 @@
 """Integration with error control, in a bounded number of steps: scipy's, and Taylor series by heyoka.
 
-Absolute tolerances follow the size that each state and sensitivity has had so far. heyoka belongs to the
+heyoka belongs to the
 extra `rotorid[fast]`; a model is compiled once, which takes up to a second. Source: Biscani and Izzo,
 "Revisiting high-order Taylor methods for astrodynamics and celestial mechanics", MNRAS 504 (2021) 2614.
 """
@@ -33,7 +33,7 @@ LEVEL = 1e-4
 
 
 def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, str]:
-    """States and sensitivities (n, size), and the integrator used.
+    """States and sensitivities (n, n_x, 1 + k), and the integrator used.
 
     Parameters
     ----------
@@ -58,7 +58,9 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
         integrator = "dop853"  # says why
     t, name, reached = system.t, "", 0.0
     for name, most, each in STEPS[integrator]:
-        table, reached = _solve(system, name, rtol, max(most, each * len(t)))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
+            table, reached = _solve(system, name, rtol, max(most, each * len(t)))
         if reached == t[-1]:
             return table, name
     raise SimulationError(
@@ -76,10 +78,9 @@ def worth_compiling(model: OdeModel, steps: int) -> bool:
     if not 0 < size**2 <= steps or find_spec("heyoka") is None:
         return False
     try:
-        taylor(model)
+        return taylor(model) is not None
     except ValueError:
         return False
-    return True
 
 
 def diverged(model: OdeModel, time: float, state: int, value: str) -> SimulationError:
@@ -95,37 +96,34 @@ def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArra
     from scipy.integrate import DOP853, LSODA
 
     t, sizes, last = system.t, first_sizes(system), 0.0
-    table = np.full((len(t), len(sizes)), np.nan)
+    scale = np.divide(1.0, theta := np.abs(system.theta[: system.k]), where=theta > 0, out=np.ones(system.k))
+    # of a sensitivity times its parameter as of the state
+    limits = (0.01 * rtol * np.outer(sizes, [1.0, *scale])).ravel()
+    table = np.full((len(t), *system.first.shape), np.nan)
     table[0] = system.first
-    options: dict[str, Any] = {"rtol": rtol, "max_step": _longest_step(system)}
-    solver_type: Any = LSODA if name == "lsoda" else DOP853
     # inputs have corners at the samples: no step may cross one
     corners = range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
-        for begin, end in pairwise(corners):
-            first = min(last, float(t[end] - t[begin])) or None
-            limits, row, last = _tolerances(system, sizes, rtol), begin + 1, 0.0
-            solver = solver_type(
-                system, float(t[begin]), table[begin], float(t[end]), first_step=first, atol=limits, **options
-            )
-            if not np.isfinite(getattr(solver, "h_abs", 0.0)):  # of rates that are not finite
-                solver.h_abs = 1e-6 * (t[end] - t[begin])
-            while row <= end:
-                if not most:
-                    return table, solver.t
-                most, system.steps = most - 1, system.steps + 1
-                solver.step()
-                _check(system, solver)
-                last = max(last, solver.step_size)
-                done = solver.status == "finished"
-                upto = end + 1 if done else int(np.searchsorted(t[: end + 1], solver.t, side="right"))
-                if upto > row:
-                    table[row:upto] = solver.dense_output()(t[row:upto]).T
-                row, now = upto, np.abs(solver.y)
-                if (now > sizes).any():
-                    sizes = np.maximum(now, sizes)
-                    solver.atol = _tolerances(system, sizes, rtol)
+    for begin, end in pairwise(corners):
+        first = min(last, float(t[end] - t[begin])) or None
+        options: dict[str, Any] = {"first_step": first, "max_step": _longest_step(system)}
+        solver: Any = (LSODA if name == "lsoda" else DOP853)(
+            system, t[begin], table[begin].ravel(), t[end], rtol=rtol, atol=limits, **options
+        )
+        if not np.isfinite(getattr(solver, "h_abs", 0.0)):  # of rates that are not finite
+            solver.h_abs = 1e-6 * (t[end] - t[begin])
+        row, last = begin + 1, 0.0
+        while row <= end:
+            if not most:
+                return table, solver.t
+            most, system.steps = most - 1, system.steps + 1
+            solver.step()
+            _check(system, solver)
+            last = max(last, solver.step_size)
+            done = solver.status == "finished"
+            upto = end + 1 if done else int(np.searchsorted(t[: end + 1], solver.t, side="right"))
+            if upto > row:
+                table[row:upto] = solver.dense_output()(t[row:upto]).T.reshape(-1, *system.first.shape)
+            row = upto
     return table, float(t[-1])
 
 
@@ -138,44 +136,33 @@ def _longest_step(system: System) -> float:
 
 
 def first_sizes(system: System) -> FloatArray:
-    """Sizes to begin with, (size,): of the initial values, and of their changes in one sample."""
-    t, n, z = system.t, system.nx, system.first
-    rates = np.abs(system(float(t[0]), z))
+    """Sizes of the states, (n_x,): of the initial values, and of their changes in one sample."""
+    t, x, model = system.t, system.first[:, 0], system.model
     # at rest now, a model may be driven later
-    later = np.abs(system.model.f(t, z[:n], system.theta, system.u)[..., 0])
-    rates[:n] = np.max(later, axis=0, where=np.isfinite(later), initial=0.0)
-    step = float(t[-1] - t[0]) / max(1, len(t) - 1)
-    return np.asarray(np.abs(z) + step * np.where(np.isfinite(rates), rates, 0.0))
-
-
-def _tolerances(system: System, sizes: FloatArray, rtol: float) -> FloatArray:
-    """Absolute tolerances (size,): a tenth of rtol times the sizes of states and sensitivities."""
-    x, s = sizes[: system.nx], sizes[system.nx :].reshape(system.nx, system.np)
-    most = float(x.max()) or 1.0  # all zero: at rest
-    theta = np.abs(system.theta[: system.np])
-    least = np.maximum(LEVEL * s.max(axis=0, initial=0.0), 1e-6 * most / np.where(theta > 0, theta, 1.0))
-    floors = np.concatenate([np.full(len(x), LEVEL * most), np.tile(least, len(x))])
-    return np.asarray(np.maximum(0.1 * rtol * np.maximum(sizes, floors), 1e-300))
+    rates = np.abs(model.f(t, x, system.theta, system.u)[..., 0])
+    fastest = np.max(rates, axis=0, where=np.isfinite(rates), initial=0.0)
+    sizes = np.abs(x) + fastest * float(t[-1] - t[0]) / max(1, len(t) - 1)
+    return np.asarray(np.maximum(sizes, LEVEL * (sizes.max() or 1.0)))
 
 
 def _check(system: System, solver: Any) -> None:  # noqa: ANN401  scipy has no types
     """Refuse a step that failed or left all bounds."""
-    y, n, more = np.asarray(solver.y), system.nx, ""
-    size = np.abs(y[:n])
+    z, more = solver.y.reshape(system.first.shape), ""
+    size = np.abs(z[:, 0])
     lost = ~(size < LARGEST)
     if not lost.any():
-        if solver.status != "failed" and np.isfinite(y).all():
+        if solver.status != "failed" and np.isfinite(z).all():
             return
         # steps have become too small: the state that changes fastest for its size
-        rates = np.abs(system(solver.t, y)[:n]) / np.maximum(size, 1e-300)
+        rates = np.abs(system(solver.t, z)[:, 0]) / np.maximum(size, 1e-300)
         lost, more = np.where(np.isfinite(rates), rates, np.inf), " and no step leads on"
     state = int(np.argmax(lost))
-    raise diverged(system.model, solver.t, state, f"{y[state]:.3g}{more}")
+    raise diverged(system.model, solver.t, state, f"{z[state, 0]:.3g}{more}")
 
 
 @lru_cache(maxsize=8)
 def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
-    """A compiled model: it gives states and sensitivities (n, size), or None without a finite solution.
+    """A compiled model: it gives states and sensitivities, or None without a finite solution.
 
     States are divided by their sizes, derivatives by parameters by theirs. Sizes are parameters of the code,
     so that it does not depend on what was solved before.
@@ -187,25 +174,29 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
     import sympy
 
     n, k, nu = len(model.states), len(model.parameters), len(model.inputs)
-    par = [hy.par[i] for i in range(2 * k + 2 * nu + n)]
-    sizes, states = par[2 * k + 2 * nu :], [hy.expression(f"z{i}") for i in range(n)]
-    quantities = [hy.time, *(size * z for size, z in zip(sizes, states, strict=True))]
-    quantities += [par[k + i] * par[i] for i in range(k)]
-    quantities += [par[2 * k + i] + par[2 * k + nu + i] * hy.time for i in range(nu)]  # straight lines
+    # parameters over their sizes and these, inputs as straight lines, sizes of the states
+    theta, size, level, slope, of_x = np.split(
+        np.array([hy.par[i] for i in range(2 * (k + nu) + n)]), np.cumsum([k, k, nu, nu])
+    )
+    z = [hy.expression(f"z{i}") for i in range(n)]
+    quantities = [hy.time, *of_x * z, *size * theta, *level + slope * hy.time]
     put = dict(zip(model.symbols, quantities, strict=True))
     try:
         if model.inertia:
             raise ValueError("a mass matrix is solved numerically")
-        rates = []
-        for z, size, rate in zip(states, sizes, model.rates, strict=True):
-            numbers = {r: sympy.Float(float(r)) for r in rate.atoms(sympy.Rational) if not r.is_Integer}
-            rates.append((z, hy.from_sympy(rate.xreplace(numbers), put) / size))
+        numbers = [
+            {r: sympy.Float(float(r)) for r in e.atoms(sympy.Rational) - e.atoms(sympy.Integer)}
+            for e in model.rates
+        ]
+        rates = [
+            hy.from_sympy(e.xreplace(by), put) for e, by in zip(model.rates, numbers, strict=True)
+        ] / of_x
         # parameters may stand in initial values and outputs only; heyoka counts up to the last it sees
-        rates[0] = (rates[0][0], rates[0][1] + 1e-300 * par[-1])
+        rates[0] += 1e-300 * of_x[-1]
         solver = hy.taylor_adaptive(
-            hy.var_ode_sys(rates, par[:k], order=1),
+            hy.var_ode_sys([*zip(z, rates, strict=True)], [*theta], order=1),
             [0.0] * n,
-            pars=[0.0] * len(par),
+            pars=[0.0] * (2 * (k + nu) + n),
             tol=1e-12,
             compact_mode=n * (1 + k) > 40,  # smaller code, quicker to compile
             opt_level=1,
@@ -214,24 +205,28 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
         raise ValueError(f"the integrator taylor cannot compile this model ({error}); use auto") from error
 
     def solve(system: System) -> FloatArray | None:
-        t, u, theta = system.t, system.u, system.theta
-        whole = system if system.np else System(model, theta, t, u, True)
-        x, p = first_sizes(whole)[:n], np.abs(theta)
-        x, p = np.where(x > 0, x, 1.0), np.where(p > 0, p, 1.0)
-        scale = np.concatenate([x, (x[:, None] / p).ravel()])
-        table = np.full((len(t), len(scale)), np.nan)
-        solver.time, solver.state[:] = t[0], whole.first / scale
-        solver.pars[:] = np.concatenate([theta / p, p, np.zeros(2 * nu), x])
-        options = {"max_steps": 20_000, "max_delta_t": _longest_step(system)}
+        t, u, values = system.t, system.u, system.theta
+        whole = system if system.k else System(model, values, t, u, True)
+        x, p = first_sizes(whole)[:, None], np.where(values == 0, 1.0, np.abs(values))
+        scale, options = x / [1.0, *p], {"max_steps": 20_000, "max_delta_t": _longest_step(system)}
+
+        def flat(table: FloatArray) -> FloatArray:
+            return np.append(table[:, 0], table[:, 1:])
+
+        solver.time, solver.state[:] = t[0], flat(whole.first / scale)
+        solver.pars[:] = np.concatenate([values / p, p, np.zeros(2 * nu), x[:, 0]])
         if not model.driven:
             table = solver.propagate_grid(t, **options)[-1]
         else:
+            table = np.full((len(t), scale.size), np.nan)
             table[0] = solver.state
-            for i, slope in enumerate(np.diff(u, axis=0) / np.diff(t)[:, None]):
-                solver.pars[2 * k : 2 * (k + nu)] = np.concatenate([u[i] - slope * t[i], slope])
+            for i, slopes in enumerate(np.diff(u, axis=0) / np.diff(t)[:, None]):
+                solver.pars[2 * k : 2 * (k + nu)] = np.concatenate([u[i] - slopes * t[i], slopes])
                 solver.propagate_until(t[i + 1], **options)
                 table[i + 1] = solver.state if solver.time == t[i + 1] else np.nan
-        usable = len(table) == len(t) and np.isfinite(table).all()
-        return np.asarray(table * scale)[:, : len(system.first)] if usable else None
+        if len(table) < len(t) or not np.isfinite(table).all():
+            return None
+        S = table[:, n:].reshape(-1, n, k)
+        return np.asarray(np.concatenate([table[:, :n, None], S], axis=2) * scale)[..., : 1 + system.k]
 
     return solve

@@ -36,7 +36,7 @@ HEUN: dict[str, Callable[[int], list[list[int]]]] = {
 
 
 class System:
-    """Right-hand side of the states x and, if wanted, of S behind them (row by row).
+    """Rates of z = [x | S], (n_x, 1 + k): the states and, if wanted (k = n_p), their sensitivities.
 
     Parameters
     ----------
@@ -52,27 +52,23 @@ class System:
         self, model: OdeModel, theta: FloatArray, t: FloatArray, u: FloatArray, sensitivities: bool
     ) -> None:
         self.model, self.theta, self.t, self.u = model, theta, t, u
-        self.nx, self.np = len(model.states), len(theta) if sensitivities else 0
-        table = model.x0(theta)[:, : 1 + self.np]
-        self.first = np.concatenate([table[:, 0], table[:, 1:].reshape(-1)])
-        """States and sensitivities at the first time."""
+        self.k = len(theta) if sensitivities else 0
+        self.first = model.x0(theta)[:, : 1 + self.k]
+        """z at the first time."""
         self.steps = 0
         """Of an integration with error control."""
 
-    def inputs(self, time: float) -> FloatArray:
-        """Inputs at a time, (n_u,)."""
-        if not self.u.size:
-            return np.zeros(0)
-        return np.array([np.interp(time, self.t, column) for column in self.u.T])
-
     def __call__(self, time: float, z: FloatArray) -> FloatArray:
-        """Rates, (size,)."""
-        return self.model.augmented(time, z, self.theta, self.inputs(time))
+        """Rates, of the shape of z; flat for a flat one."""
+        u = np.array([np.interp(time, self.t, column) for column in self.u.T] if self.u.size else ())
+        if z.ndim == 2:
+            return self.model.augmented(time, z, self.theta, u)
+        return self.model.augmented(time, z.reshape(self.first.shape), self.theta, u).ravel()
 
 
 def exact(system: System) -> FloatArray:
-    """States and sensitivities (n, size) of a linear model; not finite where they overflow."""
-    model, t, n, k = system.model, system.t, system.nx, system.np
+    """States and sensitivities (n, n_x, 1 + k) of a linear model; not finite where they overflow."""
+    model, t, k = system.model, system.t, system.k
     if not model.linear_driven:
         raise ValueError(
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
@@ -80,7 +76,7 @@ def exact(system: System) -> FloatArray:
         )
     from scipy.linalg import expm
 
-    tables, nu = model.matrices(system.theta)[: 1 + k], system.u.shape[1]
+    n, nu, tables = len(model.states), system.u.shape[1], model.matrices(system.theta)[: 1 + k]
     sizes = np.abs(tables).max(axis=(1, 2))
     moving = 1 + np.flatnonzero(sizes[1:])
     # A_j as large as A: larger ones would cost digits
@@ -97,20 +93,19 @@ def exact(system: System) -> FloatArray:
     kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
     _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
     lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    x, s = np.zeros((len(t), n, 1)), np.zeros((len(t), n, k))
-    x[0, :, 0], s[0] = system.first[:n], system.first[n:].reshape(n, k)
-    size = max(1, BATCH // M.size)
+    z = np.zeros((len(t), n, 1 + k))
+    z[0], size = system.first, max(1, BATCH // M.size)
     for low in range(0, len(steps), size):
-        rows, back = slice(low + 1, low + size + 1), slice(low, min(low + size, len(steps)))
-        used, place = np.unique(which[back], return_inverse=True)
+        back = slice(low, min(low + size, len(steps)))
+        rows, (used, place) = slice(low + 1, back.stop + 1), np.unique(which[back], return_inverse=True)
         P = expm(lengths[used][:, None, None] * M)
         P = P[place] if len(P) > 1 else P
         driven = P[:, :m, m:] @ w[back, :, None]
-        x[rows] = recurrence(P[:, :n, :n], x[low], driven[:, :n])
-        bent = (P[:, n:m, :n] @ x[back] + driven[:, n:]).reshape(len(place), -1, n)
-        s[rows, :, moving - 1] = (bent / scale[:, None]).swapaxes(1, 2)
-        s[rows] = recurrence(P[:, :n, :n], s[low], s[rows])
-    return np.concatenate([x[:, :, 0], s.reshape(len(t), -1)], axis=1)
+        z[rows, :, :1] = recurrence(P[:, :n, :n], z[low, :, :1], driven[:, :n])
+        bent = (P[:, n:m, :n] @ z[back, :, :1] + driven[:, n:]).reshape(len(place), -1, n)
+        z[rows, :, moving] = (bent / scale[:, None]).swapaxes(1, 2)
+        z[rows, :, 1:] = recurrence(P[:, :n, :n], z[low, :, 1:], z[rows, :, 1:])
+    return z
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
@@ -156,19 +151,13 @@ def heun_step(
 
 
 def stepwise(system: System, name: str) -> FloatArray:
-    """States and sensitivities (n, size) by one step from sample to sample: of `HEUN`, or "rk4" as [F]."""
-    n, k = system.nx, system.np
-    # of each part the states, and their sensitivities
-    parts = [
-        [*part, *(n + k * i + j for i in part for j in range(k))]
-        for part in (HEUN[name](n) if name in HEUN else [])
-    ]
-    table = np.full((len(system.t), len(system.first)), np.nan)
+    """States and sensitivities (n, n_x, 1 + k), a step from sample to sample: of `HEUN`, or "rk4" as [F]."""
+    table = np.full((len(system.t), *system.first.shape), np.nan)
     table[0] = z = system.first
     for i, (now, then) in enumerate(pairwise(system.t.tolist()), start=1):
         h = then - now
-        if parts:
-            z = heun_step(system, now, then, z, h, parts)
+        if name in HEUN:
+            z = heun_step(system, now, then, z, h, HEUN[name](len(z)))
         else:
             k1 = h * system(now, z)
             k2 = h * system(now + h / 2, z + k1 / 2)

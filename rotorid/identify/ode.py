@@ -122,14 +122,13 @@ class OdeModel:
         return np.moveaxis(columns, (0, 2), (2, 0))
 
     def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates of the states, and of S = ∂x/∂θ where it stands behind them, row by row, (size,)."""
-        n, size = len(self.states), len(z)
-        if n * size < UNROLLED and not self.inertia:
-            made = self.memory.get(size) or self.memory.setdefault(size, self._unrolled(size > n))
-            return np.asarray(made.one([t, *z.tolist(), *theta.tolist(), *u.tolist()]))
-        table = self.f(t, z[:n], theta, u)
-        slopes = table[:, 1 : 1 + n] @ z[n:].reshape(n, -1) + (table[:, 1 + n :] if size > n else 0.0)
-        return np.concatenate([table[:, 0], slopes.ravel()])
+        """Rates of z = [x | S], (n_x, 1 + k): of the states, and where k = n_p of S = ∂x/∂θ."""
+        if z.size * len(z) < UNROLLED and not self.inertia:
+            made: Compiled | None = self.memory.get(z.shape)
+            made = made or self.memory.setdefault(z.shape, self._unrolled(z.shape))
+            return made.one([t, *z.ravel().tolist(), *theta.tolist(), *u.tolist()])
+        table, n = self.f(t, z[:, 0], theta, u), len(z)
+        return np.hstack((table[:, :1], table[:, 1 : 1 + n] @ z[:, 1:] + table[:, 1 + n : n + z.shape[1]]))
 
     @cached_property
     def linear_driven(self) -> bool:
@@ -176,16 +175,16 @@ class OdeModel:
         """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
 
-    def _unrolled(self, whole: bool) -> Compiled:
+    def _unrolled(self, shape: tuple[int, ...]) -> Compiled:
         """Rates of x, and of S if wanted, with the products of f_x S written out: quicker if they are few."""
         import sympy
 
         n, rates = len(self.states), sympy.Matrix(self.rates)
         first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
-        S = sympy.Matrix(n, len(p), [sympy.Dummy() for _ in range(n * len(p))]) if whole else []
-        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if whole else []
-        exprs = [*rates, *slopes]
-        return Compiled([*first, *x, *S, *p, *u], exprs, (len(exprs),))
+        S = sympy.Matrix(n, shape[1] - 1, lambda *_: sympy.Dummy())
+        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if len(S) else S
+        z = sympy.Matrix([*x]).row_join(S)
+        return Compiled([*first, *z, *p, *u], [*rates.row_join(slopes)], shape)
 
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""

@@ -114,8 +114,8 @@ def simulate(
         _check(model, t[:1], system.first[None])
         table, used = _solved(system, integrator, rtol)
         _check(model, t, table)
-        x, steps = table[:, :n], system.steps
-        S = table[:, n:].reshape(S.shape) if sensitivities else S
+        x, steps = table[..., 0], system.steps
+        S = table[..., 1:] if sensitivities else S
     outputs = model.h(t, x, values, u)
     y, y_theta = outputs[..., 0], outputs[..., 1 : 1 + n] @ S + outputs[..., 1 + n :]
     y_theta = y_theta if sensitivities else np.zeros_like(y_theta)
@@ -152,7 +152,7 @@ def simulated_record(
 
 
 def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, str]:
-    """States and sensitivities (n, size), and the integrator used."""
+    """States and sensitivities (n, n_x, 1 + k), and the integrator used."""
     if integrator in STEPWISE:
         return stepwise(system, integrator), integrator
     if integrator == "expm" or (integrator == "auto" and system.model.linear_driven):
@@ -161,11 +161,11 @@ def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, s
 
 
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
-    """Refuse states and sensitivities (n, size) that have diverged, with the time and the state."""
-    n = len(model.states)
-    lost = np.logical_not(np.abs(table[:, :n]) < LARGEST)
-    unsure = np.logical_not(np.isfinite(table[:, n:].reshape(len(t), n, -1)).all(axis=-1))
+    """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the time and the state."""
+    lost = np.logical_not(np.abs(table[..., 0]) < LARGEST)
+    unsure = np.logical_not(np.isfinite(table).all(axis=-1))
     for i in np.flatnonzero((lost | unsure).any(axis=1))[:1]:
         j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
-        value = f"{table[i, j]:.3g}" if lost[i].any() else "not finite in its sensitivity to the parameters"
+        sure = f"{table[i, j, 0]:.3g}"
+        value = sure if lost[i].any() else "not finite in its sensitivity to the parameters"
         raise diverged(model, float(t[i]), j, value)

@@ -95,3 +95,12 @@ def motion_in(path, values=()):
 
     M, C, K = (np.array([[entry(cell) for cell in row] for row in said[key]]) for key in "MCK")
     return fem.Motion(M, C, K, tuple(said["coordinates"]), said.get("speed_rad_s", 0.0))
+
+
+def state_space_of(model, theta=None):
+    """A linear model s' = A s + B u, y = C s + D u: C and D are outputs of unit states and inputs."""
+    theta = model.start if theta is None else np.asarray(theta, dtype=float)
+    n, both = len(model.states), np.eye(len(model.states) + len(model.inputs))
+    A, _, B = np.split(model.matrices(theta)[0], np.add(n, (0, 1)), axis=1)
+    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], theta, both[:, n:])[..., 0].T, [n], axis=1)
+    return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)

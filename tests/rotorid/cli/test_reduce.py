@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from cases import each_of
 from scipy.io import loadmat
+from timedomain_cases import state_space_of
 
 import fem
 from rotorid import read_ode_model, read_rotor, small_model
 from rotorid import reduce as reduce_rotor
-from rotorid.identify.second_order import state_space
 from rotorid.samples import sample_data
 from rotorid.tables import read_small_model
 
@@ -48,7 +48,7 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
     else:
         found = dict(np.load(space)) if ending == "npz" else loadmat(space)
     assert "allow_pickle" not in found  # numpy 1.26 stores this argument of savez as an array
-    back = state_space(read_ode_model(model), np.zeros(3))
+    back = state_space_of(read_ode_model(model), np.zeros(3))
     ours = np.sort(np.abs(np.linalg.eigvals(found["A"])))
     np.testing.assert_allclose(ours, np.sort(np.tile(np.abs(back.eigenvalues), 2)), rtol=1e-10)
     names = [str(np.squeeze(name)) for name in np.ravel(found["outputs"])]

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cases import each_of
 from exact_solutions import frequency_response
-from timedomain_cases import motion_in
+from timedomain_cases import motion_in, state_space_of
 
 import fem
 from fem import state_space as of_motion
-from rotorid.identify.ode import ode_model
-from rotorid.identify.second_order import second_order, state_space
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
@@ -62,14 +59,14 @@ def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
     path = written(tmp_path, motion, inputs=["f_x7", "f_x18"], dampers={"x7": 500.0, "x12": 90.0})
     damped = fem.Motion(motion.M, np.diag([500.0, 90.0, 0.0]), motion.K, motion.coordinates, 0.0)
     expected = of_motion(damped)
-    found = state_space(read_ode_model(path))
+    found = state_space_of(read_ode_model(path))
     assert farthest(found.eigenvalues, expected.eigenvalues) < 1e-10
     again = of_motion(motion_in(path), inputs=["f_x7", "f_x18"])
     assert farthest(again.eigenvalues, expected.eigenvalues) < 1e-10
     assert (found.inputs, found.outputs) == (again.inputs, again.outputs)
     w = [50.0, 135.0, 700.0]
     np.testing.assert_allclose(frequency_response(found, w), frequency_response(again, w), rtol=1e-9)
-    undamped = state_space(read_ode_model(path), [0.0, 0.0]).eigenvalues
+    undamped = state_space_of(read_ode_model(path), [0.0, 0.0]).eigenvalues
     np.testing.assert_allclose(np.sort(np.abs(undamped))[::2], small.frequencies, rtol=1e-10)
 
 
@@ -85,7 +82,7 @@ def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping,
     forces = ["f_x3", "f_y6"]
     path = written(tmp_path, motion, inputs=forces, outputs=shown)
     assert ("[states]" in path.read_text()) == (supports == "kept")
-    found = state_space(read_ode_model(path))
+    found = state_space_of(read_ode_model(path))
     expected = of_motion(motion, inputs=forces, outputs=shown)
     assert farthest(found.eigenvalues, expected.eigenvalues) < 1e-10
     assert singular(motion, found.eigenvalues) < 1e-9
@@ -104,66 +101,6 @@ def test_dampers_in_states_act_like_dampers(tmp_path):
     for name, value in (("x3", 400.0), ("y6", 70.0)):
         C[motion.index(name), motion.index(name)] += value
     damped = fem.Motion(motion.M, C, motion.K, motion.coordinates, SPEED)
-    found = state_space(read_ode_model(path)).eigenvalues
+    found = state_space_of(read_ode_model(path)).eigenvalues
     assert farthest(found, of_motion(damped).eigenvalues) < 1e-10
     assert farthest(found, small.state_space(SPEED).eigenvalues) > 1e-4
-
-
-def test_a_model_with_inputs_that_act_on_outputs():
-    model = ode_model(
-        {"x": "v", "v": "-k*x - 0.5*v + 2*u - w"},
-        initial={"x": 1.0, "v": 0.0},
-        estimate={"k": 4.0},
-        outputs={"y": "x + 3*u", "z": "k*v"},
-        inputs=["u", "w"],
-    )
-    found = state_space(model, [9.0])
-    np.testing.assert_allclose(found.A, [[0, 1], [-9, -0.5]])
-    np.testing.assert_allclose(found.B, [[0, 0], [2, -1]])
-    np.testing.assert_allclose(found.C, [[1, 0], [0, 9]])
-    np.testing.assert_allclose(found.D, [[3, 0], [0, 0]])
-    assert (found.states, found.inputs, found.outputs) == (("x", "v"), ("u", "w"), ("y", "z"))
-
-
-def test_a_mass_matrix_with_parameters():
-    model = second_order(
-        [["m", 0.5], [0.5, 2]], [[0, 0], [0, 0]], [[3, 0], [0, "k"]], estimate={"m": 1, "k": 5}
-    )
-    found = state_space(model)
-    squares = np.linalg.eigvals(np.linalg.solve([[1, 0.5], [0.5, 2]], np.diag([3.0, 5.0])))
-    np.testing.assert_allclose(np.sort(found.eigenvalues.imag)[2:], np.sort(np.sqrt(squares)), rtol=1e-12)
-    assert found.B.shape == (4, 0)
-    assert found.D.shape == (2, 0)
-
-
-@each_of(
-    ("rate", "output", "said"),
-    [
-        ("-a*x**3", "x", "the rate of x is not linear"),
-        ("-a*x*u", "x", "the rate of x is not linear"),
-        ("-a*abs(x)", "x", "the rate of x is not linear"),
-        ("-a*sign(x)", "x", "the rate of x is not linear"),
-        ("-a*x + cos(t)", "x", "the rate of x depends on the time"),
-        ("-a*x + u", "x*t", "the output y depends on the time"),
-        ("-a*x + u", "x**2", "the output y is not linear"),
-        ("-a*x + 1", "x", "the rate of x has a constant part"),
-        ("-a*x + u", "x + a", "the output y has a constant part"),
-    ],
-)
-def test_what_is_no_state_space_is_refused(rate, output, said):
-    model = ode_model(
-        {"x": rate}, initial={"x": 0.0}, estimate={"a": 1.0}, outputs={"y": output}, inputs=["u"]
-    )
-    with pytest.raises(ValueError, match=said):
-        state_space(model)
-
-
-def test_numbers_that_are_none():
-    model = ode_model({"x": "-a*x"}, initial={"x": 0.0}, estimate={"a": 1.0})
-    with pytest.raises(ValueError, match="finite numbers"):
-        state_space(model, [np.nan])
-    with pytest.raises(ValueError, match="1 parameter values are needed"):
-        state_space(model, [1.0, 2.0])
-    curve = ode_model({}, estimate={"a": 1.0}, outputs={"y": "a*t"})
-    with pytest.raises(ValueError, match="without states"):
-        state_space(curve)

@@ -56,7 +56,7 @@ def test_one_point_agrees_with_many():
     theta, x = np.array([2.0, 3.0, 5.0]), np.array([0.3, -0.7])
     table = model.f(0.4, x, theta)
     np.testing.assert_allclose(table, model.f(np.array([0.4]), x, theta)[0], rtol=1e-15)
-    np.testing.assert_array_equal(model.augmented(0.4, x, theta, np.zeros(0)), table[:, 0])
+    np.testing.assert_array_equal(model.augmented(0.4, x[:, None], theta, np.zeros(0)), table[:, :1])
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -90,7 +90,7 @@ def test_names_of_sympy_python_and_numpy_are_free():
     )
     total = len(names) * (len(names) + 1) / 2
     assert model.f(0.0, [2.0], model.start)[0, 0] == 2 * total
-    assert model.augmented(0.0, np.array([2.0]), model.start, np.zeros(0))[0] == 2 * total
+    assert model.augmented(0.0, np.array([[2.0]]), model.start, np.zeros(0)) == 2 * total
     assert model.linear_driven
 
 

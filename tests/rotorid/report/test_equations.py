@@ -300,7 +300,7 @@ def test_symbols_are_what_is_integrated():
         return float(total.replace(lambda f: f.is_Function, known_functions))
 
     rates = [value(row) for row in shown.symbolic if row.name == "rate"]
-    augmented = model.augmented(t, np.concatenate((x, S.ravel())), theta, np.zeros(0))[2:].reshape(2, 3)
+    augmented = model.augmented(t, np.column_stack((x, S)), theta, np.zeros(0))[:, 1:]
     np.testing.assert_allclose(np.reshape(rates, (3, 2)).T, augmented, rtol=1e-9)
     starts = [value(row) for row in shown.symbolic if row.name == "start"]
     np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0(theta)[:, 1:], rtol=1e-9)

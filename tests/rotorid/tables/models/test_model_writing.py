@@ -12,12 +12,11 @@ from exact_solutions import frequency_response
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
-from timedomain_cases import motion_in
+from timedomain_cases import motion_in, state_space_of
 
 import fem
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.second_order import state_space
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
@@ -208,7 +207,7 @@ def test_amplitudes_are_those_of_the_model_in_time(tmp_path, text):
     assert dict(file.start) == dict(zip(model.parameters, model.start, strict=True))
     assert set(model.outputs) <= set(file.model.outputs)
     w = np.array([0.1, 1.0, 2.7, 9.0])
-    expected = frequency_response(state_space(model), w)[:, :, 0]
+    expected = frequency_response(state_space_of(model), w)[:, :, 0]
     for i, name in enumerate(model.outputs):
         np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-12)
 
@@ -288,7 +287,7 @@ def test_chains_and_circles_of_rates(tmp_path, rates):
     path = saved(tmp_path, "m.toml", "\n".join([*text, "[estimate]", "e = 3.0", ""]))
     file, model = read_harmonic_model(path), read_ode_model(path)
     w = np.array([0.5, 1.1, 4.0])
-    expected = frequency_response(state_space(model), w)[:, :, 0]
+    expected = frequency_response(state_space_of(model), w)[:, :, 0]
     for i, name in enumerate(names):
         np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-11)
 
@@ -320,7 +319,7 @@ def test_every_form_has_the_response_of_the_matrices(tmp_path_factory, entries, 
     s = w[:, None, None]
     exact = np.linalg.inv(-s * s * M + 1j * s * damping + K)[:, :, force]
     exact = exact[:, [names.index(name) for name in heavy]]
-    found = frequency_response(state_space(read_ode_model(path)), w)[:, :, 0]
+    found = frequency_response(state_space_of(read_ode_model(path)), w)[:, :, 0]
     np.testing.assert_allclose(found, exact, rtol=1e-8, atol=1e-10)
     file = read_harmonic_model(path)
     inputs = {name: np.ones(3, dtype=complex) for name in file.model.inputs}
