@@ -6,29 +6,26 @@ record. The methods of [Q] and [F] stand beside it as they are printed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit, output_errors
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
-from rotorid.identify.quasilinearization import grid, quasilinearization
+from rotorid.identify.quasilinearization import quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, recorded_starts
-from rotorid.identify.result_records import Fit, Minimum
+from rotorid.identify.result_records import Fit
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
-from rotorid.identify.simulation import simulate
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
 
-MOST_STARTS = 10_000
+MOST_STARTS, OTHERS = 10_000, 7
+"""Starts at most; so many where the first does not describe the record."""
 METHODS: tuple[Method[None], ...] = (
     Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
     Method("gauss-newton", "whole steps without safeguards, as [F]", None),
@@ -47,7 +44,6 @@ def fit(  # noqa: PLR0913
     start: Mapping[str, float] | None = None,
     loss: str = "linear",
     starts: int | None = None,
-    trajectory: Mapping[str, ArrayLike] | None = None,
     max_iterations: int = 100,
     tolerance: float | None = None,
     rtol: float = RTOL,
@@ -74,8 +70,6 @@ def fit(  # noqa: PLR0913
     starts
         Number of starts: the first is `start`, the others spread over the bounds, or around it. None: others
         where levenberg-marquardt ends at a minimum that does not describe the record.
-    trajectory
-        First trajectory of quasilinearization: {state: number, or one value per time}; None: its solution.
     max_iterations
         At most.
     tolerance
@@ -126,8 +120,7 @@ def fit(  # noqa: PLR0913
             steps = sensitivity_steps(problem, theta, near)
             return iterate(problem, "Gauss–Newton", steps, max_iterations, tolerance)
         if method == "quasilinearization":
-            first = _first_states(problem, theta, trajectory)
-            return quasilinearization(problem, theta, first, near, max_iterations, tolerance)
+            return quasilinearization(problem, theta, near, max_iterations, tolerance)
         problem.evaluate(theta)  # says why, where the states diverge
         reached = nonlinear_least_squares(
             problem.residual,
@@ -143,28 +136,25 @@ def fit(  # noqa: PLR0913
         )
         return Iterations(**vars(reached))
 
-    begins = spread_starts(begin, problem.model.bounds, count, seed)
-    paths, more = _searched(search, problem, begins), ""
+    begins = spread_starts(begin, problem.model.bounds, OTHERS if starts is None else count, seed)
+    paths, more = _searched(search, problem, begins[:count]), ""
     path = min(paths, key=_cost)
-    ended = path.converged or path.iterations > 20
-    if starts is None and method == "levenberg-marquardt" and ended:
-        others = spread_starts(begin, problem.model.bounds, 7, seed)[1:]
-        path, more = _from_elsewhere(search, problem, path, others, loss)
+    if starts is None and method == "levenberg-marquardt" and (path.converged or path.iterations > 20):
+        path, more = _from_elsewhere(search, problem, path, begins[1:], loss)
+    words = [more, *_rivals(paths, path)]
     if weigh:
         problem, path = _weighed(search, problem, path)
     if weigh and len(prior):
         if not (path.converged and problem.errors):
             raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
         problem.prior = prior
-        paths = _searched(search, problem, [path.estimate.solution, *begins[1:]])
+        paths = _searched(search, problem, [path.estimate.solution, *begins[1:count]])
         path = min(paths, key=_cost).after(path.history)
-    minima = _merged(paths) if len(begins) > 1 else ()
+        words = [more, *_rivals(paths, path)]
     judged, theta = judge(problem, path, loss), path.estimate.solution
-    warnings = [*judged.pop("warnings"), more]
-    if len(minima) > 1:
-        warnings.append(f"{len(minima)} different minima were found; the best is given, see minima")
-    outside = bool(((theta < low) | (theta > high)).any())
-    warnings += [f"{method} knows no bounds, and the result lies outside those of the model"] * outside
+    words = [*judged.pop("warnings"), *words]
+    if ((theta < low) | (theta > high)).any():
+        words.append(f"{method} knows no bounds, and the result lies outside those of the model")
     runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
     return Fit(
         **(vars(path) | judged),
@@ -173,9 +163,8 @@ def fit(  # noqa: PLR0913
         method=method,
         integrator=runs[0].integrator if runs else integrator,
         loss=loss,
-        warnings=tuple(filter(None, warnings)),
+        warnings=tuple(filter(None, words)),
         simulations=runs,
-        minima=minima,
         residual_rms=float(np.sqrt(np.mean((path.estimate.residuals / problem.scale) ** 2))),
         errors=problem.errors or None,
     )
@@ -239,25 +228,6 @@ def _from_elsewhere(
     )
 
 
-def _first_states(
-    problem: Problem, theta: FloatArray, given: Mapping[str, ArrayLike] | None
-) -> list[FloatArray]:
-    """States (n, n_x) to begin with: the model's solution, or as given at the times of each record."""
-    made, states = [], problem.model.states
-    if given is not None and {*given} != {*states}:
-        raise ValueError(
-            f"a starting trajectory needs every state ({', '.join(states)}); got {', '.join(given)}"
-        )
-    for model, (finer, at) in zip(problem.models, map(partial(grid, problem), problem.records), strict=True):
-        if given is None:
-            integrator = problem.integrator
-            made.append(simulate(model, theta, finer, integrator=integrator, sensitivities=False).x)
-        else:
-            columns = [np.broadcast_to(np.asarray(given[n], dtype=float), len(at)) for n in states]
-            made.append(np.transpose([np.interp(finer.t, finer.t[at], x) for x in columns]))
-    return made
-
-
 def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
     """Weights from the residuals of the last fit, until they stay, or 20 times."""
     for _ in range(20 if path.converged else 0):
@@ -274,21 +244,16 @@ def _cost(path: Iterations) -> float:
     return float(path.costs[-1])
 
 
-def _merged(paths: Sequence[Iterations]) -> tuple[Minimum, ...]:
-    """Different minima, the best first."""
-    kept: list[Minimum] = []
-    for path in sorted((p for p in paths if p.converged), key=_cost):
-        theta, cost = path.estimate.solution, _cost(path)
-        for i, one in enumerate(kept):
-            other = np.array([*one.values.values()])
-            # parameters that are not determined may differ at the same cost
-            alike = not path.estimate.full_rank and cost - one.cost <= 1e-6 * one.cost
-            if alike or np.allclose(theta, other, rtol=1e-3, atol=1e-12):
-                kept[i] = replace(one, starts=one.starts + 1)
-                break
-        else:
-            kept.append(Minimum(dict(zip(path.names, theta.tolist(), strict=True)), cost, 1))
-    return tuple(kept)
+def _rivals(paths: Sequence[Iterations], path: Iterations) -> Iterator[str]:
+    """Words for a start that ends elsewhere, where the model describes the record nearly as well."""
+    best = path.estimate
+    for other in paths:
+        theta = other.estimate.solution
+        apart = best.full_rank and not np.allclose(theta, best.solution, rtol=1e-3, atol=1e-12)
+        if apart and other.converged and _cost(other) <= 1.5 * _cost(path):
+            values = ", ".join(f"{n} = {x:.6g}" for n, x in zip(path.names, theta, strict=True))
+            yield f"another start ends at {values}, which describes the record nearly as well"
+            return
 
 
 def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:

@@ -16,18 +16,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import FloatArray
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
 from rotorid.identify.records import Record, inputs_of, refined
 from rotorid.identify.sensitivity_steps import Step, iterate
+from rotorid.identify.simulation import simulate
 
 
 def quasilinearization(
     problem: Problem,
     theta: FloatArray,
-    states: Sequence[FloatArray],
     near: tuple[float, float],
     most: int,
     epsilon: float | None,
@@ -40,9 +40,7 @@ def quasilinearization(
         Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
         [Q] does; with any other the linear equations are solved by two steps of DOP853 from sample to sample.
     theta
-        First parameters (n,).
-    states
-        Of each record the first trajectory, (n, n_x) at the times of `grid`.
+        First parameters (n,); their solution is the first trajectory.
     near, most, epsilon
         As in `sensitivity_steps` and `iterate`.
 
@@ -51,12 +49,17 @@ def quasilinearization(
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    grids = [grid(problem, record) for record in problem.records]
+    wanted, heun = problem.integrator, problem.integrator in HEUN
+    grids = [refined(record, 1 if heun else 2) for record in problem.records]
+    parts = [*zip(problem.models, grids, strict=True)]
 
     def seen(states: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
         """At the times of the records."""
         return tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))
 
+    states = [
+        simulate(model, theta, fine, integrator=wanted, sensitivities=False).x for model, (fine, _) in parts
+    ]
     samples = [seen(states)]
     rows: list[tuple[FloatArray, FloatArray]] = []
 
@@ -65,8 +68,8 @@ def quasilinearization(
         yield theta, problem.residual(theta), None, theta, False, False
         while True:
             tables = [
-                linear_solutions(model, theta, record, x, problem.integrator)
-                for model, (record, _), x in zip(problem.models, grids, states, strict=True)
+                linear_solutions(model, theta, fine, x, wanted)
+                for (model, (fine, _)), x in zip(parts, states, strict=True)
             ]
             K, Y = linear_rows(problem, theta, samples[-1], seen(tables))
             fitted = problem.linear_fit(K, Y, theta)
@@ -84,11 +87,6 @@ def quasilinearization(
 
     done = iterate(problem, "quasilinearization", steps(theta, states), most, epsilon)
     return replace(done, trajectories=tuple(samples), regression=rows[0])
-
-
-def grid(problem: Problem, record: Record) -> tuple[Record, IntArray]:
-    """The times of a trajectory, and where those of the record stand among them."""
-    return (record, np.arange(len(record))) if problem.integrator in HEUN else refined(record, 2)
 
 
 def linear_solutions(

@@ -12,7 +12,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
-from rotorid.base.text import capital, counted, percent
+from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
 from rotorid.identify.records import Record, record_names
@@ -23,25 +23,6 @@ from rotorid.regression.prior import PriorEffect
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True)
-class Minimum:
-    """Where one or more starts ended.
-
-    Attributes
-    ----------
-    values
-        Parameters, by name.
-    cost
-        Half the sum of squared weighted residuals.
-    starts
-        How many starts ended here.
-    """
-
-    values: dict[str, float]
-    cost: float
-    starts: int
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,8 +51,6 @@ class Fit(Answered, Iterations):
         What must be known before the numbers are used.
     simulations
         States, outputs and sensitivities of each record with the result; empty where they diverge.
-    minima
-        Where the starts ended, best first; empty for one start.
     integration_change
         Change of each parameter at a tighter tolerance; None where the solution is exact.
     autocorrelation
@@ -94,7 +73,6 @@ class Fit(Answered, Iterations):
     reliable: bool
     warnings: tuple[str, ...]
     simulations: tuple[Trajectory, ...]
-    minima: tuple[Minimum, ...]
     integration_change: FloatArray | None
     autocorrelation: float | None
     residual_rms: float
@@ -160,7 +138,6 @@ class Fit(Answered, Iterations):
                 {"cost": cost, "parameters": dict(zip(names, row, strict=True))} for row, cost in steps
             ],
             "series": rows(self.series),
-            "minima": [{"parameters": m.values, "cost": m.cost, "starts": m.starts} for m in self.minima],
             "integration_change": None if change is None else dict(zip(names, change, strict=True)),
         }
         matrix = self.normal_matrix and self.normal_matrix.to_dict()
@@ -201,9 +178,6 @@ class Fit(Answered, Iterations):
         if self.errors:
             sizes = ", ".join(f"{name} {error:.3g}" for name, error in self.errors.items())
             lines.append(f"  estimated standard deviations, used as weights: {sizes}")
-        for i, m in enumerate(self.minima if len(self.minima) > 1 else ()):
-            values = ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
-            lines.append(f"  minimum {i + 1} ({counted(m.starts, 'start')}): {values}; cost {m.cost:.4g}")
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
         notes = parts.notes if self.described or self.estimate.dof <= 0 else ()

@@ -1,4 +1,4 @@
-"""Quasilinearization from all kinds of first trajectories; the tables of [Q] are in tests/book."""
+"""Quasilinearization; the tables of [Q] are in tests/book."""
 
 import numpy as np
 import pytest
@@ -8,30 +8,13 @@ from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
 
-FIRST = {"x1": 1.5, "x2": 1 + np.sin(book_record().t)}
-
 
 def test_truth_in_seven_iterations_with_error_control():
-    found = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST)
+    found = fit(book_model(), book_record(), method="quasilinearization")
     assert found.converged
     assert found.iterations <= 7
     assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
     assert found.warnings == ()
-
-
-@pytest.mark.parametrize("trajectory", ["model", "arrays"])
-def test_other_first_trajectories(trajectory):
-    record = book_record()
-    given = {"x1": np.full(31, 1.5), "x2": 1 + np.sin(record.t)} if trajectory == "arrays" else None
-    found = fit(
-        book_model(),
-        record,
-        method="quasilinearization",
-        trajectory=given,
-        start={"theta1": 0.7, "theta2": -0.7, "theta3": -0.7},
-    )
-    assert found.converged
-    assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
 
 
 def test_unknown_initial_value_agrees_with_the_default_method():
@@ -64,23 +47,19 @@ def test_divergence_is_said():
     record = Record(np.linspace(0, 1, 21), {"x": np.ones(21)})
     with pytest.raises(ValueError, match="diverge"):
         fit(model, record, method="quasilinearization")
-    found = fit(model, record, method="quasilinearization", trajectory={"x": 1.0})
-    assert found.values == pytest.approx([0.0], abs=1e-8)
 
 
 def test_what_it_does_not_know():
     with pytest.raises(ValueError, match="no robust loss"):
         fit(decay(), decay_record(), method="quasilinearization", loss="huber")
-    with pytest.raises(ValueError, match="every state"):
-        fit(book_model(), book_record(), method="quasilinearization", trajectory={"x1": 1.0})
     with pytest.raises(ValueError, match="heun"):
         fit(decay(), decay_record(), method="quasilinearization", integrator="rk4")
 
 
 def test_a_tolerance_ends_it():
     """At the first step that moves no parameter by more."""
-    every = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST)
-    found = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST, tolerance=0.01)
+    every = fit(book_model(), book_record(), method="quasilinearization")
+    found = fit(book_model(), book_record(), method="quasilinearization", tolerance=0.01)
     steps = np.abs(np.diff(every.history, axis=0)).max(axis=1)
     first = next(k for k, step in enumerate(steps, 1) if step < 0.01 or every.integrals[k] < 0.01)
     assert found.iterations == first < every.iterations

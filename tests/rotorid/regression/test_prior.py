@@ -156,8 +156,7 @@ def test_the_best_of_several_minima_counts_the_prior():
     data = record(np.full(25, 4.0) + 0.01 * np.sin(7 * T), 0.1)
     found = fit(replace(model, prior={"a": (-1.0, 1.0)}), data, starts=9)
     assert found.values[0] == pytest.approx(-2.0, abs=0.01)
-    assert [m.values["a"] > 0 for m in found.minima] == [False, True]
-    assert found.minima[1].cost - found.minima[0].cost == pytest.approx((3**2 - 1) / 2, rel=0.01)
+    assert not any("another start" in w for w in found.warnings)  # the prior tells them apart
 
 
 def test_copies_for_each_record_have_the_prior_of_their_parameter():
@@ -284,8 +283,6 @@ def test_a_prior_that_errors_are_estimated_with_chooses_among_all_minima():
         known = replace(model, prior={"a": (2.0 * sign, 0.1)}, bounds=np.array([[-10.0, 10.0]]))
         found = fit(known, record(y, None), weigh=True, starts=9)
         chosen.append(sign * found.values[0])
-        assert found.minima[1].cost - found.minima[0].cost == pytest.approx(40**2 / 2, rel=0.1)
-        assert sum(m.starts for m in found.minima) == 9
         assert not any("contradict" in w for w in found.warnings)
     assert chosen == pytest.approx([2.0, 2.0], abs=0.05)
 
