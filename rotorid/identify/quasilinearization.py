@@ -49,17 +49,18 @@ def quasilinearization(
     SimulationError
         The linear equations have no finite solution with the starting values.
     """
-    wanted, heun = problem.integrator, problem.integrator in HEUN
-    grids = [refined(record, 1 if heun else 2) for record in problem.records]
+    wanted, records = problem.integrator, problem.records
+    grids = [(one, np.arange(len(one))) if wanted in HEUN else refined(one, 2) for one in records]
     parts = [*zip(problem.models, grids, strict=True)]
 
     def seen(states: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
         """At the times of the records."""
         return tuple(x[at] for x, (_, at) in zip(states, grids, strict=True))
 
-    states = [
-        simulate(model, theta, fine, integrator=wanted, sensitivities=False).x for model, (fine, _) in parts
+    runs = [
+        simulate(model, theta, fine, integrator=wanted, sensitivities=False) for model, (fine, _) in parts
     ]
+    states = [run.x for run in runs]
     samples = [seen(states)]
     rows: list[tuple[FloatArray, FloatArray]] = []
 

@@ -35,6 +35,16 @@ def test_several_records_and_gaps():
     assert one.values == pytest.approx(other.values, rel=1e-7)
 
 
+@pytest.mark.parametrize("integrator", ["heun", "sequential-heun"])
+def test_uneven_times_are_the_steps_of_heun(integrator):
+    """At the minimum the trajectory is the solution by the same scheme."""
+    record = decay_record()
+    uneven = Record(np.delete(record.t, [3, 4, 10]), {"x": np.delete(record.outputs["x"], [3, 4, 10])})
+    found = fit(decay(), uneven, method="quasilinearization", integrator=integrator)
+    np.testing.assert_allclose(found.trajectories[-1][0], found.simulations[0].x, rtol=1e-7)
+    assert found.converged
+
+
 def test_curve_without_states():
     t = np.linspace(0, 3, 30)
     model = ode_model({}, outputs={"y": "b*exp(-a*t)"}, estimate={"a": 0.7, "b": 1.5})
