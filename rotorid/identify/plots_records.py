@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, look, new_figure, plain
+from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, legend_below, look, new_figure, plain
 from rotorid.base.text import counted
 from rotorid.identify.records import record_names, refined
 from rotorid.identify.simulation import STEPWISE, simulate
@@ -18,11 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.identify.result_records import Fit
-    from rotorid.identify.simulation import Trajectory
 
 CURVE_POINTS = 600
 MANY = 8
-"""Records that a legend still names."""
+"""Records that a legend names."""
 
 
 def figure_fit(result: Fit) -> Figure:
@@ -33,56 +31,52 @@ def figure_fit(result: Fit) -> Figure:
     figure = new_figure(sum(parts))
     above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
     axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
-    curves = fine_curves(result)
     for name, upper, lower in zip(outputs, axes[::2], axes[1::2], strict=False):
-        draw_signal(result, name, upper, curves)
+        draw_signal(result, name, upper)
         draw_residuals(result, name, lower)
     for name, ax in zip(inputs, axes[2 * len(outputs) :], strict=True):
         for k, record in enumerate(result.records):
-            ax.plot(record.axis.scale * record.t, record.inputs[name], **_line(result, k, len(record)))
+            ax.plot(record.axis.scale * record.t, record.inputs[name], **_line(result, k))
         _finish(ax, f"input {name}")
     axes[-1].set_xlabel(result.records[0].axis.word)
     figure.align_ylabels(axes)
-    _legend(result, above)
+    stated = result.errors or any(record.sigma for record in result.records)
+    title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
+    more = len(result.records) - MANY
+    title += f"; and {counted(more, 'more record')}" if more > 0 else ""
+    legend_below(above, axes, 3, title=title)
     draw_parameters(result, below.subplots())
     return figure
 
 
-def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
-    """The model at the times of each record, and between them where the integrator allows it."""
-    curves = []
-    for model, record, run in zip(result.models, result.records, result.simulations, strict=False):
-        if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
-            finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
-            run = simulate(model, result.estimate.solution, finer, sensitivities=False)
-        curves.append(run)
-    return tuple(curves)
-
-
-def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory]) -> None:
-    """Measured samples (points) of an output and the fitted model (lines) over time."""
+def draw_signal(result: Fit, name: str, axes: Axes) -> None:
+    """Measured samples (points) of an output and the fitted model (lines, fine between samples) over time."""
+    names = record_names([record.name for record in result.records])
     for k, record in enumerate(result.records):
         if name in record.outputs:
-            axes.plot(record.axis.scale * record.t, record.outputs[name], **_mark(result, k))
-    for k, (record, curve) in enumerate(zip(result.records, curves, strict=False)):
-        y = curve.y[:, result.model.outputs.index(name)]
-        axes.plot(record.axis.scale * curve.t, y, **_line(result, k, len(y)))
+            label = names[k] if k < MANY else None
+            axes.plot(record.axis.scale * record.t, record.outputs[name], label=label, **_mark(result, k))
+    for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False)):
+        if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
+            finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
+            run = simulate(result.models[k], result.estimate.solution, finer, sensitivities=False)
+        y = run.y[:, result.model.outputs.index(name)]
+        axes.plot(record.axis.scale * run.t, y, **_line(result, k))
     _finish(axes, name)
 
 
 def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
-    j = result.model.outputs.index(name)
-    runs = [*zip(result.records, result.simulations, strict=False)]
+    j, runs = result.model.outputs.index(name), [*zip(result.records, result.simulations, strict=False)]
     residuals = [run.y[:, j] - record.outputs.get(name, np.nan) for record, run in runs]
-    seen = np.concatenate([np.zeros(0), *residuals])
-    if np.isnan(seen).all():
+    measured = any(np.isfinite(r).any() for r in residuals)
+    if not measured:
         words = "nothing measured" if runs else "the states diverge: no residuals"
         axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
-        runs = []
-    for k, (record, _) in enumerate(runs):
-        sizes = record.sigma or result.errors or {name: np.sqrt(np.nanmean(seen**2))}
-        band, t = 2 * np.broadcast_to(sizes[name], len(record)), record.axis.scale * record.t
+    for k, (record, _) in enumerate(runs if measured else ()):
+        rms = np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))
+        band = 2 * np.broadcast_to((record.sigma or result.errors or {name: rms})[name], len(record))
+        t = record.axis.scale * record.t
         axes.fill_between(t, -band, band, color="#d9dde3", lw=0, zorder=0.5)
         axes.plot(t, residuals[k], **_mark(result, k))
     axes.axhline(0.0, color=QUIET, lw=0.8)
@@ -99,24 +93,6 @@ def draw_parameters(result: Fit, axes: Axes) -> None:
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 
 
-def _legend(result: Fit, above: Any) -> None:  # noqa: ANN401 - a part of a figure
-    """Records by their marks and lines, above all axes."""
-    from matplotlib.lines import Line2D
-
-    names = record_names([record.name for record in result.records])
-    keys = [
-        Line2D([], [], label=name, **(_mark(result, k) | _line(result, k, 2)))
-        for k, name in enumerate(names[:MANY])
-    ]
-    if more := names[MANY:]:
-        keys.append(Line2D([], [], ls="", label=f"and {len(more)} more records"))
-    stated = result.errors or any(record.sigma for record in result.records)
-    title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
-    columns = max(1, min(4, 150 // (10 + max(map(len, names)))))
-    style = {"frameon": False, "fontsize": TEXT, "title_fontsize": TEXT}
-    above.legend(loc="outside upper center", ncols=columns, handles=keys, title=title, **style)
-
-
 def _mark(result: Fit, k: int) -> dict[str, Any]:
     """Points of a record; of a single one in grey, so that the line of the model is seen on them."""
     color = look(k)["color"] if len(result.records) > 1 else DARK
@@ -124,19 +100,15 @@ def _mark(result: Fit, k: int) -> dict[str, Any]:
     return {"linestyle": "", "marker": MARKERS[k % len(MARKERS)], "color": color, "ms": size, "alpha": 0.6}
 
 
-def _line(result: Fit, k: int, number: int) -> dict[str, Any]:
+def _line(result: Fit, k: int) -> dict[str, Any]:
     """Line of a record; a single value is a dash, as a line through it would not show."""
-    style = look(k) if len(result.records) > 1 else {"color": BLUE}
-    return {**style, "lw": 1.3, "alpha": 1.0, **({"marker": "_", "ms": 22.0} if number == 1 else {})}
+    dash = {"marker": "_", "ms": 22.0} if len(result.records[k]) == 1 else {}
+    return {"lw": 1.3, **(look(k) if len(result.records) > 1 else {"color": BLUE}), **dash}
 
 
 def _finish(axes: Axes, name: str) -> None:
-    """Name with its unit, powers of ten but no offsets, and room where all values are nearly the same."""
+    """Name with its unit, and powers of ten but no offsets."""
     axes.set_ylabel(f"{name}, \nmodel unit", fontsize=TEXT)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True, useOffset=False)
     axes.tick_params(labelsize=TEXT)
     plain(axes)
-    low, high = axes.dataLim.intervaly
-    size = max(abs(low), abs(high))
-    if 0 < size < np.inf and high - low < 1e-6 * size:
-        axes.set_ylim((low + high) / 2 - 0.1 * size, (low + high) / 2 + 0.1 * size)

@@ -14,7 +14,6 @@ from rotorid.identify.plots_records import (
     draw_residuals,
     draw_signal,
     figure_fit,
-    fine_curves,
 )
 from rotorid.identify.records import Record
 from rotorid.samples import sample_data
@@ -69,7 +68,7 @@ def test_every_signal_has_a_panel_with_its_residuals_below(result):
 
 def test_points_are_the_record_and_lines_pass_through_the_model(result):
     axes = Figure().add_subplot()
-    draw_signal(result, "y2", axes, fine_curves(result))
+    draw_signal(result, "y2", axes)
     points, line = axes.lines
     np.testing.assert_array_equal(points.get_ydata(), result.records[0].outputs["y2"])
     t, y = line.get_data()
@@ -115,7 +114,7 @@ def test_several_records_differ_by_mark_line_and_colour_in_every_panel():
         assert len(set(seen)) == 3
         assert seen == [getattr(line, get)() for line in signal.lines[:3]]
         assert seen == [getattr(line, get)() for line in residual.lines[:3]]
-    assert [line.get_linestyle() for line in signal.lines[3:]] == [key.get_linestyle() for key in keys]
     assert len({line.get_linestyle() for line in signal.lines[3:]}) == 3
+    assert [line.get_color() for line in signal.lines[3:]] == [key.get_color() for key in keys]
     assert entered.get_ylabel().startswith("input u")
     assert [line.get_ydata()[0] for line in entered.lines] == [1, 2, 3]
