@@ -231,7 +231,7 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     record = simulated_record(equations, theta, plan, sigma, options.digits, options.seed or 0)
     begun = f"the initial values hold at t = {plan.t[0]:g} s, where the record begins"
     about = f"record of {listing(equations.outputs, 'and')} at {counted(len(plan), 'time')}"
-    late = equations.states and equations.t0 is None and plan.t[0] != 0
+    late = equations.states and plan.t[0] != 0
     return values, record_columns(record), about, (begun,) if late else ()
 
 

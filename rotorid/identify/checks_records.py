@@ -90,7 +90,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     return judged | {
         "estimate": _widened(estimate, factor if sound else None),
         "reliable": sound and factor == 1,
-        "warnings": [*words, *_times_words(problem, theta)],
+        "warnings": [*words, _fast(problem, theta)],
         "integration_change": change,
         "autocorrelation": rho,
         "prior": prior,
@@ -261,25 +261,19 @@ def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[F
     return change, f"a more accurate integration would change {', '.join(words)}" if words else ""
 
 
-def _times_words(problem: Problem, theta: FloatArray) -> Iterator[str]:
-    """Where vibrations about the first states are faster than samples can tell, or a record begins late."""
+def _fast(problem: Problem, theta: FloatArray) -> str:
+    """Words where vibrations about the first states are faster than samples can tell."""
     model, record, n = problem.model, problem.records[0], len(problem.model.states)
     A = model.f(record.t[0], problem.runs[0].x[0], theta, problem.inputs[0][0])[:, 1 : 1 + n]
-    if len(record) > 2 and n and np.isfinite(A).all():
-        fastest, most = np.abs(np.linalg.eigvals(A).imag).max(), np.pi / np.median(np.diff(record.t))
-        if fastest > most:
-            yield (
-                f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
-                f"({most:.4g} rad/s): slower vibrations may describe the record as well. Are the times in "
-                "seconds, and not in ms?"
-            )
-    late = [one for one in problem.records if one.t[0] != 0]
-    if model.t0 is None and late and any(not e.free_symbols for e in model.initial):
-        yield (
-            f"{late[0].name} begins at t = {late[0].t[0]:.6g} s, and the initial values were put there: "
-            'state where they belong, t0 = 0 in [initial] (the time 0) or t0 = "first" (the first time of '
-            "each record)"
-        )
+    if len(record) < 3 or not n or not np.isfinite(A).all():
+        return ""
+    fastest, most = np.abs(np.linalg.eigvals(A).imag).max(), np.pi / np.median(np.diff(record.t))
+    if fastest <= most:
+        return ""
+    return (
+        f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate ({most:.4g} "
+        "rad/s): slower vibrations may describe the record as well. Are the times in seconds, and not in ms?"
+    )
 
 
 def _widened(estimate: Estimate, factor: float | None) -> Estimate:

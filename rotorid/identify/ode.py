@@ -56,8 +56,6 @@ class OdeModel:
         r, x(0) and h as expressions, one for each state or output.
     per_record
         Parameters that every one of several records has for itself.
-    t0
-        Time to which the initial values belong, s; "first" or None (not stated): the first of each record.
     recorded
         Parameters that are initial states as the record says, each with the output that measures it; their
         starting values are NaN here.
@@ -79,7 +77,6 @@ class OdeModel:
     initial: tuple[Expression, ...] = field(repr=False)
     observed: tuple[Expression, ...] = field(repr=False)
     per_record: tuple[str, ...] = ()
-    t0: float | str | None = None
     recorded: Mapping[str, str] = field(default_factory=dict)
     prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inertia: tuple[Expression, ...] = field(repr=False, default=())
@@ -155,11 +152,6 @@ class OdeModel:
         put = dict(zip(self.symbols[1:], self.initial, strict=False))
         first = [expressions.names(e.subs(put)) & {*self.parameters} for e in self.observed]
         return [i for i, free in enumerate(first) if self.states and not free]
-
-    @cached_property
-    def known_initial(self) -> list[int]:
-        """States whose initial values hold no parameter."""
-        return [i for i, e in enumerate(self.initial) if not expressions.names(e) & {*self.parameters}]
 
     # -- expressions and their functions, made when needed
 
@@ -241,8 +233,7 @@ def ode_model(
     initial
         Value of each state at the first time of a record: a number, or an expression of parameters (the name
         of one: an unknown initial state), or "record": as measured by the output that equals this state, a
-        parameter of each record, x_0 of the state x. "t0": the time to which they belong instead, s, or
-        "first".
+        parameter of each record, x_0 of the state x.
     outputs
         What is measured; by default the states.
     known
@@ -268,19 +259,17 @@ def ode_model(
     True
     """
     known, initial = dict(known or {}), dict(initial or {})
-    t0 = None if "t0" in states else initial.pop("t0", None)
-    if t0 is not None and t0 != "first" and (isinstance(t0, str) or not np.isfinite(t0)):
-        raise ValueError(f'initial: t0 is the time of the initial values in s, or "first", not {t0!r}')
-    if not states and not outputs:
-        raise ValueError("a model needs states, or outputs of the time")
     outputs = dict(outputs or {name: name for name in states})
+    if not outputs:
+        raise ValueError("a model needs states, or outputs of the time")
     _check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs}, outputs)
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
     check_known("initial", initial, "state", states)
     check_known("per_record", per_record, "parameter", estimate)
-    _check_numbers("parameter", "starting value", estimate)
-    _check_numbers("known value", "value", known)
+    for place, value in (*estimate.items(), *known.items()):
+        if isinstance(value, bool | str) or not np.isfinite(value):
+            raise ValueError(f"{place}: its value must be a finite number, not {value!r}")
     names = ["t", *states, *estimate, *inputs]
     measured = [x for x in states if initial[x] == "record" and "record" not in (*names, *known)]
     recorded: dict[str, str] = {}
@@ -310,7 +299,6 @@ def ode_model(
         observed=read("output", outputs, names),
         texts=texts,
         per_record=(*dict.fromkeys(per_record), *recorded),
-        t0=t0,
         recorded=recorded,
     )
 
@@ -329,9 +317,7 @@ def read_expression(
     usable = sorted({*allowed, *known})
     for name in sorted(expressions.names(expr) - {*usable}):
         near = difflib.get_close_matches(name, usable, n=1)
-        hint = f"did you mean {near[0]}?" if near else "put it under estimate, known or inputs"
-        if name == "t" or where.startswith("initial"):
-            hint = f"it may use {', '.join(usable) or 'numbers'}"
+        hint = f"did you mean {near[0]}?" if near else f"it may use {', '.join(usable) or 'numbers'}"
         raise ValueError(f"{where}: {expressions.quote(text)}: {name} is not defined here; {hint}")
     put = {sympy.Symbol(name): sympy.Rational(repr(float(value))) for name, value in known.items()}
     value = real(expr.subs(put))
@@ -388,32 +374,24 @@ def with_nuisance(
     return texts, [f"{name}_{output}" for output in outputs for name in terms]
 
 
-def _check_numbers(kind: str, what: str, values: Mapping[str, float]) -> None:
-    """Refuse what is no finite number."""
-    for name, value in values.items():
-        if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
-            raise ValueError(f"{kind} {name}: the {what} must be a finite number, not {value!r}")
-
-
 def _check_names(groups: Mapping[str, Collection[str]], outputs: Collection[str]) -> None:
     """Refuse names that are none, or used twice; `groups` by kind."""
     seen: dict[str, str] = {}
-    for kind, names in groups.items():
-        for name in names:
-            if name == "t":
-                raise ValueError(f"{kind} t: t is the time; choose another name")
-            if not isinstance(name, str) or not expressions.is_name(name):
-                raise ValueError(
-                    f"{kind} {name!r} is no name; a name begins with a letter, has letters, digits and _, "
-                    "and is not the name of a function"
-                )
-            if name in seen:
-                other = f"a {seen[name]}" if seen[name] != kind else "given"
-                raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
-            seen[name] = kind
-    for name in outputs:
-        if not expressions.is_name(name) or name == "t":
-            raise ValueError(f"output {name!r} is no name; names are letters, digits and _, but not t")
+    for kind, name in (
+        *((kind, n) for kind, names in groups.items() for n in names),
+        *(("output", n) for n in outputs),
+    ):
+        if name == "t":
+            raise ValueError(f"{kind} t: t is the time; choose another name")
+        if not isinstance(name, str) or not expressions.is_name(name):
+            raise ValueError(
+                f"{kind} {name!r} is no name; a name begins with a letter, has letters, digits and _, and is "
+                "not the name of a function"
+            )
+        if name in seen and kind != "output":
+            other = f"a {seen[name]}" if seen[name] != kind else "given"
+            raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
+        seen[name] = kind
 
 
 def _limits(

@@ -11,7 +11,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.adaptive_steps import worth_compiling
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
-from rotorid.identify.records import Record, from_t0, inputs_of, models_of
+from rotorid.identify.records import Record, inputs_of, models_of
 from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
@@ -86,7 +86,7 @@ class Problem:
         errors: Mapping[str, float] | None = None,
         prior: Prior | None = None,
     ) -> None:
-        self.given, self.records = model, tuple(from_t0(model, record) for record in records)
+        self.given, self.records = model, tuple(records)
         self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
         if not records:
             raise ValueError("a fit needs at least one record")

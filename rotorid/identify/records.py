@@ -90,31 +90,6 @@ class Record:
         return array if array.ndim else float(array)
 
 
-def from_t0(model: OdeModel, record: Record) -> Record:
-    """The record with one more time, without samples, where the initial values belong to an earlier one.
-
-    Raises
-    ------
-    ValueError
-        A record that begins before that time, or one with inputs, which are not known there.
-    """
-    if not isinstance(model.t0, float | int) or model.t0 == record.t[0] or not model.states:
-        return record
-    begins = f"{record.name} begins at t = {record.t[0]:g} s"
-    if record.t[0] < model.t0:
-        raise ValueError(f"{begins}, before t0 = {model.t0:g} s of [initial]")
-    if model.driven:
-        raise ValueError(
-            f"{begins}: its inputs are not known from t0 = {model.t0:g} s on; begin the record there"
-        )
-    sigma = record.sigma and {
-        name: np.append(np.nan, s) if isinstance(s, np.ndarray) else s for name, s in record.sigma.items()
-    }
-    outputs = {name: np.append(np.nan, column) for name, column in record.outputs.items()}
-    inputs = {name: np.append(column[0], column) for name, column in record.inputs.items()}
-    return replace(record, t=np.append(model.t0, record.t), outputs=outputs, inputs=inputs, sigma=sigma)
-
-
 def refined(record: Record, every: int) -> tuple[Record, IntArray]:
     """The times of a record and others between them, with its inputs, and where its own stand.
 

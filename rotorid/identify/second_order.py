@@ -42,7 +42,7 @@ def second_order(  # noqa: PLR0913
     estimate, known, inputs, bounds, per_record
         As in `ode_model`.
     initial
-        Values of displacements and velocities at the first time (or "t0"); 0 where none is given.
+        Values of displacements and velocities at the first time; 0 where none is given.
     force
         f by displacement: expressions of time, inputs, parameters and states; 0 where none is given.
     outputs

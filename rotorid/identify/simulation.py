@@ -13,7 +13,7 @@ from rotorid.base.registry import Method, find
 from rotorid.identify.adaptive_steps import LARGEST, adaptive, diverged
 from rotorid.identify.integrators import HEUN, System, exact, stepwise
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.records import Record, from_t0, inputs_of
+from rotorid.identify.records import Record, inputs_of
 
 STEPWISE = (*HEUN, "rk4")
 """Integrators without error control, of one step from sample to sample."""
@@ -106,8 +106,7 @@ def simulate(
         raise ValueError(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
-    whole = from_t0(model, given)
-    t, u, n = whole.t, inputs_of(model, whole), len(model.states)
+    t, u, n = given.t, inputs_of(model, given), len(model.states)
     x, S, used, steps = np.zeros((len(t), n)), np.zeros((len(t), n, len(values))), "none", 0
     if n:
         system = System(model, values, t, u, sensitivities)
@@ -126,8 +125,7 @@ def simulate(
             f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
             "the output"
         )
-    late = len(t) - len(given)
-    return Trajectory(t[late:], x[late:], S[late:], y[late:], y_theta[late:], used, steps)
+    return Trajectory(t, x, S, y, y_theta, used, steps)
 
 
 def simulated_record(

@@ -87,10 +87,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
     `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
     record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
-    records has for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first");
-    `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
-    output, with factors to be estimated for every record. Without states the outputs are functions of the
-    time.
+    records has for itself. `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several)
+    of the sensors to every output, with factors to be estimated for every record. Without states the outputs
+    are functions of the time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
@@ -290,17 +289,13 @@ def _readable(
 def _initial(
     said: Said, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
 ) -> dict[str, float | str]:
-    """Initial values, `complete` if those of all states must be given, and the time they belong to."""
+    """Initial values, `complete` if those of all states must be given."""
     found: dict[str, float | str] = {}
     section, inner = said.section, said["initial"]
     given = () if inner is None else inner.keys
     for name in given:
         value = inner.take(name)
-        if name == "t0" and name not in states:
-            found[name] = value
-            if value != "first" and not _is_number(value):
-                inner.complain(name, 'the time of the initial values in s, such as 0, or "first"')
-        elif name not in states:
+        if name not in states:
             inner.complain(name, f"a name of [states]{did_you_mean(name, states)}", value=False)
         elif isinstance(value, str) and value.strip():
             found[name] = value
@@ -308,7 +303,7 @@ def _initial(
             found[name] = inner.number(name, 0.0) or 0.0
         else:
             inner.complain(name, 'a number, an expression of parameters in quotes, or "record"')
-    texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
+    texts = {name: value for name, value in found.items() if isinstance(value, str)}
     if "record" not in constants:
         texts = {name: text for name, text in texts.items() if text != "record"}
     _readable(section, "initial", texts, constants, problems)
@@ -381,9 +376,7 @@ _OUTPUTS = (
         "initial",
         TEXTS,
         'name = number, or an expression of parameters, or `"record"`: the first sample of the output that '
-        "equals this state, with its error (a parameter `NAME_0` of each record); `t0`: the time they belong "
-        'to, in s, perhaps before the record, or `"first"`: the first time of each record (the default, '
-        "which asks where a record does not begin at 0)",
+        "equals this state, with its error (a parameter `NAME_0` of each record)",
     ),
 )
 FORCE = (Key("force", TEXTS, 'with matrices: coordinate = "expression" of time and inputs'),)

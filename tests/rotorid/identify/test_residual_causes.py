@@ -15,11 +15,11 @@ T = np.linspace(0.0, 4.0, 501)
 TRUTH = [100.0, 0.4]
 
 
-def oscillator(position="1", speed="0", nuisance=None, estimate=None, t0=None, **options):
+def oscillator(position="1", speed="0", nuisance=None, estimate=None, **options):
     outputs, factors = with_nuisance({"x": "x"}, *(nuisance or (False, False, [])))
     return ode_model(
         {"x": "v", "v": "-k*x - c*v"},
-        initial={"x": position, "v": speed} | ({} if t0 is None else {"t0": t0}),
+        initial={"x": position, "v": speed},
         outputs=outputs,
         estimate={"k": 90.0, "c": 0.5} | (estimate or {}) | dict.fromkeys(factors, 0.0),
         **options,
@@ -84,25 +84,6 @@ def test_noise_is_blamed_on_nothing():
         assert not any("hum" in text for text in coloured.warnings)
 
 
-def test_a_record_that_begins_later_is_asked_about_and_t0_answers():
-    late = T + 0.7
-    whole = np.concatenate([[0.0], late])
-    x = simulate(oscillator(), TRUTH, whole, sensitivities=False).y[1:, 0]
-    data = Record(late, {"x": x + 0.01 * np.random.default_rng(0).standard_normal(len(T))})
-    asked = fit(oscillator(), data)
-    assert any("begins at t = 0.7 s" in text and "t0" in text for text in asked.warnings)
-    assert not within(asked)
-    for method in names(METHODS):
-        found = fit(oscillator(t0=0.0), data, method=method)
-        assert within(found), method
-        assert found.warnings == ()
-        np.testing.assert_allclose(simulate(oscillator(t0=0.0), TRUTH, late).y[:, 0], x, atol=1e-12)
-    shifted = record(0, t=late)
-    assert fit(oscillator(t0="first"), shifted).warnings == ()
-    with pytest.raises(ValueError, match="before t0"):
-        fit(oscillator(t0=1.0), data)
-
-
 @pytest.mark.parametrize("method", names(METHODS))
 def test_what_known_initial_values_fix_is_no_degree_of_freedom(method, tmp_path):
     """n parameters, n samples and the first one: as many equations as unknowns, whatever rounding leaves."""
@@ -142,24 +123,19 @@ def test_what_did_not_converge_has_no_intervals_and_says_nothing_of_what_is_dete
     assert "determined" not in found.summary()
 
 
-def test_a_file_asks_for_nuisance_terms_and_t0(tmp_path):
+def test_a_file_asks_for_nuisance_terms(tmp_path):
     text = (
-        'per_record = []\n[states]\nx = "v"\nv = "-k*x - c*v"\n[initial]\nx = 1\nv = 0\nt0 = {t0}\n'
+        'per_record = []\n[states]\nx = "v"\nv = "-k*x - c*v"\n[initial]\nx = 1\nv = 0\n'
         '[outputs]\nx = "x"\n[estimate]\nk = 90\nc = 0.5\n[nuisance]\noffset = true\nhum_Hz = {hum}\n'
     )
     path = tmp_path / "model.toml"
-    path.write_text(text.format(t0=0, hum="[50, 16.7]"))
+    path.write_text(text.format(hum="[50, 16.7]"))
     model = read_ode_model(path)
-    assert model.t0 == 0
     hums = [f"hum{f}_{wave}_x" for f in ("50", "16_7") for wave in ("cos", "sin")]
     assert model.parameters == ("k", "c", "offset_x", *hums)
     data = record(0, extra=HUM + 0.1)
     assert within(fit(model, [data, data]))
-    for t0, hum, place in (
-        ('"now"', "50", "initial.t0"),
-        ("0", "-50", "nuisance.hum_Hz"),
-        ("0", "[5, 5]", "hum"),
-    ):
-        path.write_text(text.format(t0=t0, hum=hum))
+    for hum, place in (("-50", "nuisance.hum_Hz"), ("[5, 5]", "hum")):
+        path.write_text(text.format(hum=hum))
         with pytest.raises(ValueError, match=place):
             read_ode_model(path)
