@@ -262,7 +262,8 @@ def ode_model(
     outputs = dict(outputs or {name: name for name in states})
     if not outputs:
         raise ValueError("a model needs states, or outputs of the time")
-    _check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs}, outputs)
+    kinds = {"state": states, "parameter": estimate, "known value": known, "input": inputs}
+    _check_names(kinds | {"output": outputs})
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
     check_known("initial", initial, "state", states)
@@ -374,13 +375,10 @@ def with_nuisance(
     return texts, [f"{name}_{output}" for output in outputs for name in terms]
 
 
-def _check_names(groups: Mapping[str, Collection[str]], outputs: Collection[str]) -> None:
+def _check_names(groups: Mapping[str, Collection[str]]) -> None:
     """Refuse names that are none, or used twice; `groups` by kind."""
     seen: dict[str, str] = {}
-    for kind, name in (
-        *((kind, n) for kind, names in groups.items() for n in names),
-        *(("output", n) for n in outputs),
-    ):
+    for kind, name in ((kind, name) for kind, names in groups.items() for name in names):
         if name == "t":
             raise ValueError(f"{kind} t: t is the time; choose another name")
         if not isinstance(name, str) or not expressions.is_name(name):
