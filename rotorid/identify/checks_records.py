@@ -71,7 +71,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
     change, integration = _integration(problem, estimate, J)
-    words += [poor, cause, integration, path.bound_warning]
+    words += [integration, poor, cause, path.bound_warning]
     if path.converged:
         estimate, local = combined(problem, estimate)
         words += [local, "" if estimate.full_rank or poor else estimate.describe_rank()]

@@ -86,21 +86,19 @@ class Problem:
         errors: Mapping[str, float] | None = None,
         prior: Prior | None = None,
     ) -> None:
-        self.given, self.records = model, tuple(records)
+        self.given, self.records, outputs = model, tuple(records), model.outputs
         self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
         if not records:
             raise ValueError("a fit needs at least one record")
+        for record in records:
+            check_known(record.name, record.outputs, "output of the model", outputs)
         self.models = models_of(model, len(records))
         """One per record, all with the same parameters."""
-        self.model, outputs = self.models[0], self.models[0].outputs
+        self.model = self.models[0]
         self.prior = prior or prior_rows(self.model.parameters, {})
-        self.inputs = [inputs_of(model, record) for record in self.records]
-        for record in self.records:
-            check_known(record.name, record.outputs, "output of the model", outputs)
-            if not record.outputs:
-                raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
-        self.measured = [_table(record.outputs, outputs, len(record)) for record in self.records]
-        stated = [_table(record.sigma or {}, outputs, len(record)) for record in self.records]
+        self.inputs = [inputs_of(model, record) for record in records]
+        self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
+        stated = [_table(record.sigma or {}, outputs, len(record)) for record in records]
         self.masks = [~np.isnan(data) for data in self.measured]
         known = np.concatenate([~np.isnan(s[m]) for s, m in zip(stated, self.masks, strict=True)])
         self.stated = bool(known.any())
@@ -111,7 +109,7 @@ class Problem:
         self.series: list[tuple[str, str, slice]] = []
         """Of each output of a record its name, words for it, and its rows."""
         low = 0
-        for record, mask in zip(self.records, self.masks, strict=True):
+        for record, mask in zip(records, self.masks, strict=True):
             mask[:1, self.model.fixed_at_first] = False
             for name, count in zip(outputs, mask.sum(axis=0).tolist(), strict=True):
                 words = f"{name} in {record.name}" if len(records) > 1 else name
@@ -122,10 +120,9 @@ class Problem:
         self.data, self.scale = self.vector(self.measured), self.vector([*map(np.ones_like, self.measured)])
         """Measured values and 1 as weighted rows."""
         most = np.abs(self.data).max()
-        if most > LARGEST or 0 < most < 1 / LARGEST:
+        if not (most == 0 or 1 / LARGEST < most < LARGEST):
             raise ValueError(
-                f"the records reach {most:.3g} (over the standard deviations, where these are stated): no "
-                "sum of squares can be made of such numbers; take other units"
+                f"no sum of squares can be made of samples over σ of {most:.3g}: take other units"
             )
         self._last: tuple[bytes, FloatArray, FloatArray] | None = None
         self.runs: tuple[Trajectory, ...] = ()
@@ -166,9 +163,13 @@ class Problem:
         if self._last is None or self._last[0] != theta.tobytes():
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
-            if self._last is None and self.quick == "auto" and len({*self.models}) == 1:
-                self.quick = self._quickest(theta)
-            runs = self._simulated(theta, self.quick)
+            if self._last is None and self.quick == "auto" and not self.model.linear_driven:
+                # a rough integration tells how long others take
+                rough = self._simulated(theta, rtol=1e-6, sensitivities=False)
+                steps = (1 if self.model.timed else 4) * sum(run.steps for run in rough)
+                quick = len({*self.models}) == 1 and worth_compiling(self.model, steps)
+                self.quick = "taylor" if quick else "auto"
+            runs = self._simulated(theta, rtol=self.rtol)
             r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
             J = self.vector([run.y_theta for run in runs])
             if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
@@ -178,21 +179,9 @@ class Problem:
             self._last, self.runs = (theta.tobytes(), r, J), tuple(runs)
         return self._last[1:]
 
-    def _simulated(self, theta: FloatArray, integrator: str, **options: Any) -> list[Trajectory]:  # noqa: ANN401
-        options = {"rtol": self.rtol} | options
+    def _simulated(self, theta: FloatArray, **options: Any) -> list[Trajectory]:  # noqa: ANN401
         pairs = zip(self.models, self.records, strict=True)
-        return [simulate(m, theta, record, integrator=integrator, **options) for m, record in pairs]
-
-    def _quickest(self, theta: FloatArray) -> str:
-        """Taylor series where compiling is worth it and they find what a rough integration finds."""
-        if self.model.linear_driven:
-            return "auto"
-        rough = self._simulated(theta, "auto", rtol=1e-6, sensitivities=False)
-        if not worth_compiling(self.model, (1 if self.model.timed else 4) * sum(run.steps for run in rough)):
-            return "auto"
-        pairs = zip(rough, self._simulated(theta, "taylor"), strict=True)
-        same = all(np.abs(a.y - b.y).max() <= 1e-4 * np.abs(a.y).max() for a, b in pairs)
-        return "taylor" if same else "auto"
+        return [simulate(m, theta, record, integrator=self.quick, **options) for m, record in pairs]
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""

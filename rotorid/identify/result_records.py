@@ -11,7 +11,7 @@ from rotorid.base import tables
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
@@ -95,23 +95,6 @@ class Fit(Answered, Iterations):
         """Names of the parameters."""
         return self.model.parameters
 
-    @property
-    def series(self) -> tuple[Column, ...]:
-        """Of each output of each record: number and rms of its samples, and rms of what the model leaves."""
-        names = record_names([record.name for record in self.records])
-        lines: list[tuple[str, str, int, float, float]] = []
-        for name, record, run in zip(names, self.records, self.simulations, strict=False):
-            for output, measured in record.outputs.items():
-                seen, y = np.isfinite(measured), run.y[:, self.model.outputs.index(output)]
-                if seen.any():
-                    rms = [float(np.sqrt(np.mean(x[seen] ** 2))) for x in (measured, y - measured)]
-                    lines.append((name, output, int(seen.sum()), rms[0], rms[1]))
-        columns = zip(*lines, strict=True) if lines else [()] * 5
-        headings = ("record", "output", "samples", "rms", "residual_rms")
-        shown = (str if len(self.records) > 1 else None, str, str, "{:.4g}".format, "{:.4g}".format)
-        titles = (None, None, None, None, "left, rms")
-        return tuple(map(Column, headings, columns, shown, titles))
-
     def tables(self) -> tuple[tables.Table, ...]:
         """Parameters by iteration, and the states by iteration where a trajectory was iterated."""
         show = "{:.7g}".format
@@ -129,26 +112,25 @@ class Fit(Answered, Iterations):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        names, change = self.parameters, self.integration_change
-        steps = zip(self.history, self.costs, strict=True)
+        names, change, series = self.parameters, self.integration_change, []
+        records = record_names([record.name for record in self.records])
+        for name, record, run in zip(records, self.records, self.simulations, strict=False):
+            for output, measured in record.outputs.items():
+                seen, y = np.isfinite(measured), run.y[:, self.model.outputs.index(output)]
+                rms = [float(np.sqrt(np.mean(x[seen] ** 2))) for x in (measured, y - measured) if seen.any()]
+                line = dict(zip(("rms", "residual_rms"), rms, strict=False))
+                series += [{"record": name, "output": output, "samples": int(seen.sum()), **line}] * bool(rms)
         kept = "residual_rms method integrator loss converged message reliable stopped_by iterations errors"
-        kept = f"{kept} at_bounds autocorrelation warnings"
-        document = {key: getattr(self, key) for key in kept.split()} | {
-            "history": [
-                {"cost": cost, "parameters": dict(zip(names, row, strict=True))} for row, cost in steps
-            ],
-            "series": rows(self.series),
-            "integration_change": None if change is None else dict(zip(names, change, strict=True)),
-        }
+        document = {key: getattr(self, key) for key in f"{kept} at_bounds autocorrelation warnings".split()}
+        document["history"] = [
+            {"cost": cost, "parameters": dict(zip(names, row, strict=True))}
+            for row, cost in zip(self.history, self.costs, strict=True)
+        ]
+        document |= {"series": series, "solutions": []}
+        document["integration_change"] = None if change is None else dict(zip(names, change, strict=True))
         matrix = self.normal_matrix and self.normal_matrix.to_dict()
-        more = self.prior.to_dict() if self.prior else {}
-        return {
-            **self.estimate.to_dict(),
-            "solutions": [],
-            **plain(document),
-            "normal_matrix": matrix,
-            **more,
-        }
+        more = {"normal_matrix": matrix, **(self.prior.to_dict() if self.prior else {})}
+        return {**self.estimate.to_dict(), **plain(document), **more}
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, the 95 % interval, and whether it stands at a bound."""
@@ -173,20 +155,19 @@ class Fit(Answered, Iterations):
             judgement = f"NO intervals: {warnings.pop(0)}."
         else:
             judgement = f"NO intervals, see why. {judgement}"
-        lines = [parts.found, f"\n  {self.method}, integrator {self.integrator}: {self.message}"]
-        lines.append(f"  residual rms {self.residual_rms:.4g}")
+        found = f"{parts.found}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
+        found += f"\n  residual rms {self.residual_rms:.4g}"
         if self.errors:
             sizes = ", ".join(f"{name} {error:.3g}" for name, error in self.errors.items())
-            lines.append(f"  estimated standard deviations, used as weights: {sizes}")
+            found += f"\n  estimated standard deviations, used as weights: {sizes}"
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
-        notes = parts.notes if self.described or self.estimate.dof <= 0 else ()
         return replace(
             parts,
             judgement=judgement,
-            found="\n".join(lines),
+            found=found,
             warnings=tuple(warnings),
-            notes=notes,
+            notes=parts.notes if self.described or self.estimate.dof <= 0 else (),
             tables=tuple(texts),
             more="the iterations and the normal matrix",
         )

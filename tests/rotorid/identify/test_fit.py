@@ -94,7 +94,7 @@ def test_bad_records():
     t = np.arange(3.0)
     with pytest.raises(ValueError, match="no output of the model"):
         fit(decay(), Record(t, {"z": t}))
-    with pytest.raises(ValueError, match="no column"):
+    with pytest.raises(ValueError, match="no samples"):
         fit(decay(), Record(t))
     with pytest.raises(ValueError, match="no samples"):
         fit(decay(), Record(t, {"x": np.full(3, np.nan)}))
