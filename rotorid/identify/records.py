@@ -53,7 +53,15 @@ class Record:
 
     def __post_init__(self) -> None:
         name, t = self.name, _column(self.t, f"{self.name}: the times")
-        _check_times(t, name)
+        if not len(t):
+            raise ValueError(f"{name} has no samples")
+        for i in np.flatnonzero(~np.isfinite(t))[:1]:
+            raise ValueError(f"{name}: the time in row {i + 1} is missing or infinite")
+        for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
+            raise ValueError(
+                f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}; "
+                "sort the rows, merge samples of one time, or use one record for each run"
+            )
         object.__setattr__(self, "t", t)
         for kind in ("outputs", "inputs"):
             columns = {key: _column(x, f"{name}: {key}") for key, x in getattr(self, kind).items()}
@@ -61,10 +69,8 @@ class Record:
             for key, column in columns.items():
                 if len(column) != len(t):
                     raise ValueError(f"{name}: {key} has {len(column)} values, but there are {len(t)} times")
-                if (bad := np.flatnonzero(np.isinf(column))).size:
-                    raise ValueError(
-                        f"{name}: {key} is infinite in row {bad[0] + 1}; leave missing samples empty"
-                    )
+                for i in np.flatnonzero(np.isinf(column))[:1]:
+                    raise ValueError(f"{name}: {key} is infinite in row {i + 1}; leave missing samples empty")
                 if kind == "inputs" and np.isnan(column).any():
                     raise ValueError(
                         f"{name}: the input {key} is missing at t = {t[np.isnan(column)][0]:g}; an input "
@@ -77,16 +83,14 @@ class Record:
         return len(self.t)
 
     def _deviation(self, key: str, value: float | FloatArray) -> float | FloatArray:
+        place, array = f"{self.name}: the standard deviation of {key}", np.array(value, dtype=float)
         if key not in self.outputs:
             raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
-        array = np.array(value, dtype=float)
         if array.shape not in ((), self.t.shape):
-            raise ValueError(
-                f"{self.name}: the standard deviation of {key} is one number or {len(self)}, one per time"
-            )
+            raise ValueError(f"{place} is one number or {len(self)}, one per time")
         missing = np.isnan(self.outputs[key]) & (array.ndim > 0)
         if not np.all((np.isfinite(array) & (array > 0)) | missing):
-            raise ValueError(f"{self.name}: the standard deviation of {key} must be above 0")
+            raise ValueError(f"{place} must be above 0")
         return array if array.ndim else float(array)
 
 
@@ -114,7 +118,7 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
 
 
 def record_names(names: Sequence[str]) -> list[str]:
-    """Short names of records that tell them apart: ends of paths, numbers where they are the same.
+    """Short names of records that tell them apart: without their folders, numbers where they are the same.
 
     Examples
     --------
@@ -123,11 +127,9 @@ def record_names(names: Sequence[str]) -> list[str]:
     >>> record_names(["the record", "the record"])
     ['record 1', 'record 2']
     """
-    if len(set(names)) < len(names):
-        return [f"record {k + 1}" for k in range(len(names))]
-    parts = [PurePath(name).parts or (name,) for name in names]
-    every = (["/".join(part[-depth:]) for part in parts] for depth in range(1, max(map(len, parts)) + 1))
-    return next((short for short in every if len({*short}) == len(names)), list(names))
+    numbers = [f"record {k + 1}" for k in range(len(names))]
+    ways = [PurePath(name).name or name for name in names], [*names], numbers
+    return next(way for way in ways if len({*way}) == len(names))
 
 
 def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
@@ -209,20 +211,3 @@ def _column(value: ArrayLike, what: str) -> FloatArray:
     if column.ndim != 1:
         raise ValueError(f"{what} must be one column, not of shape {column.shape}")
     return column
-
-
-def _check_times(t: FloatArray, name: str) -> None:
-    if len(t) == 0:
-        raise ValueError(f"{name} has no samples")
-    if (bad := np.flatnonzero(~np.isfinite(t))).size:
-        raise ValueError(f"{name}: the time in row {bad[0] + 1} is missing or infinite")
-    for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
-        if t[i] == t[i + 1]:
-            raise ValueError(
-                f"{name}: the time {t[i]:g} is repeated in row {i + 2}; merge these samples, or use one "
-                "record for each run"
-            )
-        raise ValueError(
-            f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}; "
-            "sort the rows by time"
-        )

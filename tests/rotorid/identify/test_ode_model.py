@@ -212,7 +212,7 @@ def test_record_does_not_share_what_it_was_given():
     ("arguments", "message"),
     [
         (([0, 2, 1],), "the times must increase, but t = 1 in row 3 follows 2"),
-        (([0, 1, 1],), "the time 1 is repeated in row 3"),
+        (([0, 1, 1],), "the times must increase, but t = 1 in row 3 follows 1"),
         (([0, np.nan, 1],), "the time in row 2 is missing"),
         (([],), "no samples"),
         (([[0, 1]],), "one column"),
