@@ -7,8 +7,7 @@ in a periodogram that gives back what the parameters have taken of a sinusoid, b
 
 Where records do not determine every parameter: the outputs depend on them by the coefficients of the
 equations alone, in dx/dt = −(a + b) x + g h u by a + b and g h. A coefficient, or a product or quotient of
-two, is determined where its gradient stands in the row space of the sensitivities, here and at values 20 %
-of the parameters away, so that it is no chance of the place.
+two, is determined where its gradient stands in the row space of the sensitivities.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
             alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
-            prior = replace(prior, alone=combined(problem, alone)[0].describe_rank())
+            prior = replace(prior, alone=combined(problem, alone).describe_rank())
         estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
     seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
     rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
@@ -73,8 +72,8 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     change, integration = _integration(problem, estimate, J)
     words += [integration, poor, cause, path.bound_warning]
     if path.converged:
-        estimate, local = combined(problem, estimate)
-        words += [local, "" if estimate.full_rank or poor else estimate.describe_rank()]
+        estimate = combined(problem, estimate)
+        words += ["" if estimate.full_rank or poor else estimate.describe_rank()]
     words += [] if prior is None else prior.warnings
     if rho is not None and chance < 1e-4 and not poor:
         factor = wider if wider > 1.2 else 1.0
@@ -252,13 +251,13 @@ def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[F
         return None, ""
     missed = problem.residual(theta) - problem.again("auto", RTOL, problem.errors).residual(theta)
     change = solution(problem.prior.below(J), np.append(missed, np.zeros(len(problem.prior))), rcond=RCOND)
-    std = np.full(len(change), np.nan) if estimate.std is None else estimate.std
-    words = [
-        f"{name} by about {c:.2g}" + ("" if np.isnan(s) else f" (standard deviation {s:.2g})")
-        for name, x, c, s in zip(estimate.names, theta, change, std, strict=True)
-        if abs(c) > max(1e-8 * abs(x), 0.1 * np.nan_to_num(s))
-    ]
-    return change, f"a more accurate integration would change {', '.join(words)}" if words else ""
+    limit = 1e-8 * np.abs(theta)
+    if estimate.std is not None:
+        limit = np.maximum(limit, 0.1 * np.nan_to_num(estimate.std))
+    j = int(np.argmax(np.abs(change) / np.maximum(limit, 1e-300)))
+    far = f"{estimate.names[j]} by about {change[j]:.2g}"
+    far += "" if estimate.std is None else f" (standard deviation {estimate.std[j]:.2g})"
+    return change, f"a more accurate integration would change {far}" * (abs(change[j]) > limit[j])
 
 
 def _fast(problem: Problem, theta: FloatArray) -> str:
@@ -293,43 +292,33 @@ def _widened(estimate: Estimate, factor: float | None) -> Estimate:
 # -- what records determine
 
 
-def combined(problem: Problem, estimate: Estimate) -> tuple[Estimate, str]:
-    """The estimate with combinations that hold for the nonlinear model, and a warning or nothing."""
+def combined(problem: Problem, estimate: Estimate) -> Estimate:
+    """The estimate with combinations that hold for the nonlinear model, else those near its values."""
+    theta, names, rank = estimate.solution, np.array(estimate.names), estimate.rank
     if estimate.full_rank:
-        return estimate, ""
-    theta, names = estimate.solution, np.array(estimate.names)
+        return estimate
     scale = np.where(theta == 0, 1.0, np.abs(theta))
-    other = theta + 0.2 * scale * np.linspace(1.0, -0.7, len(theta))
-    points, spaces = [theta], [estimate.row_space]
-    if np.isfinite(problem.residual(other)).all():
-        points.append(other)
-        spaces.append(least_squares(problem.jacobian(other), problem.data, rcond=RCOND).row_space)
-    problem.residual(theta)  # the problem keeps the runs of the last point
-    near = [replace(c, words=f"(near these values) {c.words}", std=None) for c in estimate.combinations]
-    tangents = replace(estimate, curved=tuple(near))
-    if len(spaces[-1]) > len(spaces[0]):
-        return tangents, (
-            f"the record's sensitivity to {', '.join(estimate.undetermined)} (or to a combination) vanishes "
-            "at the values found, but not beside them: it may be determined after all; start elsewhere"
-        )
-    null = [np.linalg.svd(rows * scale)[2][len(rows) :] for rows in spaces]
+    null = np.linalg.svd(estimate.row_space * scale)[2][rank:]
     rows = [scale * (names == name) for name in names if name not in estimate.undetermined]
     chosen: list[Combination] = []
     by = problem.model.symbols[1 + len(problem.model.states) :][: len(theta)]
     for expression in _coefficients(problem.model, by):
-        if len(rows) == estimate.rank:
-            return replace(estimate, curved=tuple(chosen)), ""
-        compiled = Compiled(by, jacobian([expression], by), (1 + len(by),))
-        tables = [compiled.one(point.tolist()) for point in points]
-        gradients = [table[1:] * scale / np.linalg.norm(table[1:] * scale) for table in tables]
-        hidden = [np.linalg.norm(N @ g) for N, g in zip(null, gradients, strict=True)]
-        if max(hidden) <= 1e-5 and np.linalg.matrix_rank([*rows, gradients[0]], tol=1e-6) > len(rows):
-            rows.append(gradients[0])
-            cov, value, slope = estimate.solution_covariance, tables[0][0], tables[0][1:]
-            std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+        if len(rows) == rank:
+            break
+        table = Compiled(by, jacobian([expression], by), (1 + len(by),)).one(theta.tolist())
+        value, slope = float(table[0]), table[1:]
+        gradient = slope * scale / np.linalg.norm(slope * scale)
+        seen = np.linalg.norm(null @ gradient) <= 1e-5
+        if seen and np.linalg.matrix_rank([*rows, gradient], tol=1e-6) > len(rows):
+            rows.append(gradient)
             words = str(usual(expression)).replace("**", "^").replace("*", "·")  # such as a·b^2/c
-            chosen.append(Combination(words, float(value), std, slope))
-    return tangents, ""
+            cov = estimate.solution_covariance
+            std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+            chosen.append(Combination(words, value, std, slope))
+    if len(rows) < rank:
+        tangents = estimate.combinations
+        chosen = [replace(c, words=f"(near these values) {c.words}", std=None) for c in tangents]
+    return replace(estimate, curved=tuple(chosen))
 
 
 def _coefficients(model: OdeModel, parameters: list[Any]) -> Iterator[Any]:

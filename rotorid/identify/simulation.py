@@ -110,7 +110,6 @@ def simulate(
     x, S, used, steps = np.zeros((len(t), n)), np.zeros((len(t), n, len(values))), "none", 0
     if n:
         system = System(model, values, t, u, sensitivities)
-        _check(model, t[:1], system.first[None])
         table, used = _solved(system, integrator, rtol)
         _check(model, t, table)
         x, steps = table[..., 0], system.steps
