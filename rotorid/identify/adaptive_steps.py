@@ -95,30 +95,31 @@ def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArra
     """By scipy's "dop853" or "lsoda", and the time that it comes to in so many steps at most."""
     from scipy.integrate import DOP853, LSODA
 
-    t, sizes, last = system.t, first_sizes(system), 0.0
-    scale = np.divide(1.0, theta := np.abs(system.theta[: system.k]), where=theta > 0, out=np.ones(system.k))
+    t, theta, table = (
+        system.t,
+        np.abs(system.theta[: system.k]),
+        np.full((len(system.t), *system.first.shape), np.nan),
+    )
     # of a sensitivity times its parameter as of the state
-    limits = (0.01 * rtol * np.outer(sizes, [1.0, *scale])).ravel()
-    table = np.full((len(t), *system.first.shape), np.nan)
+    scale = np.divide(1.0, theta, where=theta > 0, out=np.ones(system.k))
+    limits = (0.01 * rtol * np.outer(first_sizes(system), [1.0, *scale])).ravel()
     table[0] = system.first
     # inputs have corners at the samples: no step may cross one
     corners = range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)
     for begin, end in pairwise(corners):
-        first = min(last, float(t[end] - t[begin])) or None
-        options: dict[str, Any] = {"first_step": first, "max_step": _longest_step(system)}
-        solver: Any = (LSODA if name == "lsoda" else DOP853)(
-            system, t[begin], table[begin].ravel(), t[end], rtol=rtol, atol=limits, **options
-        )
-        if not np.isfinite(getattr(solver, "h_abs", 0.0)):  # of rates that are not finite
-            solver.h_abs = 1e-6 * (t[end] - t[begin])
-        row, last = begin + 1, 0.0
+        options: dict[str, Any] = {"rtol": rtol, "atol": limits, "max_step": _longest_step(system)}
+        span = t[begin], table[begin].ravel(), t[end]
+        if name == "lsoda":
+            solver: Any = LSODA(system, *span, **options)
+        else:
+            solver = DOP853(system, *span, first_step=t[begin + 1] - t[begin], **options)
+        row = begin + 1
         while row <= end:
             if not most:
                 return table, solver.t
             most, system.steps = most - 1, system.steps + 1
             solver.step()
             _check(system, solver)
-            last = max(last, solver.step_size)
             done = solver.status == "finished"
             upto = end + 1 if done else int(np.searchsorted(t[: end + 1], solver.t, side="right"))
             if upto > row:

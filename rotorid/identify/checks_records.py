@@ -257,7 +257,8 @@ def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[F
     j = int(np.argmax(np.abs(change) / np.maximum(limit, 1e-300)))
     far = f"{estimate.names[j]} by about {change[j]:.2g}"
     far += "" if estimate.std is None else f" (standard deviation {estimate.std[j]:.2g})"
-    return change, f"a more accurate integration would change {far}" * (abs(change[j]) > limit[j])
+    worse = abs(change[j]) > limit[j]
+    return change, f"a more accurate integration would change {far}" if worse else ""
 
 
 def _fast(problem: Problem, theta: FloatArray) -> str:
