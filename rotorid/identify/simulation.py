@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.registry import Method, find
-from rotorid.identify.adaptive_steps import LARGEST, adaptive, diverged
+from rotorid.identify.adaptive_steps import LARGEST, adaptive
 from rotorid.identify.integrators import HEUN, System, exact, stepwise
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.records import Record, inputs_of
@@ -165,4 +165,7 @@ def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
         j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
         sure = f"{table[i, j, 0]:.3g}"
         value = sure if lost[i].any() else "not finite in its sensitivity to the parameters"
-        raise diverged(model, float(t[i]), j, value)
+        raise SimulationError(
+            f"the solution diverges: at t = {t[i]:.6g} the state {model.states[j]} is {value}; choose other "
+            "parameters or bounds"
+        )
