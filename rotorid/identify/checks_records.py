@@ -66,7 +66,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
     seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
     rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
-    poor, cause, wrong = misfit(problem, estimate.dof, r, loss), "", False
+    poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
     change, integration = _integration(problem, estimate, J)
@@ -97,17 +97,16 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     }
 
 
-def misfit(problem: Problem, dof: int, r: FloatArray, loss: str) -> str:
+def misfit(problem: Problem, estimate: Estimate, r: FloatArray, loss: str) -> str:
     """Words where the model does not describe the record: intervals would be wrong."""
     if not problem.data.any():
         return "the record is zero throughout: a sensor without a signal?"
-    if dof <= 0 or _rounding_only(problem, r):
+    if estimate.dof <= 0 or _rounding_only(problem, r):
         return ""
     if problem.stated:
-        ratio = float(r @ r) / dof
-        if loss != "linear" or ratio <= MISFIT or _chance(float(r @ r), dof) >= CHANCE:
-            return ""
-        return f"residuals are {np.sqrt(ratio):.2g} times as large as the stated errors explain: {HINT}"
+        far = loss == "linear" and float(r @ r) > MISFIT * estimate.dof
+        why = estimate.misfit() if far else ""
+        return f"{why}: {HINT}" if why else ""
     for _, name, rows in problem.series:
         data, part = problem.data[rows], r[rows]
         if loss != "linear":  # without outliers

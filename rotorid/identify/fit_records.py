@@ -216,7 +216,7 @@ def _from_elsewhere(
     search: Searching, problem: Problem, path: Iterations, begins: Sequence[FloatArray], loss: str
 ) -> tuple[Iterations, str]:
     """A better minimum from other starts and words, where the first does not describe the record."""
-    if not misfit(problem, path.estimate.dof, path.estimate.residuals, loss):
+    if not misfit(problem, path.estimate, path.estimate.residuals, loss):
         return path, ""
     paths = _searched(search, problem, begins, [path])
     best = min(paths, key=_cost)

@@ -137,14 +137,19 @@ class OdeModel:
         return bool(self.states) and not self.timed and not any(expressions.names(e) & varying for e in parts)
 
     @cached_property
+    def in_rates(self) -> set[str]:
+        """Names that stand in the rates."""
+        return {name for e in self.rates for name in expressions.names(e)}
+
+    @property
     def timed(self) -> bool:
         """Whether the rates depend on the time itself."""
-        return any("t" in expressions.names(e) for e in self.rates)
+        return "t" in self.in_rates
 
-    @cached_property
+    @property
     def driven(self) -> bool:
         """Whether inputs stand in the rates."""
-        return any(expressions.names(e) & {*self.inputs} for e in self.rates)
+        return bool(self.in_rates & {*self.inputs})
 
     @cached_property
     def fixed_at_first(self) -> list[int]:

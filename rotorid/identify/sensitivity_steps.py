@@ -68,10 +68,8 @@ def iterate(
             integrals.append(float(width @ r**2))
             if len(history) == 1:
                 continue
-            by = "step" if short and settled else None
-            if epsilon is not None:
-                small = np.abs(step).max() < epsilon
-                by = "step" if small else "cost" if integrals[-1] < epsilon else None
+            small = short and settled if epsilon is None else np.abs(step).max() < epsilon
+            by = "step" if small else "cost" if integrals[-1] < (epsilon or 0.0) else None
             if by:
                 converged, message = settled, f"converged in {counted(len(history) - 1, 'iteration')}"
                 if epsilon is not None:
