@@ -154,8 +154,6 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
         import heyoka as hy
     except ImportError as error:
         raise ValueError("the integrator taylor needs the extra: pip install rotorid[fast]") from error
-    import sympy
-
     n, k, nu = len(model.states), len(model.parameters), len(model.inputs)
     # parameters over their sizes and these, inputs as straight lines, sizes of the states
     theta, size, level, slope, of_x = np.split(
@@ -167,13 +165,11 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
     try:
         if model.inertia:
             raise ValueError("a mass matrix is solved numerically")
-        numbers = [
-            {r: sympy.Float(float(r)) for r in e.atoms(sympy.Rational) - e.atoms(sympy.Integer)}
-            for e in model.rates
-        ]
+        # heyoka takes no fractions but floats
         rates = [
-            hy.from_sympy(e.xreplace(by), put) for e, by in zip(model.rates, numbers, strict=True)
-        ] / of_x
+            e.replace(lambda x: x.is_Rational and not x.is_Integer, lambda x: x.evalf()) for e in model.rates
+        ]
+        rates = [hy.from_sympy(e, put) for e in rates] / of_x
         # parameters may stand in initial values and outputs only; heyoka counts up to the last it sees
         rates[0] += 1e-300 * of_x[-1]
         solver = hy.taylor_adaptive(
