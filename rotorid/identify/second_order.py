@@ -115,8 +115,4 @@ def _entries(matrix: Matrix, what: str) -> list[list[str]]:
     """Texts of a matrix."""
     if not len(matrix) or any(len(row) != len(matrix) for row in matrix):
         raise ValueError(f"the {what} matrix must be square, (n, n)")
-    for i, row in enumerate(matrix):
-        for value in row:
-            if not isinstance(value, str) and not np.isfinite(value):
-                raise ValueError(f"{what} matrix, row {i + 1}: {value} is no finite number")
     return [[v if isinstance(v, str) else repr(float(v)) if v else "0" for v in row] for row in matrix]

@@ -92,7 +92,7 @@ def test_names_and_rest_by_default():
         (([[1]], np.zeros((2, 2)), [[1]]), {}, "different sizes: mass 1, damping 2, stiffness 1"),
         (([["m - 1"]], [[0]], [[1]]), {}, "the mass matrix is singular at m = 1"),
         (([["y1"]], [[0]], [[1]]), {}, "mass matrix, row 1: 'y1': y1 is not defined here"),
-        (([[np.nan]], [[0]], [[1]]), {}, "mass matrix, row 1: nan is no finite number"),
+        (([[np.nan]], [[0]], [[1]]), {}, "mass matrix, row 1: .nan.: nan is not defined here"),
         (([[1]], [[0]], [["q"]]), {}, "state v_y1: .* q is not defined"),
         (([[1]], [[0]], [[1]]), {"force": {"z": 1}}, "force: z is no displacement; displacements are y1"),
         (([[1]], [[0]], [[1]]), {"names": ["a", "b"]}, "1 names of displacements are needed, not 2"),
