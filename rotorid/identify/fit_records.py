@@ -24,8 +24,8 @@ from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import inside
 
-MOST_STARTS, OTHERS = 10_000, 7
-"""Starts at most; so many where the first does not describe the record."""
+MOST_STARTS, OTHERS, MOST_WARNINGS = 10_000, 7, 3
+"""Starts at most; so many where the first does not describe the record; warnings at most, the worst first."""
 METHODS: tuple[Method[None], ...] = (
     Method("levenberg-marquardt", "safeguarded, with bounds and robust losses", None),
     Method("gauss-newton", "whole steps without safeguards, as [F]", None),
@@ -163,7 +163,7 @@ def fit(  # noqa: PLR0913
         method=method,
         integrator=runs[0].integrator if runs else integrator,
         loss=loss,
-        warnings=tuple(filter(None, words)),
+        warnings=tuple(filter(None, words))[:MOST_WARNINGS],
         simulations=runs,
         residual_rms=float(np.sqrt(np.mean((path.estimate.residuals / problem.scale) ** 2))),
         errors=problem.errors or None,
