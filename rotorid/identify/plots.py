@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.plots import draw_polar, right_angles
+from fem.plots import right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     COLORS,
@@ -19,7 +19,6 @@ from rotorid.base.plot_style import (
     legend_below,
     look,
     new_figure,
-    on_figure,
     plain,
     plain_numbers,
     rad_s_above,
@@ -214,21 +213,6 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
     title = f"less the slow roll; at most {CURVES} curves" + (f"; critical: {words} rpm" if words else "")
     legend_below(figure, (above,), 3, title=title)
     return figure
-
-
-def polar_plot(sweeps: Sequence[Readings], roll: ComplexArray) -> Figure:
-    """Paths of the vectors less the slow roll (C,), with speeds marked."""
-    every, nothing = np.unique(np.concatenate([s.speeds for s in sweeps])), complex(np.nan, np.nan)
-    labels, curves = sweeps[0].labels, _curves(sweeps)
-    paths = [np.interp(every, omega, read - roll[c], nothing, nothing) for _, c, _, omega, read in curves]
-    unit, marks = Shown(_unit(sweeps[0]), labels.vibration_scale), max(3, 16 // len(curves))
-
-    def draw(ax: Axes) -> None:
-        names, lag = [name for _, _, name, *_ in curves], labels.phase == "lag"
-        draw_polar(every, np.transpose(paths), names, ax, marks=marks, unit=unit, lag=lag)
-        ax.set_title(f"{ax.get_title()}\nless the slow roll; at most {CURVES} curves", fontsize=TEXT)
-
-    return on_figure(draw, height=7.4, projection="polar")
 
 
 def _unit(readings: Readings) -> str:

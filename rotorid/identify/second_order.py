@@ -1,23 +1,14 @@
-"""Models of matrices, M y'' + C y' + K y = f, and linear models as state spaces."""
+"""Models of matrices, M y'' + C y' + K y = f."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.expression_functions import signs
-from rotorid.identify.expressions import names as names_in
 from rotorid.identify.ode import OdeModel, check_known, ode_model, read_expression
-
-if TYPE_CHECKING:
-    from fem import StateSpace
-
-__all__ = ["second_order", "state_space"]
 
 Matrix = Sequence[Sequence[float | str]] | FloatArray
 """Numbers or expressions of parameters, (n, n)."""
@@ -118,60 +109,6 @@ def second_order(  # noqa: PLR0913
     model = replace(plain, inertia=tuple(inertia))
     model.augmented(0.0, np.zeros(2 * n), model.start, np.zeros(len(inputs)))  # a singular mass matrix
     return model
-
-
-def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
-    """Write a linear model as s' = A s + B u, y = C s + D u.
-
-    Parameters
-    ----------
-    model
-        Of `ode_model`, `second_order` or a file, with its inputs and outputs.
-    theta
-        Parameters, shape (n_p,); by default the starting values.
-
-    Returns
-    -------
-    StateSpace
-        With the model's names; initial values have no place in it.
-
-    Raises
-    ------
-    ValueError
-        A model without states, one that depends on the time itself or is not linear, constant loads (they
-        need an input of their own), parameters that are not finite.
-
-    Examples
-    --------
-    >>> from rotorid.identify.ode import ode_model
-    >>> model = ode_model({"x": "-a*x + u"}, initial={"x": 0.0}, estimate={"a": 2.0}, inputs=["u"])
-    >>> state_space(model).A
-    array([[-2.]])
-    """
-    from fem import StateSpace
-
-    if not model.states:
-        raise ValueError("a model without states has no state space")
-    varying = [s for s in model.symbols if s.name in {*model.states, *model.inputs}]
-    parts = [(f"the rate of {x}", e) for x, e in zip(model.states, model.rates, strict=True)]
-    parts += [(f"the output {y}", e) for y, e in zip(model.outputs, model.observed, strict=True)]
-    for what, e in parts:
-        if "t" in names_in(e):
-            raise ValueError(
-                f"{what} depends on the time itself: a state space does not; make what varies an input"
-            )
-        if any(part.free_symbols & {*varying} for part in (*signs(e), *map(e.diff, varying))):
-            raise ValueError(f"{what} is not linear in states and inputs: a state space must be")
-        if e.subs(dict.fromkeys(varying, 0)) != 0:
-            raise ValueError(f"{what} has a constant part, which a state space cannot hold: make it an input")
-    values = model.start if theta is None else np.asarray(theta, dtype=float)
-    if values.shape != model.start.shape or not np.isfinite(values).all():
-        raise ValueError(f"{len(model.parameters)} parameter values are needed, finite numbers")
-    A, _, B = np.split(model.matrices(values)[0], np.add(len(model.states), (0, 1)), axis=1)
-    # linear, and 0 without states and inputs: outputs of unit states and inputs are the columns of C and D
-    n, both = len(A), np.eye(len(varying))
-    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
-    return StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
 
 
 def _entries(matrix: Matrix, what: str) -> list[list[str]]:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cases import each_of
 from exact_solutions import frequency_response
 from timedomain_cases import motion_in
 
 import fem
 from fem import state_space as of_motion
-from rotorid.identify.ode import ode_model
-from rotorid.identify.second_order import second_order, state_space
+from rotorid.identify.second_order import second_order
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
@@ -54,6 +52,15 @@ def singular(motion, eigenvalues):
         sigma = np.linalg.svd((s * s * motion.M + s * motion.C + motion.K) * scaled, compute_uv=False)
         worst = max(worst, sigma[-1] / sigma[0])
     return worst
+
+
+def state_space(model, theta=None):
+    """A linear model as a state space: outputs of unit states and inputs are the columns of C and D."""
+    n, values = len(model.states), model.start if theta is None else np.array(theta)
+    A, _, B = np.split(model.matrices(values)[0], [n, n + 1], axis=1)
+    both = np.eye(n + len(model.inputs))
+    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
+    return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
 
 
 def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
@@ -109,22 +116,6 @@ def test_dampers_in_states_act_like_dampers(tmp_path):
     assert farthest(found, small.state_space(SPEED).eigenvalues) > 1e-4
 
 
-def test_a_model_with_inputs_that_act_on_outputs():
-    model = ode_model(
-        {"x": "v", "v": "-k*x - 0.5*v + 2*u - w"},
-        initial={"x": 1.0, "v": 0.0},
-        estimate={"k": 4.0},
-        outputs={"y": "x + 3*u", "z": "k*v"},
-        inputs=["u", "w"],
-    )
-    found = state_space(model, [9.0])
-    np.testing.assert_allclose(found.A, [[0, 1], [-9, -0.5]])
-    np.testing.assert_allclose(found.B, [[0, 0], [2, -1]])
-    np.testing.assert_allclose(found.C, [[1, 0], [0, 9]])
-    np.testing.assert_allclose(found.D, [[3, 0], [0, 0]])
-    assert (found.states, found.inputs, found.outputs) == (("x", "v"), ("u", "w"), ("y", "z"))
-
-
 def test_a_mass_matrix_with_parameters():
     model = second_order(
         [["m", 0.5], [0.5, 2]], [[0, 0], [0, 0]], [[3, 0], [0, "k"]], estimate={"m": 1, "k": 5}
@@ -134,36 +125,3 @@ def test_a_mass_matrix_with_parameters():
     np.testing.assert_allclose(np.sort(found.eigenvalues.imag)[2:], np.sort(np.sqrt(squares)), rtol=1e-12)
     assert found.B.shape == (4, 0)
     assert found.D.shape == (2, 0)
-
-
-@each_of(
-    ("rate", "output", "said"),
-    [
-        ("-a*x**3", "x", "the rate of x is not linear"),
-        ("-a*x*u", "x", "the rate of x is not linear"),
-        ("-a*abs(x)", "x", "the rate of x is not linear"),
-        ("-a*sign(x)", "x", "the rate of x is not linear"),
-        ("-a*x + cos(t)", "x", "the rate of x depends on the time"),
-        ("-a*x + u", "x*t", "the output y depends on the time"),
-        ("-a*x + u", "x**2", "the output y is not linear"),
-        ("-a*x + 1", "x", "the rate of x has a constant part"),
-        ("-a*x + u", "x + a", "the output y has a constant part"),
-    ],
-)
-def test_what_is_no_state_space_is_refused(rate, output, said):
-    model = ode_model(
-        {"x": rate}, initial={"x": 0.0}, estimate={"a": 1.0}, outputs={"y": output}, inputs=["u"]
-    )
-    with pytest.raises(ValueError, match=said):
-        state_space(model)
-
-
-def test_numbers_that_are_none():
-    model = ode_model({"x": "-a*x"}, initial={"x": 0.0}, estimate={"a": 1.0})
-    with pytest.raises(ValueError, match="finite numbers"):
-        state_space(model, [np.nan])
-    with pytest.raises(ValueError, match="1 parameter values are needed"):
-        state_space(model, [1.0, 2.0])
-    curve = ode_model({}, estimate={"a": 1.0}, outputs={"y": "a*t"})
-    with pytest.raises(ValueError, match="without states"):
-        state_space(curve)
