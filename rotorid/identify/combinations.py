@@ -186,20 +186,6 @@ def sum_words(polynomial: Polynomial) -> str:
     return _written(factor_terms(expression(polynomial)))
 
 
-def ratio_words(above: Polynomial, below: Polynomial) -> str:
-    """Write one sum over another, common factors cancelled.
-
-    Examples
-    --------
-    >>> one, ka, kb = Fraction(1), (("ka", 1),), (("kb", 1),)
-    >>> ratio_words({(("ka", 1), ("kb", 1)): one}, {ka: one, kb: one})
-    'ka*kb/(ka + kb)'
-    """
-    import sympy
-
-    return _written(sympy.factor(sympy.cancel(expression(above) / expression(below))))
-
-
 def _written(words: Expression) -> str:
     """As text, what is not subtracted first; fractions as decimals, but for exponents."""
     from sympy import Float, Pow, Rational

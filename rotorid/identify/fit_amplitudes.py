@@ -25,7 +25,7 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, passive_elements, several
+from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
@@ -135,9 +135,11 @@ def _identified(
     """By output error, or linear regression alone where the model cannot predict."""
     linear, problem, fits = None, ValueError(), list[OutputError]()
     try:
-        linear = linear_fit(model, data)
+        rows = build_rows(model, data)
     except ValueError as error:  # an amplitude that it needs is missing
         problem = error
+    else:
+        linear = linear_fit(model, rows)
     nowhere = {name: np.isnan(data.table([name])).all() for name in model.signals}
     predicts = len(model.outputs) == len(model.equations)
     without = all(nowhere[name] for name in model.outputs) or any(nowhere[name] for name in model.inputs)
@@ -284,9 +286,9 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
         ),
         theta=recovery.solutions[0] if recovery.solutions else values,
         unidentifiable=linear.reasons if np.isnan(values).any() else (),
-        left_out=linear.left_out,
+        left_out=linear.rows.left_out,
         notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
-        normal_matrix=normal_matrix(linear.estimate.names, linear.K),
+        normal_matrix=normal_matrix(linear.estimate.names, linear.rows.K),
     )
 
 

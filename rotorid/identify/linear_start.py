@@ -27,7 +27,6 @@ from rotorid.identify.combinations import (
     Expression,
     Polynomial,
     only_determined,
-    ratio_words,
     sum_words,
     why_several,
 )
@@ -52,15 +51,15 @@ MOST = 30
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Combinations `matrix @ monomials(θ) / below @ monomials(θ) = values`: sums, and ratios of sums.
+    """Combinations `matrix @ monomials(θ) = values`.
 
     Attributes
     ----------
     names
         Of the n parameters.
     exponents
-        Of the monomials (m, n); a row of zeros is 1.
-    matrix, below
+        Of the monomials (m, n); the first row, of zeros, is 1.
+    matrix
         (q, m).
     values, covariance
         (q,), and (q, q) or None.
@@ -71,14 +70,11 @@ class System:
     matrix: FloatArray
     values: FloatArray
     covariance: FloatArray | None
-    below: FloatArray
 
     def combinations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values (q,) at the parameters (n,), and their derivatives (q, n)."""
         monomials, slopes = products_of_powers(self.exponents, theta)
-        bottom = self.below @ monomials
-        values = self.matrix @ monomials / bottom
-        return values, ((self.matrix - values[:, None] * self.below) @ slopes) / bottom[:, None]
+        return self.matrix @ monomials, self.matrix @ slopes
 
 
 class Recovery(NamedTuple):
@@ -105,18 +101,26 @@ class Recovery(NamedTuple):
     reasons: tuple[str, ...] = ()
 
 
+class Rows(NamedTuple):
+    """Real rows K (m, u), Y (m,); which of the experiments' (n, 2·equations) these are; others in words.
+
+    Real and imaginary parts of each equation stand in turn.
+    """
+
+    K: FloatArray
+    Y: FloatArray
+    used: BoolArray
+    left_out: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class LinearFit:
     """What linear regression gives.
 
     Attributes
     ----------
-    estimate, K, Y
-        The regression: its unknowns, rows (m, u) and (m,).
-    used, left_out
-        Which real rows of the experiments these are, (n, 2·equations); the others in words.
-    fixed
-        1 for each of all unknowns that others are given relative to, else 0.
+    estimate, rows
+        The regression.
     system, words, recovery
         The combinations (q,) that the data determine as functions of the parameters, in words, and the
         parameters from them; what stands alone in the equations is known without a real solution, too.
@@ -125,91 +129,62 @@ class LinearFit:
     """
 
     estimate: Estimate
-    K: FloatArray
-    Y: FloatArray
-    used: BoolArray
-    left_out: tuple[str, ...]
-    fixed: FloatArray
+    rows: Rows
     system: System
     words: tuple[str, ...]
     recovery: Recovery
     reasons: tuple[str, ...]
 
 
-def linear_fit(model: HarmonicModel, experiments: Experiments) -> LinearFit:
+def linear_fit(model: HarmonicModel, rows: Rows) -> LinearFit:
     """Regression of the equations, and the parameters that follow.
 
     Raises
     ------
     ValueError
-        If a signal of the model was measured nowhere or no complete row remains.
+        If every multiple of some unknowns fits.
     """
-    K, Y, used, left_out = build_rows(model, experiments)
-    combos = model.combinations
-    groups, fixed = _relative(model, K, Y, np.nonzero(used)[1] // 2)
-    kept, right = np.flatnonzero(fixed == 0), Y - K @ fixed
-    names = [combos.words[i] for i in kept]
-    alike = len({*names}) < len(names)  # in six digits
-    estimate = least_squares(K[:, kept], right, names=None if alike else names, rcond=RCOND)
-    picks = np.eye(len(kept)) if estimate.full_rank else np.array(echelon(estimate.row_space))
-    picks = picks.reshape(-1, len(kept))[: 0 if groups and not fixed.any() else None]
-    whole, below = np.zeros((2, len(picks), len(fixed)))
-    whole[:, kept] = picks
-    for group in groups:
-        below[np.ix_(whole[:, group].any(axis=1), group)] = fixed[group]
-    spread, to_monomials = estimate.solution_covariance, np.pad(combos.rows, ((0, 0), (1, 0)))
-    under = below @ to_monomials
-    under[~below.any(axis=1), 0] = 1.0
+    combos, (K, Y, *_) = model.combinations, rows
+    _check_scale(model, rows)
+    alike = len({*combos.words}) < len(combos.words)  # in six digits
+    estimate = least_squares(K, Y, names=None if alike else combos.words, rcond=RCOND)
+    picks = np.eye(K.shape[1]) if estimate.full_rank else np.array(echelon(estimate.row_space))
+    picks = picks.reshape(-1, K.shape[1])
+    matrix, spread = picks @ np.pad(combos.rows, ((0, 0), (1, 0))), estimate.solution_covariance
     system = System(
         names=model.parameters,
         exponents=model.exponents,
-        matrix=whole @ to_monomials,
+        matrix=matrix,
         values=picks @ estimate.solution,
         covariance=None if spread is None else picks @ spread @ picks.T,
-        below=under,
     )
-    words = []
-    for pick, top, bottom in zip(whole, system.matrix, under, strict=True):
-        plain, alone = bottom[0] == 1.0, np.flatnonzero(pick)
-        if plain and len(alone) == 1:
-            words.append(combos.words[alone[0]])
-        else:
-            above, beneath = (_polynomial(model, row) for row in (top, bottom))
-            words.append(sum_words(above) if plain else ratio_words(above, beneath))
-    recovery = recover(system)
+    words = [
+        combos.words[alone[0]] if len(alone := np.flatnonzero(pick)) == 1 else sum_words(polynomial)
+        for pick, polynomial in zip(picks, (_polynomial(model, row) for row in matrix), strict=True)
+    ]
+    recovery, reasons = recover(system), list[str]()
     for i, name in enumerate(words if not recovery.solutions else ()):
         if name in model.parameters:
             j = model.parameters.index(name)
             recovery.values[j], recovery.gain[j] = system.values[i], np.eye(len(words))[i]
-    reasons = []
     if recovery.undetermined.any():
         lost = np.array(model.parameters)[recovery.undetermined].tolist()
         reasons.append(only_determined(model.parameters, lost, words))
-    for group in groups:
-        loose = [combos.words[i] for i in group]
-        if {*loose} <= {*model.parameters}:
-            reasons.append(
-                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
-                "in their equations: no experiment of this kind tells more than ratios; make one of them "
-                "known"
-            )
     if not estimate.full_rank:
         reasons.append(
-            f"these experiments determine {estimate.rank} of the {len(kept)} combinations that the model "
+            f"these experiments determine {estimate.rank} of the {K.shape[1]} combinations that the model "
             "could show"
         )
-    reasons += recovery.reasons
-    parts = K[:, kept], right, used, left_out, fixed, system, tuple(words), recovery, tuple(reasons)
-    return LinearFit(estimate, *parts)
+    return LinearFit(estimate, rows, system, tuple(words), recovery, (*reasons, *recovery.reasons))
 
 
-def build_rows(
-    model: HarmonicModel, experiments: Experiments
-) -> tuple[FloatArray, FloatArray, BoolArray, tuple[str, ...]]:
-    """Real rows K (m, u), Y (m,) at the measured amplitudes; which these are; what was left out, in words.
+def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
+    """Rows at the measured amplitudes.
 
-    They are the marked ones of each experiment's (n, 2·equations), real and imaginary parts in turn. Raises
-    as `linear_fit`.
+    Raises
+    ------
+    ValueError
+        If a signal of the model was measured nowhere or no complete row remains.
     """
     names, n, equations = (*model.outputs, *model.inputs), len(experiments), len(model.equations)
     measured = experiments.table(names)
@@ -238,40 +213,31 @@ def build_rows(
         raise ValueError(
             "no equation can be used: in every experiment an amplitude that it needs was not measured or is 0"
         )
-    table, left_out = dict(zip(names, measured.T, strict=True)) | dict(experiments.varying), []
-    for i, e in np.argwhere(lost):
-        parts_of = (f for f in model.features if f.equation == e)
-        needed = dict.fromkeys(name for f in parts_of for name in (f.signal, *dict(f.varying)) if name)
-        missing = ", ".join(name for name in needed if np.isnan(table[name][i]))
-        left_out.append(f"experiment {experiments.names[i]}, equation {e + 1} ({missing} not measured)")
-    return parts[used][:, :-1], parts[used][:, -1], used.reshape(n, -1), tuple(left_out)
+    left_out = (
+        f"experiment {experiments.names[i]}, equation {e + 1}: an amplitude in it is not measured"
+        for i, e in np.argwhere(lost)
+    )
+    return Rows(parts[used][:, :-1], parts[used][:, -1], used.reshape(n, -1), tuple(left_out))
 
 
-def _relative(
-    model: HarmonicModel, K: FloatArray, Y: FloatArray, equation: IntArray
-) -> tuple[tuple[IntArray, ...], FloatArray]:
-    """Groups of unknowns that may all be multiplied by one factor, for the right sides of their rows are 0.
+def _check_scale(model: HarmonicModel, rows: Rows) -> None:
+    """Refuse unknowns that may all be multiplied by one factor, for the right sides of their rows are 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
-    Beside: 1 for the first unknown of each group that is surely not zero, to which others are relative.
     """
     from scipy.sparse.csgraph import connected_components
 
-    holds = np.zeros((len(model.equations), K.shape[1]), dtype=bool)
+    holds = np.zeros((len(model.equations), rows.K.shape[1]), dtype=bool)
     np.logical_or.at(holds, model.equation, model.of_unknowns != 0)
-    known = np.bincount(equation, Y != 0, len(holds)) > 0
-    groups, fixed = [], np.zeros(K.shape[1])
+    known = np.bincount(np.nonzero(rows.used)[1] // 2, rows.Y != 0, len(holds)) > 0
     count, part = connected_components(holds @ holds.T)
     for k in range(count):
-        group = np.flatnonzero(holds[part == k].any(axis=0))
-        if known[part == k].any() or not len(group):
-            continue
-        scale = np.linalg.norm(K[:, group], axis=0)
-        share = np.abs(np.linalg.svd(K[:, group] / np.where(scale == 0, 1.0, scale))[2][-1])
-        fixed[group[np.argmax(share > 0.1 * share.max())]] = 1.0
-        groups.append(group)
-    # where each unknown is alone with its factor, nothing is given relative to another
-    return tuple(groups), np.zeros_like(fixed) if fixed.all() else fixed
+        loose = [model.combinations.words[i] for i in np.flatnonzero(holds[part == k].any(axis=0))]
+        if loose and not known[part == k].any():
+            raise ValueError(
+                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
+                "in their equations: make one of them known (the others are then relative to it)"
+            )
 
 
 def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
@@ -320,31 +286,24 @@ def recover(system: System) -> Recovery:
 def _candidates(system: System, free: list[int], J: FloatArray) -> list[FloatArray] | None:
     """All real solutions (n,) for the free unknowns, the others at `GAUGE`; None: nobody knows them.
 
-    J are derivatives (q, free) at a general point.
+    Of as many independent combinations as there are unknowns, by derivatives J (q, free) at a general point.
     """
     from scipy.linalg import qr
-    from scipy.sparse.csgraph import connected_components
 
     powers = [[Fraction(e).limit_denominator(50).denominator for e in row] for row in system.exponents]
     roots = np.lcm.reduce(powers, axis=0)[free]  # 2 where sqrt(k) stands in the model
     exponents = np.round(system.exponents[:, free] * roots).astype(int)
-    rows = system.matrix - system.values[:, None] * system.below
+    rows = system.matrix - np.outer(system.values, np.eye(len(system.exponents))[0])
     rows = rows * np.prod(np.delete(GAUGE**system.exponents, free, axis=1), axis=1)
     stands = (rows != 0) @ (exponents != 0)
     simple = 4.0 ** -(np.count_nonzero(rows, axis=1) + stands.sum(axis=1))
     sizes = simple / np.fmax(np.linalg.norm(J, axis=1), 1e-300)
     chosen = qr((J * sizes[:, None]).T, mode="r", pivoting=True)[1][: len(free)]
-    solutions = [np.full(len(system.names), GAUGE)]
-    count, part = connected_components(stands[chosen].T @ stands[chosen])
-    for k in range(count):
-        inside = np.flatnonzero(part == k)
-        ends = _solved(rows[chosen][stands[chosen][:, inside].any(axis=1)], exponents[:, inside])
-        if ends is None:
-            return None
-        ends = [end ** roots[inside] for end in ends if (end[roots[inside] > 1] >= 0).all()]
-        places = np.array(free)[inside]
-        solutions = [_put(theta, places, end) for theta in solutions for end in ends]
-    return solutions
+    ends = _solved(rows[chosen], exponents)
+    if ends is None:
+        return None
+    real = [end**roots for end in ends if (end[roots > 1] >= 0).all()]
+    return [_put(np.full(len(system.names), GAUGE), np.array(free), end) for end in real]
 
 
 def _solved(rows: FloatArray, exponents: IntArray) -> list[FloatArray] | None:
@@ -415,8 +374,7 @@ def _refined(system: System, theta: FloatArray, free: list[int], weight: FloatAr
 
 def _misfit(system: System, theta: FloatArray) -> float:
     """Largest error of a combination in units of what rounding and four standard deviations allow."""
-    monomials = np.abs(products_of_powers(system.exponents, theta)[0])
-    size = np.abs(system.matrix) @ monomials / (np.abs(system.below) @ monomials)
+    size = np.abs(system.matrix) @ np.abs(products_of_powers(system.exponents, theta)[0])
     size += np.abs(system.values) + 1e-300
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
     error = np.abs(system.combinations(theta)[0] - system.values)
