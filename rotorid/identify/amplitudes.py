@@ -212,19 +212,6 @@ class Experiments:
             whole[:, j] = self.signals.get(name, np.nan)
         return whole
 
-    def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
-        """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
-        rows = np.column_stack([self.frequencies, self.free, *self.signals.values(), *self.varying.values()])
-        first: dict[bytes, int] = {}
-        same = [first.setdefault(row.tobytes(), i) for i, row in enumerate(rows)]
-        words = tuple(
-            f"experiment {self.names[i]}, in every reading a copy of experiment {self.names[j]} "
-            "(if both were measured, say so in a column repeat)"
-            for i, j in enumerate(same)
-            if i != j
-        )
-        return self.take(sorted({*same})), words
-
 
 def experiments(
     model: HarmonicModel,

@@ -45,7 +45,6 @@ WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
-KINDS = ("spring", "damper", "mass")
 OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
 """A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
@@ -85,11 +84,10 @@ def identify(
     """
     how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
     _check(model, experiments, start or {}, **how)
-    data, copies = experiments.without_copies()
-    answer = _identified(model, data, start or {}, how)
-    if data.rounding and not data.stated and answer.predicted and len(answer.solutions) == 1:
+    answer = _identified(model, experiments, start or {}, how)
+    if experiments.rounding and not experiments.stated and answer.predicted and len(answer.solutions) == 1:
         answer = _by_digits(answer, how)
-    return replace(_finished(answer, how["bounds"]), left_out=(*copies, *answer.left_out))
+    return _finished(answer, how["bounds"])
 
 
 def _check(
@@ -340,7 +338,7 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
     words += answer.warnings
     if answer.converged:
         high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])
-        words += negative(model, float(data.frequencies.max()), answer.values, high, bounds)
+        words += _negative(model, float(data.frequencies.max()), answer.values, high, bounds)
     return replace(answer, warnings=(*words, *(answer.prior.warnings if answer.prior else ())))
 
 
@@ -397,28 +395,22 @@ def unexplained(estimate: Estimate, *, stated: bool) -> list[str]:
     ]
 
 
-def negative(
+def _negative(
     model: HarmonicModel, highest: float, values: FloatArray, high: FloatArray, bounds: Bounds
 ) -> list[str]:
-    """Masses, dampers and springs that are negative beyond the upper end of their interval (n,).
+    """Masses, dampers and springs whose forces are negative up to the end of their interval (n,).
 
-    Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
+    But those that bounds allow; `highest` is the highest frequency of the data, rad/s.
     """
     kinds = passive_elements(model)
-    kind = np.array([kinds.get(name, -1) for name in model.parameters])
-    force = np.where(kind < 0, 0.0, np.abs(values) * highest**kind)
+    power = np.array([kinds.get(name, -1) for name in model.parameters])
+    force = np.nan_to_num(np.where(power < 0, 0.0, np.abs(values) * highest**power))
     lowest = [bounds.get(name, (0.0, None))[0] for name in model.parameters]
-    allowed = np.array([low is None or low < 0 for low in lowest])
-    known = (kind >= 0) & np.isfinite(values)
-    wrong = known & (high < 0) & (force > 1e-9 * np.nan_to_num(force).max()) & ~allowed
-    if not wrong.any():
+    each = zip(model.parameters, values, (high < 0) & (force > 1e-9 * force.max()), lowest, strict=True)
+    wrong = [f"{name} = {x:.6g}" for name, x, below, low in each if below and low is not None and low >= 0]
+    if not wrong:
         return []
-    why = "a sign, a unit or the model may be wrong"
-    if len({*kind[wrong]}) > 1 and (wrong == known).all():
-        why = "does a force or a reading have the other sign?"
-    elif (wrong == known & (kind == 1)).all():
-        why = "are the phases counted the other way (lag, not lead)?"
-    listed = ", ".join(f"{model.parameters[j]} = {values[j]:.6g}" for j in np.flatnonzero(wrong))
-    what = " or ".join(dict.fromkeys(KINDS[k] for k in kind[wrong]))
-    verb = "is" if np.count_nonzero(wrong) == 1 else "are"
-    return [f"{listed} {verb} negative, which no passive {what} is: {why}"]
+    return [
+        f"{listing(wrong, 'and')} negative, which no passive spring, damper or mass is: a sign (of a force, "
+        "or of phases: lead, not lag), a unit or the model may be wrong"
+    ]
