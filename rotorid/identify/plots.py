@@ -25,7 +25,7 @@ from rotorid.base.plot_style import (
 )
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import SPEEDS, Shown
-from rotorid.identify.amplitudes import compare, real_matrices
+from rotorid.identify.amplitudes import real_matrices
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
@@ -95,15 +95,12 @@ def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Sh
 def _shapes(result: Identification, axes: Axes, units: Mapping[str, Shown]) -> str:
     """Measured and fitted mode shapes, one line per natural frequency."""
     data, outputs = result.experiments, result.model.outputs
-    table = data.table(outputs).real
-    fitted, natural = np.full(table.shape, np.nan), np.full(len(table), np.nan)
-    if result.predicted and np.isfinite(result.values).all():
-        fitted, natural = compare(result.model, data).predict(result.values)
-    for i, (w, other) in enumerate(data.axis.scale * np.transpose((data.frequencies, natural))):
-        label = f"{w:.5g} {data.axis.word.rpartition(', ')[2]}"
-        label += f" (model {other:.5g})" if np.isfinite(other) else ""
-        axes.plot(table[i], zorder=3, label=label if i < NAMES else "", **_mark(i))
-        axes.plot(fitted[i].real, lw=1.4, **look(i))
+    fitted = [[*amplitudes.real] for amplitudes in np.transpose([*result.predicted.values()])]
+    for i, (w, shape) in enumerate(zip(data.frequencies, data.table(outputs).real, strict=True)):
+        label = f"{data.axis.scale * w:.5g} {data.axis.word.rpartition(', ')[2]}"
+        axes.plot(shape, zorder=3, label=label if i < NAMES else "", **_mark(i))
+        if fitted:
+            axes.plot(fitted[i], lw=1.4, **look(i))
     axes.axhline(0.0, color=QUIET, lw=0.8)
     axes.set_xticks(range(len(outputs)), outputs)
     axes.set_ylabel(f"shape, {' or '.join({unit.word: '' for unit in units.values()})}")
@@ -115,9 +112,8 @@ def _degrees(z: ComplexArray) -> FloatArray:
 
 
 def _mark(j: int) -> dict[str, Any]:
-    """Points; every other one is open and larger, so that equal ones are seen."""
-    face = {"mfc": "none", "ms": 9} if j % 2 else {"mec": "white", "ms": 7}
-    return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], **face}
+    """Points, open, so that equal ones are seen."""
+    return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], "mfc": "none", "ms": 6}
 
 
 def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:
@@ -157,11 +153,7 @@ def figure_modes(modes: FittedModes) -> Figure:
         rows, grid = (data.speeds >= low) & (data.speeds <= high), np.linspace(low, high, POINTS)
         fits, w = size * modes.curve(grid), scale * data.speeds[rows]
         for p, name in enumerate(data.sensors[:CURVES]):
-            read, fit, mark = (
-                size * data.vectors[rows, p],
-                fits[:, p],
-                {**_mark(p), "mfc": "none", "mec": None, "ms": 5},
-            )
+            read, fit, mark = size * data.vectors[rows, p], fits[:, p], _mark(p)
             circle.plot(fit.real, fit.imag, **look(p))
             circle.plot(read.real, read.imag, label=name, **mark)
             peak.plot(scale * grid, np.abs(fit), **look(p))
