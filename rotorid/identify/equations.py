@@ -139,7 +139,7 @@ def multiplied_out(
         With the reason, for whatever is not rational in other names than those to estimate, and for
         expansions that are too long.
     """
-    from sympy import QQ, Add, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
+    from sympy import QQ, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
 
     def of_known(part: Expression) -> bool:
         plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
@@ -160,9 +160,8 @@ def multiplied_out(
             "signals, nor a function of parameters"
         )
     top, bottom = fraction(together(whole))
-    factors = bottom.as_powers_dict().items()
-    if math.prod(len(Add.make_args(base)) ** int(n) for base, n in factors) > MAX_TERMS:
-        raise ValueError("it expands to too many terms")
+    if max(_terms(top), _terms(bottom)) > MAX_TERMS:
+        raise ValueError(f"multiplied out, it has more than {MAX_TERMS} terms")
     symbols = sorted(top.free_symbols | bottom.free_symbols, key=str)
     R = ring(symbols, QQ)[0]
 
@@ -184,6 +183,15 @@ def multiplied_out(
     scale = below[min(below, key=lambda m: (degree(m), m))]
     left = frozenset(n for m in below for n, _ in times(m, shift))
     return {times(m, shift): x / scale for m, x in terms(top).items()}, left
+
+
+def _terms(part: Expression) -> int:
+    """Bound for the number of terms of a polynomial when it is multiplied out."""
+    if part.is_Pow:
+        n = int(part.exp)
+        return math.comb(_terms(part.base) + n - 1, n)
+    each = map(_terms, part.args)
+    return sum(each) if part.is_Add else math.prod(each)
 
 
 def _functions_as_unknowns(whole: Expression, names: set[str]) -> Expression:
