@@ -9,13 +9,13 @@ regression, and k ≥ 0. Any other function of parameters, such as exp(-a), is a
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence, Set
 from fractions import Fraction
 
 import numpy as np
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.identify.combinations import (
     CONSTANT,
     NAME,
@@ -66,7 +66,7 @@ def harmonic_model(
     ------
     ValueError
         For equations that cannot be read, are not linear in the signals or not rational in p and powers of
-        parameters, or follow from the others; parameters that do not occur, names given twice.
+        parameters; parameters that do not occur, names given twice.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def harmonic_model(
             raise ValueError(
                 f"the parameter {name} cancels out of the equations: nothing can be said about it"
             )
-        near = difflib.get_close_matches(name, others, 1, 0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+        raise ValueError(
+            f"the parameter {name} is to be estimated but stands in no equation{did_you_mean(name, others)}"
+        )
     parameters = (*(name for name in estimate if name in occurs), *functions)
     chosen = tuple(inputs) if inputs is not None else tuple(n for n in signals if n not in left)
     if strange := [name for name in chosen if name not in signals]:
@@ -123,9 +123,7 @@ def harmonic_model(
     if not outputs:
         raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
     ordered = tuple(name for name in others if name in changing)
-    model = HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
-    _check_independent(model)
-    return model
+    return HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
 
 
 def multiplied_out(
@@ -280,20 +278,6 @@ def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
             raise ValueError(f"the parameter {name} is named twice")
         if name in known:
             raise ValueError(f"{name} is both known and to be estimated")
-
-
-def _check_independent(model: HarmonicModel) -> None:
-    """Raise ValueError for an equation that follows from those before it: its rows would count twice."""
-    rng = np.random.default_rng(1)
-    varying = {name: rng.uniform(0.5, 2.0, 1) for name in model.varying}
-    A = model.matrices(rng.uniform(0.5, 2.0, len(model.parameters)), rng.uniform(0.5, 2.0, 1), varying)[0]
-    A = A / np.linalg.norm(A, axis=1, keepdims=True)
-    for i in range(1, len(A)):
-        if np.linalg.matrix_rank(A[: i + 1], 1e-12) <= i:
-            raise ValueError(
-                f"equation {i + 1} follows from those before it and tells nothing new: leave it out, or its "
-                "rows would count twice"
-            )
 
 
 def _finite(name: str, value: float) -> float:

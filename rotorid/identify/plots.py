@@ -26,7 +26,6 @@ from rotorid.base.plot_style import (
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import SPEEDS, Shown
 from rotorid.identify.amplitudes import real_matrices
-from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,20 +45,17 @@ MODEL_UNIT = Shown("model unit")
 
 
 def figure_identification(result: Identification) -> Figure:
-    """All about an identification: amplitudes and phases (or shapes), parameters."""
+    """Amplitudes and phases, or shapes, measured and predicted."""
     units = {name: result.experiments.units.get(name, MODEL_UNIT) for name in result.model.outputs}
-    free, intervals = bool(result.experiments.free.all()), _intervals(result)
+    free = bool(result.experiments.free.all())
     heights = [3.4] if free else [*[2.4] * len({*units.values()}), 1.6]
-    parts = 0.9 + sum(heights), ROOM[0] + ROOM[1] * len(intervals)
-    figure = new_figure(sum(parts))
-    above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
-    axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    figure = new_figure(0.9 + sum(heights))
+    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     words = _shapes(result, axes[0], units) if free else _forced(result, axes, units)
     for ax in axes:
         plain(ax)
     figure.align_ylabels(axes)
-    legend_below(above, axes, 2 if free else 4, title=f"points: measured{words}")
-    draw_intervals(below.subplots(), intervals)
+    legend_below(figure, axes, 2 if free else 4, title=f"points: measured{words}")
     return figure
 
 
@@ -114,18 +110,6 @@ def _degrees(z: ComplexArray) -> FloatArray:
 def _mark(j: int) -> dict[str, Any]:
     """Points, open, so that equal ones are seen."""
     return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], "mfc": "none", "ms": 6}
-
-
-def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:
-    """Parameters with the half width of their 95 % intervals, and combinations where they say more."""
-    factor, lines = result.coverage_factor or np.nan, []
-    std = np.full(len(result.parameters), np.nan) if result.std is None else result.std
-    for name, value, sigma in zip(result.parameters, result.values.tolist(), std.tolist(), strict=True):
-        several = len({solution[name] for solution in result.solutions}) > 1
-        words = "no interval" if np.isfinite(value) else "several values" if several else "not determined"
-        lines.append((name, value, factor * sigma, words))
-    more = () if np.isfinite(result.values).all() else result.combinations
-    return [*lines, *((c.words, c.value, factor * (c.std or np.nan), "no interval") for c in more)]
 
 
 def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArray]]:

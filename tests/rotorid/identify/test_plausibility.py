@@ -66,18 +66,6 @@ def test_noise_is_not_blamed_on_the_model_and_intervals_cover(size):
     assert np.mean(inside) > 0.85, (np.mean(inside), len(inside))
 
 
-SUM = "m1*p**2*X1 + m2*p**2*X2 + b1*p*X1 + b2*p*X2 + k1*X1 = F"
-
-
-@pytest.mark.parametrize("more", [TWO[0], f"-3*({TWO[1].split(' =')[0]}) = 0", SUM, f"p*({SUM[:-4]}) = p*F"])
-def test_an_equation_that_follows_from_others_is_refused(more):
-    names = ["m1", "b1", "k1", "k2", "m2", "b2"]
-    with pytest.raises(ValueError, match="equation 3 follows from those before it"):
-        harmonic_model([*TWO, more], estimate=names)
-    assert harmonic_model([*TWO, more.replace("b1", "b3") if "b1" in more else "k3*X2 = G"],
-                          estimate=[*names, "b3" if "b1" in more else "k3"]).parameters  # fmt: skip
-
-
 @pytest.mark.full
 def test_noise_is_not_taken_for_a_wrong_sign():
     noisy = [readings(seed, 2, AmplitudeErrors(0.2, 0.2), stated=False) for seed in range(8)]
