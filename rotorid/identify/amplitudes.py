@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import Shown
 from rotorid.identify.operator_model import (
     HarmonicModel,
@@ -166,14 +166,12 @@ class Experiments:
     rounding: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n = len(self.names)
-        if not n:
+        if not (n := len(self.names)):
             raise ValueError("there are no experiments")
-        tables: dict[str, AnyArray] = {"frequencies": self.frequencies, "marks of free vibration": self.free}
-        tables |= {f"amplitudes {name}": values for name, values in self.signals.items()}
-        tables |= {f"covariances of {name}": values for name, values in self.covariances.items()}
-        for what, values in tables.items():
-            if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
+        parts = [(f"amplitudes {name}", values, (n,)) for name, values in self.signals.items()]
+        parts += [(f"covariances of {name}", values, (n, 2, 2)) for name, values in self.covariances.items()]
+        for what, values, shape in (("frequencies", self.frequencies, (n,)), *parts):
+            if np.shape(values) != shape or np.isinf(values).any():
                 raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
         if not (np.asarray(self.frequencies) >= 0).all():
             raise ValueError(f"frequencies must be finite and not negative; got {self.frequencies.tolist()}")

@@ -139,13 +139,7 @@ def multiplied_out(
     """
     from sympy import QQ, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
 
-    def of_known(part: Expression) -> bool:
-        plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
-        alone = part.is_Pow and part.base.is_Symbol and part.exp.is_Integer
-        return plain and not alone and all(s.name in known for s in part.free_symbols)
-
-    whole = expression.replace(of_known, lambda part: _number(part, known))
-    whole = _functions_as_unknowns(whole, {*known, *estimate})
+    whole = _without_functions(expression, known, estimate)
     powers, roots = [e for e in whole.atoms(Pow) if e.exp.is_Rational], dict[str, int]()
     for name in estimate:
         x = Symbol(name)
@@ -192,22 +186,33 @@ def _terms(part: Expression) -> int:
     return sum(each) if part.is_Add else math.prod(each)
 
 
-def _functions_as_unknowns(whole: Expression, names: set[str]) -> Expression:
-    """Functions of these names as symbols of their text, but for fractional powers of products."""
+def _without_functions(
+    whole: Expression, known: Mapping[str, Fraction], estimate: Sequence[str]
+) -> Expression:
+    """Functions of known names as numbers, those of parameters as symbols of their text, but for roots."""
     from sympy import Symbol
 
-    inside = set(names)
+    inside = {*known, *estimate}
+
+    def numbers(part: Expression) -> bool:
+        return all(s.name in known for s in part.free_symbols)
 
     def function(part: Expression) -> bool:
-        power = part.is_Pow and not part.exp.is_Integer
-        plain = power and part.exp.is_Rational and not part.base.is_Add
-        return (part.is_Function or (power and not plain)) and {s.name for s in part.free_symbols} <= inside
+        if not part.is_Pow or numbers(part):
+            plain = part.is_Pow and part.exp.is_Integer and (part.exp > 0 or part.base.is_Symbol)
+        else:  # a fractional power of a product
+            plain = part.exp.is_Rational and (part.exp.is_Integer or not part.base.is_Add)
+        return (
+            (part.is_Function or part.is_Pow) and not plain and {s.name for s in part.free_symbols} <= inside
+        )
 
-    def as_unknown(part: Expression) -> Expression:
+    def replaced(part: Expression) -> Expression:
+        if numbers(part):
+            return _number(part, known)
         inside.add(str(part))  # which may stand in another
         return Symbol(str(part))
 
-    return whole.replace(function, as_unknown)
+    return whole.replace(function, replaced)
 
 
 def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:

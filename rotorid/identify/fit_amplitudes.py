@@ -138,10 +138,9 @@ def _identified(
         problem = error
     else:
         linear = linear_fit(model, rows)
-    nowhere = {name: np.isnan(data.table([name])).all() for name in model.signals}
     predicts = len(model.outputs) == len(model.equations)
-    without = all(nowhere[name] for name in model.outputs) or any(nowhere[name] for name in model.inputs)
-    if linear is None and (not predicts or without):
+    hidden = {name for name in model.signals if np.isnan(data.table([name])).all()}
+    if linear is None and (not predicts or hidden.intersection(model.inputs) or hidden >= {*model.outputs}):
         raise problem
     solutions = linear.recovery.solutions if linear else ()
     if predicts:
@@ -269,7 +268,6 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
         spread = np.sqrt(np.diag(covariance).clip(0))
         covariance = recovery.gain @ covariance @ recovery.gain.T
         covariance[np.isnan(values)[:, None] | np.isnan(values)] = np.nan
-    notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
     return Identification(
         model=model,
         experiments=data,
@@ -285,7 +283,7 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
         theta=recovery.solutions[0] if recovery.solutions else values,
         unidentifiable=linear.reasons if np.isnan(values).any() else (),
         left_out=linear.rows.left_out,
-        notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
+        notes=("the model predicts no amplitudes: linear regression, which noisy readings bias",),
         normal_matrix=normal_matrix(linear.estimate.names, linear.rows.K),
     )
 

@@ -20,7 +20,6 @@ from rotorid.base.plot_style import (
     look,
     new_figure,
     plain,
-    plain_numbers,
     rad_s_above,
 )
 from rotorid.base.rpm import RPM
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
 
 POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4
 """Of a curve; most curves of a sweep, outputs in a legend, modes."""
-WIDE = 10.0
-"""Ratio of amplitudes above which their scale is logarithmic."""
 HIDDEN = 3.0
 """Standard deviations below which a vector has no phase to draw."""
 MODEL_UNIT = Shown("model unit")
@@ -77,12 +74,7 @@ def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Sh
             phases.plot(x, _degrees(curves[name]), **line)
         ax.set_ylabel(f"amplitude, {unit.word}")
     for ax in by_unit.values():
-        low, high = ax.dataLim.minposy, ax.dataLim.y1
-        if high > WIDE * low:
-            ax.set_yscale("log")
-            plain_numbers(ax)
-        else:
-            ax.set_ylim(bottom=0.0)
+        ax.set_ylim(bottom=0.0)
     phases.set(xlabel=data.axis.word, ylabel="phase lead, °", ylim=(-205, 205), yticks=range(-180, 181, 90))
     lost = "; free vibrations not drawn" if data.free.any() else ""
     return f"{' ± 2σ' if data.stated else ''}; lines: model{lost}"
