@@ -168,10 +168,11 @@ class Experiments:
     def __post_init__(self) -> None:
         if not (n := len(self.names)):
             raise ValueError("there are no experiments")
-        parts = [(f"amplitudes {name}", values, (n,)) for name, values in self.signals.items()]
-        parts += [(f"covariances of {name}", values, (n, 2, 2)) for name, values in self.covariances.items()]
-        for what, values, shape in (("frequencies", self.frequencies, (n,)), *parts):
-            if np.shape(values) != shape or np.isinf(values).any():
+        parts: dict[str, AnyArray] = {"frequencies": self.frequencies}
+        parts |= {f"amplitudes {name}": values for name, values in self.signals.items()}
+        parts |= {f"covariances of {name}": values for name, values in self.covariances.items()}
+        for what, values in parts.items():
+            if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
                 raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
         if not (np.asarray(self.frequencies) >= 0).all():
             raise ValueError(f"frequencies must be finite and not negative; got {self.frequencies.tolist()}")

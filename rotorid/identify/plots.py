@@ -47,7 +47,7 @@ def figure_identification(result: Identification) -> Figure:
     free = bool(result.experiments.free.all())
     heights = [3.4] if free else [*[2.4] * len({*units.values()}), 1.6]
     figure = new_figure(0.9 + sum(heights))
-    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    axes = [*figure.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]]
     words = _shapes(result, axes[0], units) if free else _forced(result, axes, units)
     for ax in axes:
         plain(ax)
