@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.unit_words import Shown
 from rotorid.identify.operator_model import (
     HarmonicModel,
