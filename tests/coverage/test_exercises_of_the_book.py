@@ -1,4 +1,4 @@
-"""Intervals of the exercises of [S] with a known truth: most contain it, as rounded in the book and redrawn."""
+"""Intervals of the exercises of [S] with a known truth: most contain it, as printed and redrawn."""
 
 import tomllib
 import warnings
