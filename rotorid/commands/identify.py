@@ -116,7 +116,7 @@ def identify(
     return outcome_of(
         result,
         provenance(files, options),
-        pictures={"Amplitudes or shapes; parameters with 95 %.": picture},
+        pictures={"Amplitudes or shapes, measured and predicted.": picture},
         title="Coefficients from harmonic tests",
         solved=lambda: _equations(result),
     )

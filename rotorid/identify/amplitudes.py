@@ -166,13 +166,12 @@ class Experiments:
     rounding: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n = len(self.names)
-        if not n:
+        if not (n := len(self.names)):
             raise ValueError("there are no experiments")
-        tables: dict[str, AnyArray] = {"frequencies": self.frequencies, "marks of free vibration": self.free}
-        tables |= {f"amplitudes {name}": values for name, values in self.signals.items()}
-        tables |= {f"covariances of {name}": values for name, values in self.covariances.items()}
-        for what, values in tables.items():
+        parts: dict[str, AnyArray] = {"frequencies": self.frequencies}
+        parts |= {f"amplitudes {name}": values for name, values in self.signals.items()}
+        parts |= {f"covariances of {name}": values for name, values in self.covariances.items()}
+        for what, values in parts.items():
             if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
                 raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
         if not (np.asarray(self.frequencies) >= 0).all():
@@ -211,19 +210,6 @@ class Experiments:
         for j, name in enumerate(names):
             whole[:, j] = self.signals.get(name, np.nan)
         return whole
-
-    def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
-        """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
-        rows = np.column_stack([self.frequencies, self.free, *self.signals.values(), *self.varying.values()])
-        first: dict[bytes, int] = {}
-        same = [first.setdefault(row.tobytes(), i) for i, row in enumerate(rows)]
-        words = tuple(
-            f"experiment {self.names[i]}, in every reading a copy of experiment {self.names[j]} "
-            "(if both were measured, say so in a column repeat)"
-            for i, j in enumerate(same)
-            if i != j
-        )
-        return self.take(sorted({*same})), words
 
 
 def experiments(

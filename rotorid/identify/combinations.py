@@ -156,20 +156,19 @@ def _as_an_equation_has_them(
     """
     first = next(iter(wanted))
     for f in features if len(wanted) > 1 else ():
-        if any(len(f.symbolic.get(m, ())) != 1 for m in wanted):
+        parts = [f.symbolic.get(m, {}) for m in wanted]
+        if any(len(part) != 1 for part in parts):
             continue
         scale = f.exact[first] / wanted[first]
         if any(f.exact[m] != scale * x for m, x in wanted.items()):
             continue
-        terms = {m: next(iter(f.symbolic[m].items())) for m in wanted}
-        names = [dict(powers) for powers, _ in terms.values()]
-        shared = tuple((n, -min(one.get(n, 0) for one in names)) for n in set().union(*names))
-        unit = min((abs(x) for _, x in terms.values()))
-        if any((x / unit).denominator > 1 for _, x in terms.values()):
-            unit = Fraction(1)
-        if sum(x < 0 for _, x in terms.values()) > len(terms) / 2:
-            unit = -unit
-        return {m: {times(powers, shared): x / unit} for m, (powers, x) in terms.items()}
+        names, factors = zip(*(item for part in parts for item in part.items()), strict=True)
+        shared = tuple((n, -min(dict(one).get(n, 0) for one in names)) for n in dict(sum(names, ())))
+        unit = min(map(abs, factors))
+        unit = Fraction(1) if any((x / unit).denominator > 1 for x in factors) else unit
+        unit = -unit if sum(x < 0 for x in factors) > len(factors) / 2 else unit
+        terms = zip(wanted, names, factors, strict=True)
+        return {m: {times(powers, shared): x / unit} for m, powers, x in terms}
     return {m: {ONE: x} for m, x in wanted.items()}
 
 
@@ -184,20 +183,6 @@ def sum_words(polynomial: Polynomial) -> str:
     from sympy import factor_terms
 
     return _written(factor_terms(expression(polynomial)))
-
-
-def ratio_words(above: Polynomial, below: Polynomial) -> str:
-    """Write one sum over another, common factors cancelled.
-
-    Examples
-    --------
-    >>> one, ka, kb = Fraction(1), (("ka", 1),), (("kb", 1),)
-    >>> ratio_words({(("ka", 1), ("kb", 1)): one}, {ka: one, kb: one})
-    'ka*kb/(ka + kb)'
-    """
-    import sympy
-
-    return _written(sympy.factor(sympy.cancel(expression(above) / expression(below))))
 
 
 def _written(words: Expression) -> str:

@@ -9,13 +9,13 @@ regression, and k ≥ 0. Any other function of parameters, such as exp(-a), is a
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence, Set
 from fractions import Fraction
 
 import numpy as np
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.identify.combinations import (
     CONSTANT,
     NAME,
@@ -66,7 +66,7 @@ def harmonic_model(
     ------
     ValueError
         For equations that cannot be read, are not linear in the signals or not rational in p and powers of
-        parameters, or follow from the others; parameters that do not occur, names given twice.
+        parameters; parameters that do not occur, names given twice.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def harmonic_model(
             raise ValueError(
                 f"the parameter {name} cancels out of the equations: nothing can be said about it"
             )
-        near = difflib.get_close_matches(name, others, 1, 0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+        raise ValueError(
+            f"the parameter {name} is to be estimated but stands in no equation{did_you_mean(name, others)}"
+        )
     parameters = (*(name for name in estimate if name in occurs), *functions)
     chosen = tuple(inputs) if inputs is not None else tuple(n for n in signals if n not in left)
     if strange := [name for name in chosen if name not in signals]:
@@ -123,9 +123,7 @@ def harmonic_model(
     if not outputs:
         raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
     ordered = tuple(name for name in others if name in changing)
-    model = HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
-    _check_independent(model)
-    return model
+    return HarmonicModel(texts, parameters, numbers, signals, chosen, outputs, tuple(features), ordered)
 
 
 def multiplied_out(
@@ -139,15 +137,9 @@ def multiplied_out(
         With the reason, for whatever is not rational in other names than those to estimate, and for
         expansions that are too long.
     """
-    from sympy import QQ, Add, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
+    from sympy import QQ, Dummy, Function, Pow, Symbol, fraction, nan, oo, ring, together, zoo
 
-    def of_known(part: Expression) -> bool:
-        plain = part.is_Function or (part.is_Pow and not (part.exp.is_Integer and part.exp > 0))
-        alone = part.is_Pow and part.base.is_Symbol and part.exp.is_Integer
-        return plain and not alone and all(s.name in known for s in part.free_symbols)
-
-    whole = expression.replace(of_known, lambda part: _number(part, known))
-    whole = _functions_as_unknowns(whole, {*known, *estimate})
+    whole = _without_functions(expression, known, estimate)
     powers, roots = [e for e in whole.atoms(Pow) if e.exp.is_Rational], dict[str, int]()
     for name in estimate:
         x = Symbol(name)
@@ -160,9 +152,8 @@ def multiplied_out(
             "signals, nor a function of parameters"
         )
     top, bottom = fraction(together(whole))
-    factors = bottom.as_powers_dict().items()
-    if math.prod(len(Add.make_args(base)) ** int(n) for base, n in factors) > MAX_TERMS:
-        raise ValueError("it expands to too many terms")
+    if max(_terms(top), _terms(bottom)) > MAX_TERMS:
+        raise ValueError(f"multiplied out, it has more than {MAX_TERMS} terms")
     symbols = sorted(top.free_symbols | bottom.free_symbols, key=str)
     R = ring(symbols, QQ)[0]
 
@@ -186,22 +177,42 @@ def multiplied_out(
     return {times(m, shift): x / scale for m, x in terms(top).items()}, left
 
 
-def _functions_as_unknowns(whole: Expression, names: set[str]) -> Expression:
-    """Functions of these names as symbols of their text, but for fractional powers of products."""
+def _terms(part: Expression) -> int:
+    """Bound for the number of terms of a polynomial when it is multiplied out."""
+    if part.is_Pow:
+        n = int(part.exp)
+        return math.comb(_terms(part.base) + n - 1, n)
+    each = map(_terms, part.args)
+    return sum(each) if part.is_Add else math.prod(each)
+
+
+def _without_functions(
+    whole: Expression, known: Mapping[str, Fraction], estimate: Sequence[str]
+) -> Expression:
+    """Functions of known names as numbers, those of parameters as symbols of their text, but for roots."""
     from sympy import Symbol
 
-    inside = set(names)
+    inside = {*known, *estimate}
+
+    def numbers(part: Expression) -> bool:
+        return all(s.name in known for s in part.free_symbols)
 
     def function(part: Expression) -> bool:
-        power = part.is_Pow and not part.exp.is_Integer
-        plain = power and part.exp.is_Rational and not part.base.is_Add
-        return (part.is_Function or (power and not plain)) and {s.name for s in part.free_symbols} <= inside
+        if not part.is_Pow or numbers(part):
+            plain = part.is_Pow and part.exp.is_Integer and (part.exp > 0 or part.base.is_Symbol)
+        else:  # a fractional power of a product
+            plain = part.exp.is_Rational and (part.exp.is_Integer or not part.base.is_Add)
+        return (
+            (part.is_Function or part.is_Pow) and not plain and {s.name for s in part.free_symbols} <= inside
+        )
 
-    def as_unknown(part: Expression) -> Expression:
+    def replaced(part: Expression) -> Expression:
+        if numbers(part):
+            return _number(part, known)
         inside.add(str(part))  # which may stand in another
         return Symbol(str(part))
 
-    return whole.replace(function, as_unknown)
+    return whole.replace(function, replaced)
 
 
 def _number(part: Expression, known: Mapping[str, Fraction]) -> Expression:
@@ -272,20 +283,6 @@ def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
             raise ValueError(f"the parameter {name} is named twice")
         if name in known:
             raise ValueError(f"{name} is both known and to be estimated")
-
-
-def _check_independent(model: HarmonicModel) -> None:
-    """Raise ValueError for an equation that follows from those before it: its rows would count twice."""
-    rng = np.random.default_rng(1)
-    varying = {name: rng.uniform(0.5, 2.0, 1) for name in model.varying}
-    A = model.matrices(rng.uniform(0.5, 2.0, len(model.parameters)), rng.uniform(0.5, 2.0, 1), varying)[0]
-    A = A / np.linalg.norm(A, axis=1, keepdims=True)
-    for i in range(1, len(A)):
-        if np.linalg.matrix_rank(A[: i + 1], 1e-12) <= i:
-            raise ValueError(
-                f"equation {i + 1} follows from those before it and tells nothing new: leave it out, or its "
-                "rows would count twice"
-            )
 
 
 def _finite(name: str, value: float) -> float:

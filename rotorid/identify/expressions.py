@@ -20,8 +20,6 @@ FUNCTIONS = (
 """Functions of one argument that expressions may use; their names are no names of a model."""
 
 MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT = 10_000, 100, 50
-MAX_TERMS = 20_000
-"""Of an expression multiplied out."""
 MAX_BITS = 60_000
 """Of all numbers of an expression together; exact arithmetic with more of them would take forever."""
 LARGEST = 1e300
@@ -154,11 +152,10 @@ class _Token(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """A part of an expression: bounds of the size of its numbers, and of its terms when multiplied out."""
+    """A part of an expression, and a bound for the size of its numbers."""
 
     expr: Any
     bits: int = 1
-    terms: int = 1
 
     @property
     def number(self) -> Fraction | None:
@@ -217,34 +214,26 @@ class _Parser:
     def sum(self) -> _Node:
         import sympy
 
-        return self.chain(self.product, ("+", "-"), sympy.Add, sum)
+        return self.chain(self.product, ("+", "-"), sympy.Add)
 
     def product(self) -> _Node:
         import sympy
 
-        return self.chain(self.unary, ("*", "/"), sympy.Mul, math.prod)
+        return self.chain(self.unary, ("*", "/"), sympy.Mul)
 
-    def chain(
-        self,
-        operand: Callable[[], _Node],
-        signs: tuple[str, str],
-        join: Callable[..., Any],
-        count: Callable[..., int],
-    ) -> _Node:
+    def chain(self, operand: Callable[[], _Node], signs: tuple[str, str], join: Callable[..., Any]) -> _Node:
         nodes, at = [operand()], self.next.at
         while self.next.text in signs:
             sign, node = self.take(), operand()
             if sign.text == "/" and node.number == 0:  # such as x/(y - y)
                 raise self.error(sign.at, "division by zero")
-            if sign.text == "-":
-                node = node._replace(expr=-node.expr)
-            if sign.text == "/":  # a denominator is never multiplied out
-                node = node._replace(expr=1 / node.expr, terms=1)
+            if sign.text in "-/":
+                node = node._replace(expr=-node.expr if sign.text == "-" else 1 / node.expr)
             nodes.append(node)
         if len(nodes) == 1:
             return nodes[0]
-        exprs, bits, terms = zip(*nodes, strict=True)
-        return self.node(at, lambda: join(*exprs), sum(bits), count(terms))
+        exprs, bits = zip(*nodes, strict=True)
+        return self.node(at, lambda: join(*exprs), sum(bits))
 
     def unary(self) -> _Node:
         if self.next.text not in ("+", "-"):
@@ -261,21 +250,15 @@ class _Parser:
             return base
         sign = self.take()
         exponent = self.deeper(sign, self.unary)
-        x, n, whole, terms = base.number, exponent.number, 1, 1
-        if n is not None:
-            if abs(n) > MAX_EXPONENT:
-                raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
-            whole = max(1, math.ceil(abs(n)))
-            if x == 0 and n < 0:
-                raise self.error(sign.at, "division by zero")
-            if n.denominator == 1:
-                terms = math.comb(base.terms + whole - 1, whole) if n > 0 else 1
-            elif x is not None:
-                if x < 0:
-                    raise self.error(sign.at, "a fractional power of a negative number is no real number")
-                return self.real(lambda: math.pow(x, n), sign.at, "this power")
-        bits = base.bits * whole + exponent.bits
-        return self.node(sign.at, lambda: sympy.Pow(base.expr, exponent.expr), bits, terms)
+        x, n = base.number, exponent.number
+        if n is not None and abs(n) > MAX_EXPONENT:
+            raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
+        if x == 0 and n is not None and n < 0:
+            raise self.error(sign.at, "division by zero")
+        if x is not None and n is not None and n.denominator > 1:
+            return self.real(lambda: math.pow(x, n), sign.at, "this power")
+        bits = base.bits * (1 if n is None else max(1, math.ceil(abs(n)))) + exponent.bits
+        return self.node(sign.at, lambda: sympy.Pow(base.expr, exponent.expr), bits)
 
     def atom(self) -> _Node:
         import sympy
@@ -339,7 +322,7 @@ class _Parser:
         called = getattr(sympy, "Abs" if name == "abs" else name)
         # unevaluated: sympy's simplifications may search for long
         options = {} if name == "sqrt" else {"evaluate": False}
-        return self.node(at, lambda: called(argument.expr, **options), argument.bits, 1)
+        return self.node(at, lambda: called(argument.expr, **options), argument.bits)
 
     def real(self, compute: Callable[[], float], at: int, what: str) -> _Node:
         try:
@@ -358,13 +341,11 @@ class _Parser:
         bits = number.numerator.bit_length() + number.denominator.bit_length()
         return _Node(sympy.Rational(number.numerator, number.denominator), bits)
 
-    def node(self, at: int, build: Callable[[], Any], bits: int, terms: int) -> _Node:
+    def node(self, at: int, build: Callable[[], Any], bits: int) -> _Node:
         """What is built once its size is known to be allowed."""
-        if terms > MAX_TERMS:
-            raise self.error(at, f"multiplied out, this has more than {MAX_TERMS} terms; write it in parts")
         if bits > MAX_BITS:
             raise self.error(at, "this expression is too large; write it in parts or with smaller powers")
-        node = _Node(build(), bits, terms)
+        node = _Node(build(), bits)
         return node if node.number is None else self.constant(node.number, at)
 
     def deeper(self, token: _Token, inner: Callable[[], _Node]) -> _Node:

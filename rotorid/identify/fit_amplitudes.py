@@ -25,7 +25,7 @@ from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, only_determined, why_several
-from rotorid.identify.linear_start import SAME, LinearFit, linear_fit, passive_elements, several
+from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
@@ -45,7 +45,6 @@ WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
-KINDS = ("spring", "damper", "mass")
 OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
 """A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
@@ -85,11 +84,10 @@ def identify(
     """
     how: dict[str, Any] = {"bounds": bounds or {}, "loss": loss, "prior": prior or {}, "ridge": ridge}
     _check(model, experiments, start or {}, **how)
-    data, copies = experiments.without_copies()
-    answer = _identified(model, data, start or {}, how)
-    if data.rounding and not data.stated and answer.predicted and len(answer.solutions) == 1:
+    answer = _identified(model, experiments, start or {}, how)
+    if experiments.rounding and not experiments.stated and answer.predicted and len(answer.solutions) == 1:
         answer = _by_digits(answer, how)
-    return replace(_finished(answer, how["bounds"]), left_out=(*copies, *answer.left_out))
+    return _finished(answer, how["bounds"])
 
 
 def _check(
@@ -135,13 +133,14 @@ def _identified(
     """By output error, or linear regression alone where the model cannot predict."""
     linear, problem, fits = None, ValueError(), list[OutputError]()
     try:
-        linear = linear_fit(model, data)
+        rows = build_rows(model, data)
     except ValueError as error:  # an amplitude that it needs is missing
         problem = error
-    nowhere = {name: np.isnan(data.table([name])).all() for name in model.signals}
+    else:
+        linear = linear_fit(model, rows)
     predicts = len(model.outputs) == len(model.equations)
-    without = all(nowhere[name] for name in model.outputs) or any(nowhere[name] for name in model.inputs)
-    if linear is None and (not predicts or without):
+    hidden = {name for name in model.signals if np.isnan(data.table([name])).all()}
+    if linear is None and (not predicts or hidden.intersection(model.inputs) or hidden >= {*model.outputs}):
         raise problem
     solutions = linear.recovery.solutions if linear else ()
     if predicts:
@@ -269,7 +268,6 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
         spread = np.sqrt(np.diag(covariance).clip(0))
         covariance = recovery.gain @ covariance @ recovery.gain.T
         covariance[np.isnan(values)[:, None] | np.isnan(values)] = np.nan
-    notes = [f"{listing(model.varying, 'and')}: from the measurements, row by row"] * bool(model.varying)
     return Identification(
         model=model,
         experiments=data,
@@ -284,9 +282,9 @@ def _by_regression(model: HarmonicModel, data: Experiments, linear: LinearFit) -
         ),
         theta=recovery.solutions[0] if recovery.solutions else values,
         unidentifiable=linear.reasons if np.isnan(values).any() else (),
-        left_out=linear.left_out,
-        notes=(*notes, "the model predicts no amplitudes: linear regression, which noisy readings bias"),
-        normal_matrix=normal_matrix(linear.estimate.names, linear.K),
+        left_out=linear.rows.left_out,
+        notes=("the model predicts no amplitudes: linear regression, which noisy readings bias",),
+        normal_matrix=normal_matrix(linear.estimate.names, linear.rows.K),
     )
 
 
@@ -333,12 +331,12 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
         for name in model.parameters
         if not name.isidentifier()
     ]
-    if answer.linear and answer.solutions and not answer.linear.recovery.solutions:
+    if answer.linear and answer.solutions and not answer.linear.recovery.sure:
         words.append("the parameters were found by a search; there may be more solutions than shown")
     words += answer.warnings
     if answer.converged:
         high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])
-        words += negative(model, float(data.frequencies.max()), answer.values, high, bounds)
+        words += _negative(model, float(data.frequencies.max()), answer.values, high, bounds)
     return replace(answer, warnings=(*words, *(answer.prior.warnings if answer.prior else ())))
 
 
@@ -395,28 +393,22 @@ def unexplained(estimate: Estimate, *, stated: bool) -> list[str]:
     ]
 
 
-def negative(
+def _negative(
     model: HarmonicModel, highest: float, values: FloatArray, high: FloatArray, bounds: Bounds
 ) -> list[str]:
-    """Masses, dampers and springs that are negative beyond the upper end of their interval (n,).
+    """Masses, dampers and springs whose forces are negative up to the end of their interval (n,).
 
-    Unless bounds say that it may be so; `highest` is the highest frequency of the data, rad/s.
+    But those that bounds allow; `highest` is the highest frequency of the data, rad/s.
     """
     kinds = passive_elements(model)
-    kind = np.array([kinds.get(name, -1) for name in model.parameters])
-    force = np.where(kind < 0, 0.0, np.abs(values) * highest**kind)
+    power = np.array([kinds.get(name, -1) for name in model.parameters])
+    force = np.nan_to_num(np.where(power < 0, 0.0, np.abs(values) * highest**power))
     lowest = [bounds.get(name, (0.0, None))[0] for name in model.parameters]
-    allowed = np.array([low is None or low < 0 for low in lowest])
-    known = (kind >= 0) & np.isfinite(values)
-    wrong = known & (high < 0) & (force > 1e-9 * np.nan_to_num(force).max()) & ~allowed
-    if not wrong.any():
+    each = zip(model.parameters, values, (high < 0) & (force > 1e-9 * force.max()), lowest, strict=True)
+    wrong = [f"{name} = {x:.6g}" for name, x, below, low in each if below and low is not None and low >= 0]
+    if not wrong:
         return []
-    why = "a sign, a unit or the model may be wrong"
-    if len({*kind[wrong]}) > 1 and (wrong == known).all():
-        why = "does a force or a reading have the other sign?"
-    elif (wrong == known & (kind == 1)).all():
-        why = "are the phases counted the other way (lag, not lead)?"
-    listed = ", ".join(f"{model.parameters[j]} = {values[j]:.6g}" for j in np.flatnonzero(wrong))
-    what = " or ".join(dict.fromkeys(KINDS[k] for k in kind[wrong]))
-    verb = "is" if np.count_nonzero(wrong) == 1 else "are"
-    return [f"{listed} {verb} negative, which no passive {what} is: {why}"]
+    return [
+        f"{listing(wrong, 'and')} negative, which no passive spring, damper or mass is: a sign (of a force, "
+        "or of phases: lead, not lag), a unit or the model may be wrong"
+    ]

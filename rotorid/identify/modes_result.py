@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from balancing import Labels
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
@@ -29,6 +29,8 @@ LARGEST = 10.0
 """No relative error of a shape is larger: amplitudes that are 0 within it count as that share of it."""
 RARE, EXACT = 1e-3, 1e-3
 """Probability below which chance explains nothing; a share of a shape that nobody minds."""
+ALONE = 30.0
+"""Half-widths of a mode beyond which all readings but one tell nothing of its peak."""
 ASIDE = 4.0
 """Standard deviations across the phase of its mode beyond which a probe may stand 90° apart."""
 
@@ -178,12 +180,9 @@ class FittedModes:
         left = max(float(estimate.residuals @ estimate.residuals), 1e-300)
         return 1.0 if estimate.errors_stated else left / estimate.dof if estimate.dof > 0 else np.nan
 
-    def _linear(
-        self, q: FloatArray, rows: BoolArray | slice = slice(None)
-    ) -> tuple[ComplexArray, FloatArray]:
-        """R, a and b (C, k + 2), and their covariances but for `unit`, by some of the readings."""
-        columns, slopes = self.answers.basis(q)
-        return projected((columns[rows], slopes[rows]), self.readings.vectors[rows], self.root[rows])[2:]
+    def _linear(self, q: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """R, a and b (C, k + 2), and their covariances but for `unit`."""
+        return projected(self.answers.basis(q), self.readings.vectors, self.root)[2:]
 
     def curve(self, omega: FloatArray) -> ComplexArray:
         """The fitted amplitudes at frequencies between the readings, (m,): (m, P)."""
@@ -208,16 +207,16 @@ class FittedModes:
         linear = np.einsum("miaj,pajbk,mnbk->mpin", rows, self._linear(q)[1], rows)
         return sums(q), by_q @ of_q @ np.swapaxes(by_q, -1, -2) + self.unit * linear
 
-    def _residues(self, rows: BoolArray | slice = slice(None)) -> tuple[ComplexArray, FloatArray]:
-        """R (k, P), and covariances of their parts but for `unit`, (k, P, 2, 2), by some of the readings."""
-        linear, spread = self._linear(self.fit.estimate.solution, rows)
+    def _residues(self) -> tuple[ComplexArray, FloatArray]:
+        """R (k, P), and covariances of their parts but for `unit`, (k, P, 2, 2)."""
+        linear, spread = self._linear(self.fit.estimate.solution)
         return linear.T[:-2], np.einsum("piaib->ipab", spread)[:-2]
 
-    def by_noise(self, rows: BoolArray | slice = slice(None)) -> FloatArray:
-        """Bound for the probability that noise alone makes each mode, (k,), by some of the readings."""
+    def by_noise(self) -> FloatArray:
+        """Bound for the probability that noise alone makes each mode, (k,)."""
         from scipy.special import chdtrc
 
-        residues, spread = self._residues(rows)
+        residues, spread = self._residues()
         parts = np.stack((residues.real, residues.imag), axis=-1)
         size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
         return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * parts.shape[1] + 2, size))
@@ -226,55 +225,42 @@ class FittedModes:
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words: at most one clause a mode."""
         words, by_noise = [] if self.fit.converged else [self.fit.message], self.by_noise()
-        speeds, vectors = self.readings.speeds, self.readings.vectors
+        speeds = self.readings.speeds
         known = self.fit.std is not None
         for mode, ((low, high), values) in enumerate(zip(self.ends, self.values.T, strict=True)):
             omega, zeta, error, other = values
-            name = f"mode {mode + 1} ({self.readings.words(omega)})"
             near = speeds[(3 * low - 2 * high <= speeds) & (speeds <= 3 * high - 2 * low)]
-            rest = speeds != speeds[np.abs(speeds - omega).argmin()]
-            alone = min((~np.isnan(vectors[rest])).sum(axis=0)) >= len(self.ends) + 2
-            doubts = (
-                (by_noise[mode] > RARE, f"{name} is no more than noise: say in --bands where modes are"),
-                (
-                    known and not 2 * error < high - low,
-                    f"these readings do not tell frequency and damping of mode {mode + 1}",
-                ),
-                (
-                    alone and self.by_noise(rest)[mode] > RARE,
+            name = f"mode {mode + 1} ({self.readings.words(omega)})"
+            if by_noise[mode] > RARE:
+                words.append(f"{name} is no more than noise: say in --bands where modes are")
+            elif np.unique(np.abs(speeds - omega))[1] > ALONE * abs(zeta) * omega:
+                words.append(
                     f"{name} stands on one frequency, perhaps a wild reading: measure closer by, or say in "
-                    "--bands where modes are",
-                ),
-                # in a fast sweep it stands beside its peak
-                (not near.min() < omega < near.max(), f"{name} is read on one side only"),
-                (
-                    zeta + 2 * np.nan_to_num(other) < 0,
-                    f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads",
-                ),
-            )
-            words += [text for doubtful, text in doubts if doubtful][:1]
+                    "--bands where modes are"
+                )
+            elif known and not 2 * error < high - low:
+                words.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
+            elif not near.min() < omega < near.max():  # in a fast sweep it stands beside its peak
+                words.append(f"{name} is read on one side only")
+            elif zeta + 2 * np.nan_to_num(other) < 0:
+                words.append(f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads")
         return tuple(words)
 
     @cached_property
     def _misfit(self) -> tuple[str, ...]:
-        """Why what is left is more than errors."""
+        """Why what is left is more than errors: its size, where these are stated, else its course."""
         from scipy.special import ndtr
 
         estimate = self.fit.estimate
         words = [why] if (why := estimate.misfit()) else []
-        Z = np.nan_to_num(self.readings.vectors)
-        gap = np.where(Z == 0, 0, Z - self.curve(self.readings.speeds))
-        left = (self.root @ np.stack((gap.real, gap.imag), -1)[..., None])[..., 0]
-        size = np.where(np.abs(gap) > 1e-9 * np.abs(Z).max(), np.linalg.norm(left, axis=-1), 0.0)
-        i, p = np.unravel_index(size.argmax(), size.shape)
-        if (estimate.dof + 1) * np.exp(-(size[i, p] ** 2) / self.unit / 2) < RARE:
-            words.append(
-                f"{self.readings.sensors[p]} at {self.readings.words(float(self.readings.speeds[i]))} is "
-                f"{size[i, p] / self.unit**0.5:.2g} standard deviations off: a wild reading"
-            )
-        trend = (left[:-1] * left[1:]).sum() / (left**2).sum() * np.sqrt(left.size)
-        if not estimate.errors_stated and ndtr(-trend) < RARE:
-            words.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
+        if not estimate.errors_stated:
+            gap = np.nan_to_num(self.readings.vectors - self.curve(self.readings.speeds))
+            left = self.root @ np.stack((gap.real, gap.imag), -1)[..., None]
+            trend = (left[:-1] * left[1:]).sum() / max((left**2).sum(), 1e-300) * np.sqrt(gap.size)
+            if (np.abs(gap) > 1e-9 * np.nanmax(np.abs(self.readings.vectors))).any() and ndtr(-trend) < RARE:
+                words.append(
+                    "what is left of the amplitudes is no noise: it changes slowly with the frequency"
+                )
         return tuple(f"{why}; or another mode is in the range (--bands)" for why in words)
 
     @property
@@ -288,8 +274,6 @@ class FittedModes:
 
         Probes 90° apart read a mode that whirls a quarter turn after each other: such residues are turned.
         """
-        from scipy.special import chdtrc
-
         residues, spread = self._residues()
         points, modes, spread = np.array(self.readings.sensors), np.arange(len(residues)), self.unit * spread
         trace, size = np.trace(spread, axis1=2, axis2=3), np.abs(residues)
@@ -298,16 +282,15 @@ class FittedModes:
         aside = np.abs(beside.imag) > np.fmax(np.abs(beside.real), ASIDE * np.sqrt(trace))
         way = np.where(aside, 1j, 1.0)
         way = way * np.exp(-0.5j * np.angle(((way * residues) ** 2 / trace).sum(axis=1)))[:, None]
-        parts, turn = way * residues, real_matrices(way)
-        along, across = np.moveaxis(np.einsum("kpai,kpij,kpaj->kpa", turn, spread, turn), -1, 0)
+        parts, turn = way * residues, real_matrices(way)[:, :, 0]
+        along = np.einsum("kpi,kpij,kpj->kp", turn, spread, turn)
         shape = np.copysign(np.fmax(np.abs(parts.real), np.sqrt(along) / LARGEST), parts.real)
         std = np.sqrt(along) / np.abs(shape)
         lost = (parts.imag**2).sum(axis=1) / (shape**2).sum(axis=1)  # of the real parts, of second order
-        chance = chdtrc(max(len(points) - 1, 1), (parts.imag**2 / across).sum(axis=1))
-        bent = (chance < RARE) & (lost > np.maximum(EXACT, np.median(std, axis=1) / 2))
+        bent = lost > np.maximum(EXACT, np.median(std, axis=1) / 2)
         warnings = (
-            f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°, more than "
-            "errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
+            f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°; its real "
+            "shape is not exact (heavy damping, or another mode beside it)"
             for mode in modes[bent]
         )
         notes = (
@@ -331,7 +314,7 @@ class FittedModes:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
-        return (*self.undetermined, *self._misfit, *self._shapes[2])
+        return (*self.undetermined, *self._misfit, *(() if self.undetermined else self._shapes[2]))
 
     @property
     def notes(self) -> tuple[str, ...]:

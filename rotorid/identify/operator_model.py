@@ -171,21 +171,18 @@ class HarmonicModel:
             If there are not as many outputs as equations.
         """
         self.check_square()
-        table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
-        for j, name in enumerate(self.inputs):
-            table[:, j] = inputs[name]
-        amplitudes, _ = self.forced(values, frequencies, table, False, varying)
-        return dict(zip(self.outputs, amplitudes.T, strict=True))
+        size = np.ones(len(frequencies), dtype=complex)
+        table = np.array([inputs[name] * size for name in self.inputs]).reshape(-1, len(size)).T
+        return dict(zip(self.outputs, self.forced(values, frequencies, table, varying)[0].T, strict=True))
 
     def forced(
         self,
         values: FloatArray,
         frequencies: FloatArray,
         inputs: ComplexArray,
-        slopes: bool = True,
         varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
-        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters), if asked for.
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters).
 
         Parameters
         ----------
@@ -195,8 +192,6 @@ class HarmonicModel:
             ω, shape (n,).
         inputs
             Amplitudes of the inputs, (n, inputs).
-        slopes
-            False: without derivatives (an empty array).
         varying
             Known quantities (n,) that change from row to row, by name.
 
@@ -207,16 +202,12 @@ class HarmonicModel:
         """
         e, (P, dP) = len(self.outputs), self.polynomials(values)
         multipliers = self.multipliers(frequencies, varying)
-        whole = np.tensordot(multipliers * P, self._place, 1)
+        A, B = np.split(np.tensordot(multipliers * P, self._place, 1), [e], axis=2)
         given = np.column_stack((inputs, np.ones(len(multipliers))))
-        A = whole[:, :, :e]
-        Z = np.asarray(np.linalg.solve(A, -(whole[:, :, e:] @ given[:, :, None]))[:, :, 0])
-        if not slopes:
-            return Z, np.zeros((*Z.shape, 0), dtype=complex)
+        Z = np.linalg.solve(A, -(B @ given[:, :, None]))[:, :, 0]
         load = multipliers * np.column_stack((Z, given))[:, self.column]
-        rows = [self.equation == i for i in range(e)]
-        G = -np.stack([load[:, f] @ dP[f] for f in rows], axis=1)
-        return Z, np.asarray(np.linalg.solve(A, G))
+        G = (load[:, None] * np.eye(e)[self.equation].T) @ dP
+        return np.asarray(Z), np.asarray(np.linalg.solve(A, -G))
 
     def dynamic_stiffness(
         self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None

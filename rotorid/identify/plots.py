@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.plots import draw_polar, right_angles
+from fem.plots import right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     COLORS,
@@ -19,15 +19,12 @@ from rotorid.base.plot_style import (
     legend_below,
     look,
     new_figure,
-    on_figure,
     plain,
-    plain_numbers,
     rad_s_above,
 )
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import SPEEDS, Shown
-from rotorid.identify.amplitudes import compare, real_matrices
-from rotorid.regression.interval_plot import ROOM, draw_intervals
+from rotorid.identify.amplitudes import real_matrices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,8 +35,6 @@ if TYPE_CHECKING:
 
 POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4
 """Of a curve; most curves of a sweep, outputs in a legend, modes."""
-WIDE = 10.0
-"""Ratio of amplitudes above which their scale is logarithmic."""
 HIDDEN = 3.0
 """Standard deviations below which a vector has no phase to draw."""
 MODEL_UNIT = Shown("model unit")
@@ -47,20 +42,17 @@ MODEL_UNIT = Shown("model unit")
 
 
 def figure_identification(result: Identification) -> Figure:
-    """All about an identification: amplitudes and phases (or shapes), parameters."""
+    """Amplitudes and phases, or shapes, measured and predicted."""
     units = {name: result.experiments.units.get(name, MODEL_UNIT) for name in result.model.outputs}
-    free, intervals = bool(result.experiments.free.all()), _intervals(result)
+    free = bool(result.experiments.free.all())
     heights = [3.4] if free else [*[2.4] * len({*units.values()}), 1.6]
-    parts = 0.9 + sum(heights), ROOM[0] + ROOM[1] * len(intervals)
-    figure = new_figure(sum(parts))
-    above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
-    axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    figure = new_figure(0.9 + sum(heights))
+    axes = [*figure.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]]
     words = _shapes(result, axes[0], units) if free else _forced(result, axes, units)
     for ax in axes:
         plain(ax)
     figure.align_ylabels(axes)
-    legend_below(above, axes, 2 if free else 4, title=f"points: measured{words}")
-    draw_intervals(below.subplots(), intervals)
+    legend_below(figure, axes, 2 if free else 4, title=f"points: measured{words}")
     return figure
 
 
@@ -82,12 +74,7 @@ def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Sh
             phases.plot(x, _degrees(curves[name]), **line)
         ax.set_ylabel(f"amplitude, {unit.word}")
     for ax in by_unit.values():
-        low, high = ax.dataLim.minposy, ax.dataLim.y1
-        if high > WIDE * low:
-            ax.set_yscale("log")
-            plain_numbers(ax)
-        else:
-            ax.set_ylim(bottom=0.0)
+        ax.set_ylim(bottom=0.0)
     phases.set(xlabel=data.axis.word, ylabel="phase lead, °", ylim=(-205, 205), yticks=range(-180, 181, 90))
     lost = "; free vibrations not drawn" if data.free.any() else ""
     return f"{' ± 2σ' if data.stated else ''}; lines: model{lost}"
@@ -96,15 +83,12 @@ def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Sh
 def _shapes(result: Identification, axes: Axes, units: Mapping[str, Shown]) -> str:
     """Measured and fitted mode shapes, one line per natural frequency."""
     data, outputs = result.experiments, result.model.outputs
-    table = data.table(outputs).real
-    fitted, natural = np.full(table.shape, np.nan), np.full(len(table), np.nan)
-    if result.predicted and np.isfinite(result.values).all():
-        fitted, natural = compare(result.model, data).predict(result.values)
-    for i, (w, other) in enumerate(data.axis.scale * np.transpose((data.frequencies, natural))):
-        label = f"{w:.5g} {data.axis.word.rpartition(', ')[2]}"
-        label += f" (model {other:.5g})" if np.isfinite(other) else ""
-        axes.plot(table[i], zorder=3, label=label if i < NAMES else "", **_mark(i))
-        axes.plot(fitted[i].real, lw=1.4, **look(i))
+    fitted = [[*amplitudes.real] for amplitudes in np.transpose([*result.predicted.values()])]
+    for i, (w, shape) in enumerate(zip(data.frequencies, data.table(outputs).real, strict=True)):
+        label = f"{data.axis.scale * w:.5g} {data.axis.word.rpartition(', ')[2]}"
+        axes.plot(shape, zorder=3, label=label if i < NAMES else "", **_mark(i))
+        if fitted:
+            axes.plot(fitted[i], lw=1.4, **look(i))
     axes.axhline(0.0, color=QUIET, lw=0.8)
     axes.set_xticks(range(len(outputs)), outputs)
     axes.set_ylabel(f"shape, {' or '.join({unit.word: '' for unit in units.values()})}")
@@ -116,21 +100,8 @@ def _degrees(z: ComplexArray) -> FloatArray:
 
 
 def _mark(j: int) -> dict[str, Any]:
-    """Points; every other one is open and larger, so that equal ones are seen."""
-    face = {"mfc": "none", "ms": 9} if j % 2 else {"mec": "white", "ms": 7}
-    return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], **face}
-
-
-def _intervals(result: Identification) -> list[tuple[str, float, float, str]]:
-    """Parameters with the half width of their 95 % intervals, and combinations where they say more."""
-    factor, lines = result.coverage_factor or np.nan, []
-    std = np.full(len(result.parameters), np.nan) if result.std is None else result.std
-    for name, value, sigma in zip(result.parameters, result.values.tolist(), std.tolist(), strict=True):
-        several = len({solution[name] for solution in result.solutions}) > 1
-        words = "no interval" if np.isfinite(value) else "several values" if several else "not determined"
-        lines.append((name, value, factor * sigma, words))
-    more = () if np.isfinite(result.values).all() else result.combinations
-    return [*lines, *((c.words, c.value, factor * (c.std or np.nan), "no interval") for c in more)]
+    """Points, open, so that equal ones are seen."""
+    return {"ls": "", "marker": MARKERS[j % len(MARKERS)], "color": look(j)["color"], "mfc": "none", "ms": 6}
 
 
 def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArray]]:
@@ -158,11 +129,7 @@ def figure_modes(modes: FittedModes) -> Figure:
         rows, grid = (data.speeds >= low) & (data.speeds <= high), np.linspace(low, high, POINTS)
         fits, w = size * modes.curve(grid), scale * data.speeds[rows]
         for p, name in enumerate(data.sensors[:CURVES]):
-            read, fit, mark = (
-                size * data.vectors[rows, p],
-                fits[:, p],
-                {**_mark(p), "mfc": "none", "mec": None, "ms": 5},
-            )
+            read, fit, mark = size * data.vectors[rows, p], fits[:, p], _mark(p)
             circle.plot(fit.real, fit.imag, **look(p))
             circle.plot(read.real, read.imag, label=name, **mark)
             peak.plot(scale * grid, np.abs(fit), **look(p))
@@ -214,21 +181,6 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
     title = f"less the slow roll; at most {CURVES} curves" + (f"; critical: {words} rpm" if words else "")
     legend_below(figure, (above,), 3, title=title)
     return figure
-
-
-def polar_plot(sweeps: Sequence[Readings], roll: ComplexArray) -> Figure:
-    """Paths of the vectors less the slow roll (C,), with speeds marked."""
-    every, nothing = np.unique(np.concatenate([s.speeds for s in sweeps])), complex(np.nan, np.nan)
-    labels, curves = sweeps[0].labels, _curves(sweeps)
-    paths = [np.interp(every, omega, read - roll[c], nothing, nothing) for _, c, _, omega, read in curves]
-    unit, marks = Shown(_unit(sweeps[0]), labels.vibration_scale), max(3, 16 // len(curves))
-
-    def draw(ax: Axes) -> None:
-        names, lag = [name for _, _, name, *_ in curves], labels.phase == "lag"
-        draw_polar(every, np.transpose(paths), names, ax, marks=marks, unit=unit, lag=lag)
-        ax.set_title(f"{ax.get_title()}\nless the slow roll; at most {CURVES} curves", fontsize=TEXT)
-
-    return on_figure(draw, height=7.4, projection="polar")
 
 
 def _unit(readings: Readings) -> str:

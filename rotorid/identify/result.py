@@ -117,8 +117,8 @@ class Identification(Answered, Uncertain):
                 left = (measured - np.transpose([*self.predicted.values()])) / np.abs(measured)
             left[~np.isfinite(left)] = np.nan
         else:
-            parts = np.full(self.linear.used.shape, np.nan)
-            parts[self.linear.used] = self.linear.estimate.residuals
+            parts = np.full(self.linear.rows.used.shape, np.nan)
+            parts[self.linear.rows.used] = self.linear.estimate.residuals
             left = parts[:, ::2] + 1j * parts[:, 1::2]
             rows_of = [f"equation {e + 1}" for e in range(left.shape[1])]
         n, e = left.shape

@@ -36,7 +36,7 @@ def _(model: HarmonicModel) -> Equations:
     words = model.combinations.words
     none = np.zeros((0, len(words)))
     title = f"K θ = Y, [S] (9), at p = iω: {counted(len(words), 'unknown')}"
-    rows = _rows_in_symbols(model, None, [0.0] * len(words))
+    rows = _rows_in_symbols(model, None)
     return Equations(title, rows, ("K", "θ", "Y"), (), words, none, none[:, 0], none[:, 0])
 
 
@@ -51,19 +51,16 @@ def _(found: Identification) -> Equations:
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
-    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.used)]
-    notes = [
-        f"{model.combinations.words[i]} = 1: the others are relative to it" for i in fit.fixed.nonzero()[0]
-    ]
-    notes += [_START] if found.method == "output-error" else []
-    rows, solved = _rows_in_symbols(model, tests, fit.fixed.tolist()), fit.estimate
+    labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
+    notes = [_START] if found.method == "output-error" else []
+    rows, solved = _rows_in_symbols(model, tests), fit.estimate
     title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(solved.names), 'unknown')}"
     names = "K", "θ", "Y"
-    return Equations(title, rows, names, labels, solved.names, fit.K, fit.Y, solved.values, notes)
+    return Equations(title, rows, names, labels, solved.names, fit.rows.K, fit.rows.Y, solved.values, notes)
 
 
-def _rows_in_symbols(model: HarmonicModel, tests: Experiments | None, ones: list[float]) -> list[Row]:
-    """Parts of each equation; amplitudes that are real in all tests are one symbol, unknowns of `ones` 1.
+def _rows_in_symbols(model: HarmonicModel, tests: Experiments | None) -> list[Row]:
+    """Parts of each equation; amplitudes that are real in all tests are one symbol.
 
     Without tests inputs are real, and a model that nothing excites vibrates freely.
     """
@@ -92,10 +89,8 @@ def _rows_in_symbols(model: HarmonicModel, tests: Experiments | None, ones: list
     for e, part in np.ndindex(len(model.equations), 1 if free else 2):
         pairs = zip(pivots, combos.symbolic, strict=True)
         left = [factor_terms(total(e, part, m) / expression(by[m])) for m, by in pairs]
-        known = total(e, part, ONE) + sum(c for c, one in zip(left, ones, strict=True) if one)
-        right = collect((-known).expand(), signals, evaluate=False)
-        unknown = zip(left, map(_unknown, combos.symbolic), ones, strict=True)
-        terms = [(c, word) for c, word, one in unknown if not one]
+        right = collect((-total(e, part, ONE)).expand(), signals, evaluate=False)
+        terms = [*zip(left, map(_unknown, combos.symbolic), strict=True)]
         name = f"eq. {e + 1}" if free else f"{PARTS[part]} eq. {e + 1}"
         given = [(factor_terms(right[signal]), signal) for signal in sorted(right, key=str)]
         rows.append(Row(name, terms, given))

@@ -38,7 +38,7 @@ def exercise(folder, data="data.csv"):
 def _estimates(folder, units, data="data.csv", words="estimate of {}"):
     """What K θ = Y gives, and the largest error of some parameters in percent of the direct problem's."""
     model, readings, truth = exercise(folder, data)
-    fit = linear_fit(model, readings)
+    fit = linear_fit(model, build_rows(model, readings))
     values = dict(zip(fit.words, fit.system.values, strict=True))
     values |= dict(zip(model.parameters, fit.recovery.values, strict=True))
     numbers = {words.format(f"{n}{units.get(n, '')}"): value for n, value in values.items()}

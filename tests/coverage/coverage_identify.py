@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.linear_start import linear_fit
+from rotorid.identify.linear_start import build_rows, linear_fit
 from rotorid.regression import coverage_factor
 
 FloatArray = NDArray[np.float64]
@@ -107,7 +107,7 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
             found = identify(case.model, data, start=dict(case.truth))
             values[i], deviations, factor = found.values, found.std, found.coverage_factor
         else:
-            fit = linear_fit(case.model, data)
+            fit = linear_fit(case.model, build_rows(case.model, data))
             values[i] = fit.recovery.values
             deviations = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
             factor = coverage_factor(None if stated else fit.estimate.dof)

@@ -10,7 +10,7 @@ from golden.tolerances import TOLERANCES
 
 import rotorid
 from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, problems, toml_file
-from rotorid.identify import expressions
+from rotorid.identify import equations, expressions
 from rotorid.tables.job.job_keys import MOST_HOLES
 from rotorid.tables.waveforms import array_files
 from rotorid.worksheet import app, server
@@ -37,7 +37,7 @@ MB = 10**6
         ),
         (
             "exponents and terms of an expression",
-            f"{expressions.MAX_EXPONENT}, {expressions.MAX_TERMS:,}",
+            f"{expressions.MAX_EXPONENT}, {equations.MAX_TERMS:,}",
         ),
         ("holes of a plane", f"{MOST_HOLES:,}"),
         (

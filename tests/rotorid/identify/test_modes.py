@@ -208,17 +208,6 @@ def test_few_readings_do_not_choose_what_errors_are_the_same_in():
     assert sum(kind.startswith("size") for kind in kinds) <= 3
 
 
-def test_a_wild_reading_is_named():
-    omega0, _ = undamped(M, K)
-    omega, rng = around(omega0, 2e-4 * omega0), np.random.default_rng(3)
-    Z = amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])
-    Z = Z * (1 + 0.02 * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
-    assert fitted(omega, measured(omega, Z)).warnings == ()
-    Z[12, 1] *= 1.5
-    (words,) = fitted(omega, measured(omega, Z)).warnings
-    assert words.startswith(f"X2 at {omega[12]:.5g} rad/s is ")
-
-
 def test_phases_that_lag_are_found_out():
     result = near_one(share=0.01, conjugate=True)
     assert "phases must be leads" in result.undetermined[0]

@@ -180,19 +180,6 @@ def test_stated_errors_do_not_weight_the_rows():
     assert not np.allclose(solved, found.result.values, rtol=1e-9)
 
 
-def test_an_unknown_that_the_others_are_relative_to():
-    model = harmonic_model(["(m*p**2 + c)*X = 0"], estimate=["m", "c"])
-    tests = experiments(model, [10.0, 10.0], {"X": [1.0, 2.0]}, free=True)
-    found = identify(model, tests)
-    shown = found.equations
-    assert found.result.unidentifiable
-    assert shown.notes[0] == "m = 1: the others are relative to it"
-    assert [row.written() for row in shown.symbolic] == ["X·c = ω²·X"]
-    assert shown.columns == ("c",)
-    np.testing.assert_allclose(np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0], [100.0])
-    assert "experiment" in shown.rows[0]  # the frequency alone does not tell the rows apart
-
-
 def test_what_has_no_such_rows_is_refused(cli, tmp_path):
     model, data = files("task_4_1")
     for words in (
