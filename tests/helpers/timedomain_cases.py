@@ -95,3 +95,12 @@ def motion_in(path, values=()):
 
     M, C, K = (np.array([[entry(cell) for cell in row] for row in said[key]]) for key in "MCK")
     return fem.Motion(M, C, K, tuple(said["coordinates"]), said.get("speed_rad_s", 0.0))
+
+
+def state_space(model, theta=None):
+    """A linear model as a state space: outputs of unit states and inputs are the columns of C and D."""
+    n, values = len(model.states), model.start if theta is None else np.array(theta)
+    A, _, B = np.split(model.matrices(values)[0], [n, n + 1], axis=1)
+    both = np.eye(n + len(model.inputs))
+    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
+    return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)

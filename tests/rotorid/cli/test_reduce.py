@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from cases import each_of
 from scipy.io import loadmat
+from timedomain_cases import state_space
 
 import fem
 from rotorid import read_ode_model, read_rotor, small_model
 from rotorid import reduce as reduce_rotor
-from rotorid.identify.second_order import state_space
 from rotorid.samples import sample_data
 from rotorid.tables import read_small_model
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exact_solutions import frequency_response
-from timedomain_cases import motion_in
+from timedomain_cases import motion_in, state_space
 
 import fem
 from fem import state_space as of_motion
@@ -52,15 +52,6 @@ def singular(motion, eigenvalues):
         sigma = np.linalg.svd((s * s * motion.M + s * motion.C + motion.K) * scaled, compute_uv=False)
         worst = max(worst, sigma[-1] / sigma[0])
     return worst
-
-
-def state_space(model, theta=None):
-    """A linear model as a state space: outputs of unit states and inputs are the columns of C and D."""
-    n, values = len(model.states), model.start if theta is None else np.array(theta)
-    A, _, B = np.split(model.matrices(values)[0], [n, n + 1], axis=1)
-    both = np.eye(n + len(model.inputs))
-    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
-    return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
 
 
 def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):

@@ -12,12 +12,11 @@ from exact_solutions import frequency_response
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
-from timedomain_cases import motion_in
+from timedomain_cases import motion_in, state_space
 
 import fem
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.identify.second_order import state_space
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
