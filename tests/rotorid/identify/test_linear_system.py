@@ -53,15 +53,6 @@ def singular(motion, eigenvalues):
     return worst
 
 
-def state_space(model, theta=None):
-    """A linear model as a state space: outputs of unit states and inputs are the columns of C and D."""
-    n, values = len(model.states), model.start if theta is None else np.array(theta)
-    A, _, B = np.split(model.matrices(values)[0], [n, n + 1], axis=1)
-    both = np.eye(n + len(model.inputs))
-    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], values, both[:, n:])[..., 0].T, [n], axis=1)
-    return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)
-
-
 def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
     small = reduce(read_rotor(sample_data() / "rotor23.csv"), (7, 12, 18), 2)
     motion = small.equations_of_motion

@@ -12,8 +12,6 @@ from rotorid.commands import BalanceOptions, balance
 from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.reduce import ReduceOptions, reduce
-from rotorid.identify import harmonic_model
-from rotorid.identify.amplitudes import experiments
 from rotorid.identify.expressions import parse
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
