@@ -7,11 +7,11 @@ from typing import Any
 
 from rotorid.base.suggestions import one_of
 from rotorid.files.settings_keys import Key, file_schema
+from rotorid.files.waveforms import WAVEFORMS
 from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.models.small_model_file import SMALL_MODEL
 from rotorid.tables.rotor.rotor_file import ROTOR
 from rotorid.tables.study_file import STUDY
-from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
 
 FILES: dict[str, tuple[str, Sequence[Key]]] = {
     "job": ("Job file of rotorid", JOB),

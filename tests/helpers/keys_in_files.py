@@ -3,11 +3,11 @@
 import re
 from pathlib import Path
 
+from rotorid.files import waveforms
 from rotorid.tables import study_file
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
-from rotorid.tables.waveforms import waveform_keys
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
@@ -35,8 +35,8 @@ TABLES = {
     "key of a small model": small_model_file.SMALL_MODEL,
     "key of [[unbalance]]": small_model_file.UNBALANCE,
     "key of [[bow]]": small_model_file.BOW,
-    "key of a waveforms file": waveform_keys.WAVEFORMS,
-    "key of [channels.NAME]": waveform_keys.CHANNEL,
+    "key of a waveforms file": waveforms.WAVEFORMS,
+    "key of [channels.NAME]": waveforms.CHANNEL,
     "key of a study file": study_file.STUDY,
     "key of [planes.NAME] of a study": study_file.PLANE,
     "key of [sensors.NAME] of a study": study_file.SENSOR,
