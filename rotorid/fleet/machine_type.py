@@ -60,9 +60,12 @@ class MachineRecord(NamedTuple):
 
     @classmethod
     def of(cls, influence: Influence, machine: str = "", job: str = "") -> MachineRecord:
-        """The coefficients of a job with the covariance of each, zero where errors are not known."""
+        """The coefficients of a job with the covariance of each, of stated and measured errors alone.
+
+        Assumed ones would make the scatter between machines look smaller than it is.
+        """
         S, C, P = influence.W.shape
-        V = np.einsum("scpipj->scpij", influence.channels()[..., 2:, 2:].reshape(S, C, P, 2, P, 2))
+        V = np.einsum("scpipj->scpij", influence.channels(known=True)[..., 2:, 2:].reshape(S, C, P, 2, P, 2))
         return cls(machine, job, influence.W, V)
 
 

@@ -316,8 +316,6 @@ COMMANDS = (
         "trial-weight",
         "split",
         "tolerance",
-        "fleet add",
-        "fleet show",
         "fleet fit",
     ),
     *(
@@ -436,26 +434,17 @@ def _all() -> list[Case]:
         ),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
-    added = "fleet add fans sample_data/fleet"
-    shown = "fleet show fans"
-    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans:fan-132"
+    fitted = "fleet fit sample_data/fleet"
+    before = (f"{fitted} --output fans.parquet",)
+    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans.parquet:fan-132"
     cases += [
-        Case("fleet-add", "fleet add d sample_data/fleet", "fleet"),
-        Case("fleet-add-known", added, "fleet", before=(added,)),
-        Case("fleet-add-nothing", "fleet add d sample_data/motion", "fleet"),
-        Case("fleet-show", shown, "fleet", before=(added,)),
-        Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
-        Case("fleet-show-other", f"{shown} --type fan-123", "fleet", before=(added,)),
-        Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
-        Case(
-            "fleet-fit-table",
-            "fleet fit fans --type fan-132 --output t.csv --table",
-            "fleet",
-            before=(added,),
-        ),
-        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
-        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
-        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=(added,)),
+        Case("fleet-nothing", "fleet fit sample_data/motion", "fleet"),
+        Case("fleet-other", f"{fitted} --type fan-123", "fleet"),
+        Case("fleet-fit", f"{fitted} --plot t.png", "fleet"),
+        Case("fleet-fit-table", f"{fitted} --output t.csv --table", "fleet"),
+        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=before),
+        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=before),
+        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=before),
     ]
     cases += [Case("demo", "demo d", "demos"), Case("demo-json", "demo d --json", "demos")]
     cases += [Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage") for name in COMMANDS]
@@ -489,9 +478,7 @@ STORED = (
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",
-    "fleet-add",
     "fleet-fit",
-    "fleet-show-type",
     "holes-minmax",
     "holes-report",
     "identify-equations",
@@ -559,7 +546,7 @@ REFUSED = (
     "critical-two-into-one",
     "fit-no-output",
     "fit-not-measured",
-    "fleet-add-nothing",
+    "fleet-nothing",
     "identify-misspelt",
     "identify-no-column",
     "study-misspelt",
