@@ -77,9 +77,7 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
     unreadable = [f"{printable(file)} cannot be read: {why}" for file, why in damaged.items()]
     types = fleet.drop_duplicates("job")["machine_type"].value_counts().drop("", errors="ignore")
     if types.empty:
-        words = (
-            f"{tree}: there is no balancing job with a type (machine_type in it, or --type) and coefficients"
-        )
+        words = f"{tree}: no balancing job in it has a type (machine_type, or --type) and coefficients"
         raise ValueError("\n".join([words, *unreadable]))
     name = options.machine_type or str(types.index[0])
     known = known_type(fleet, name)

@@ -11,13 +11,11 @@ from rotorid.files.waveforms import WAVEFORMS
 from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.models.small_model_file import SMALL_MODEL
 from rotorid.tables.rotor.rotor_file import ROTOR
-from rotorid.tables.study_file import STUDY
 
 FILES: dict[str, tuple[str, Sequence[Key]]] = {
     "job": ("Job file of rotorid", JOB),
     "rotor": ("Rotor file of rotorid", ROTOR),
     "small": ("Small model for motion of rotorid", SMALL_MODEL),
-    "study": ("Study file of rotorid", STUDY),
     "waveforms": ("Waveforms file of rotorid", WAVEFORMS),
 }
 """What the file is, and its keys, by the names that `rotorid schema` takes."""

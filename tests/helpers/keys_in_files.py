@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from rotorid.files import waveforms
-from rotorid.tables import study_file
+from rotorid.study import study_file
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
@@ -42,7 +42,6 @@ TABLES = {
     "key of [sensors.NAME] of a study": study_file.SENSOR,
     "key of [unbalance.STATION]": study_file.UNBALANCE,
     "key of [readings]": study_file.READINGS,
-    "key of [calibrate]": study_file.CALIBRATE,
     **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.files import units, value_kinds
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.settings_keys import Key, Kind, Said, take
+from rotorid.files.settings_keys import Key, Said, take
 from rotorid.files.toml_file import Section, read_toml
-from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
+from rotorid.files.value_kinds import ABOVE_ZERO, TEXT, TURN, named, number, whole
 from rotorid.tables.rotor.bearing import NODE
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
 
 MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20
-_KIND = value_kinds.choice(("balance", "calibrate"))
 _CORRECTIONS = whole("corrections", 0, MOST_CORRECTIONS)
 _PERCENT = number(0.0, 100.0)
 _SPEEDS = value_kinds.numbers("speeds, such as speeds_rpm = [1500, 3000]", "1500; 3000", above_zero=True)
@@ -33,14 +32,6 @@ _SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale"
 _TRIAL = "trial unbalance; default: what moves a reading by half of the largest"
 _SIZE = "size, drawn by Rayleigh: x and y are normal, any angle is as likely"
 _NODE = Key("node", NODE, "the node, a number from 1, or a station", required="a node of the rotor")
-
-
-def _texts(section: Section, key: str) -> tuple[str, ...] | None:
-    value = section.take(key)
-    if isinstance(value, list) and value and all(isinstance(one, str) for one in value):
-        return tuple(value)
-    section.complain(key, 'a list of files, such as data = ["job.toml"]', value=False)
-    return None
 
 
 PLANE = (
@@ -67,30 +58,37 @@ READINGS = (
     Key("floor_percent", _PERCENT, "besides in each direction, percent of the sensor's limit", default=0.0),
     Key("run_percent", _PERCENT, "from run to run; half of its variance common to a run", default=0.0),
 )
-CALIBRATE = (
-    Key("data", Kind(_texts, {"type": "array", "items": TEXT.schema}), "as of the command", required="data"),
-    Key("estimate", TEXT, "as `--estimate`", required="the unknown numbers, as --estimate has them"),
-    Key("prior", TEXT, "as `--prior`", default=""),
-    Key("bounds", TEXT, "as `--bounds`", default=""),
-    Key("exact", FLAG, "as `--exact`", default=False),
-    Key("unbalance_at", TEXT, "as `--unbalance-at`"),
-    Key("bow", whole("shapes of a bow", 0, 20), "as `--bow`", default=0),
-)
 STUDY = (
-    Key("kind", _KIND, "what a sample is", required="balance or calibrate"),
+    Key("kind", value_kinds.choice(("balance",)), "what a sample is", default="balance"),
     Key("rotor", TEXT, "rotor table or file, relative to this file", required="the rotor's file"),
     Key("samples", whole("samples", 1, MOST_SAMPLES), "how many, default 1000", default=1000),
     Key("seed", whole("the seed", 0, 2**31), "of all that is drawn, default 1", default=1),
-    Key("speeds_rpm", _SPEEDS, "speeds at which limits hold and runs are made", units.SPEED),
+    Key(
+        "speeds_rpm",
+        _SPEEDS,
+        "speeds at which limits hold and runs are made",
+        units.SPEED,
+        required="the speeds of the runs",
+    ),
     Key("corrections", _CORRECTIONS, "most corrections, default none", default=0),
     Key("planes", named(PLANE), "correction planes", default={}),
-    Key("sensors", named(SENSOR), "sensors with their limits", default={}),
-    Key("unbalance", named(UNBALANCE), "drawn unbalance, by node or station", default={}),
+    Key(
+        "sensors",
+        named(SENSOR),
+        "sensors with their limits",
+        required="sensors with their limits",
+        default={},
+    ),
+    Key(
+        "unbalance",
+        named(UNBALANCE),
+        "drawn unbalance, by node or station",
+        required="the unbalance that is drawn",
+        default={},
+    ),
     Key("scatter", value_kinds.by_name(_SCATTER, "disc.scale: 2"), f"log-normal, {_SCATTER}", default={}),
     Key("readings", value_kinds.table(READINGS), "errors of readings, which are stated, too"),
-    Key("calibrate", value_kinds.table(CALIBRATE), "the calibration whose starts are drawn", default={}),
 )
-_OF_MACHINES = ("speeds_rpm", "corrections", "planes", "sensors", "unbalance", "scatter", "readings")
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +128,12 @@ class MachineStudy:
 
 @dataclass(frozen=True, eq=False)
 class StudyFile:
-    """A study as it is read: of machines, or of the starts of a calibration (options of `calibrate`)."""
+    """A study as it is read."""
 
     samples: int
     seed: int
-    rotor_file: Path
     files: tuple[Path, ...]
-    machine: MachineStudy | None
-    calibrate: Mapping[str, Any]
+    machine: MachineStudy
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -149,27 +145,18 @@ def read_study(path: str | Path) -> StudyFile:
         With all problems of both.
     """
     path, problems = Path(path), Problems()
-    said = take(Section(str(path), problems.need(read_toml(path, problems)), problems), STUDY)
-    problems.stop()
-    balance = said["kind"] == "balance"
-    for key in ("speeds_rpm", "sensors", "unbalance") if balance else ("calibrate",):
-        if not said[key]:
-            said.section.missing(key, f"what is needed where kind is {said['kind']}")
-    for key in ("calibrate",) if balance else _OF_MACHINES:
-        if said[key]:
-            said.section.complain(key, f"nothing, where kind is {said['kind']}", value=False)
-    if balance and said["corrections"] and not said["planes"]:
-        said.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
-    file = path.parent / said["rotor"]
+    values = take(Section(str(path), problems.need(read_toml(path, problems)), problems), STUDY)
+    if values["corrections"] and not values["planes"]:
+        values.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
+    file = path.parent / (values["rotor"] or "")
     try:
-        rotor = read_rotor(file)
+        rotor = read_rotor(file) if values["rotor"] else None
     except InputError as error:
         problems.extend(error.problems)
     problems.stop()
-    machine = _machine(said, rotor) if balance else None
+    machine = _machine(values, problems.need(rotor))
     problems.stop()
-    files = (path, *rotor_files(file))
-    return StudyFile(said["samples"], said["seed"], file, files, machine, said["calibrate"])
+    return StudyFile(values["samples"], values["seed"], (path, *rotor_files(file)), machine)
 
 
 def _machine(said: Said, rotor: Rotor) -> MachineStudy:
