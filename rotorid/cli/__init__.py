@@ -105,11 +105,11 @@ def schema(
 
     Example: rotorid schema job
     """
-    from rotorid.study.study_file import STUDY
+    from rotorid.study.study_file import StudyKeys
     from rotorid.tables.schema import FILES
     from rotorid.tables.schema import schema as schema_of
 
-    FILES["study"] = ("Study file of rotorid", STUDY)
+    FILES["study"] = ("Study file of rotorid", StudyKeys)
 
     typer.echo(json_text(schema_of(kind)))
 

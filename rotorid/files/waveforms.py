@@ -7,9 +7,10 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from balancing import Labels
 from rotorid.base import result
@@ -19,15 +20,24 @@ from rotorid.base.rpm import RPM
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import Phase
-from rotorid.files import units, value_kinds
-from rotorid.files.conventions import PHASES, as_phase
+from rotorid.files import units
+from rotorid.files.conventions import as_phase
 from rotorid.files.grid import Grid
 from rotorid.files.instruments import Sampled, read_samples, refusal
 from rotorid.files.problems import InputError, Problems, TableWarning
-from rotorid.files.settings_keys import Key, Kind, take
-from rotorid.files.toml_file import Section, read_toml
+from rotorid.files.settings import (
+    NotNegative,
+    Number,
+    Positive,
+    Settings,
+    Text,
+    Whole,
+    key,
+    listed,
+    read_settings,
+)
+from rotorid.files.toml_file import read_toml
 from rotorid.files.units import VIBRATION, Unit, spelt
-from rotorid.files.value_kinds import ABOVE_ZERO, TEXT, number
 from rotorid.waveforms.record import Channel, Edge, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import Vectors, find_vectors
 
@@ -39,73 +49,81 @@ _NAMED_UNIT = re.compile(rf"(.+?)(?:_| *[\[(] *)({'|'.join(sorted(VIBRATION, key
 _RECORDS = 'files by the names of their runs, such as { BASE = "base.wav" }, or a list of files'
 
 
-def _unit(section: Section, key: str) -> Unit | None:
-    text = section.text(key)
-    try:
-        return None if text is None else units.vibration(text)
-    except units.UnitError as error:
-        section.complain(key, str(error))
-        return None
-
-
-def _records(section: Section, key: str) -> dict[str, str] | None:
+def _by_stem(value: object) -> object:
     """Files by run; those of a list by their names without suffix."""
-    value = section.take(key)
-    if isinstance(value, list) and all(isinstance(file, str) for file in value):
-        stems = [Path(file).stem for file in value]
-        if twice := [file for file, stem in zip(value, stems, strict=True) if stems.count(stem) > 1]:
-            expected = f"files of different names, which are those of the runs, not {listing(twice, 'and')}"
-            section.complain(key, f'{expected}; or [records] with RUN = "FILE"', value=False)
-        value = dict(zip(stems, value, strict=True))
-    if isinstance(value, dict) and value and all(isinstance(file, str) and file for file in value.values()):
+    if not isinstance(value, list) or not value or not all(isinstance(file, str) for file in value):
         return value
-    section.complain(key, _RECORDS, value=False)
-    return None
+    stems = [Path(file).stem for file in value]
+    if twice := [file for file, stem in zip(value, stems, strict=True) if stems.count(stem) > 1]:
+        expected = f"files of different names, which are those of the runs, not {listing(twice, 'and')}"
+        raise ValueError(f'{expected}; or [records] with RUN = "FILE"')
+    return dict(zip(stems, value, strict=True))
 
 
-_UNIT = Kind(_unit, TEXT.schema, "a unit of vibration", "um", cell="name")
-_FILES = {"anyOf": [{"type": "object"}, {"type": "array", "items": TEXT.schema}]}
-CHANNEL = (
-    Key("channel", TEXT, "its name in the records, default that of the sensor; in a WAV file `1`, `2`, …"),
-    Key("unit", _UNIT, "unit of its numbers after `scale`, peak values: `um`, `mm_s`, `g`, … or any label"),
-    Key("scale", number(), "how much of the unit one number of the record is, default 1", default=1.0),
-    Key(
-        "high_pass_Hz",
-        ABOVE_ZERO,
+if TYPE_CHECKING:
+    Vibration = Unit
+else:
+    Vibration = Annotated[Text, AfterValidator(units.vibration)]
+Records = Annotated[
+    Annotated[dict[str, Text], Field(min_length=1)],
+    BeforeValidator(_by_stem, json_schema_input_type=dict[str, str] | list[str]),
+]
+
+
+class ChannelKeys(Settings):
+    """A sensor: `[channels.NAME]`."""
+
+    channel: Text | None = key(
+        "its name in the records, default that of the sensor; in a WAV file `1`, `2`, …", default=None
+    )
+    unit: Vibration | None = key(
+        "unit of its numbers after `scale`, peak values: `um`, `mm_s`, `g`, … or any label",
+        default=None,
+        example="um",
+    )
+    scale: Number = key("how much of the unit one number of the record is, default 1", default=1.0)
+    high_pass: Positive | None = key(
         "corner of an AC coupling (Butterworth), taken off again",
-        {name: units.SPEED[name] for name in ("Hz", "rad_s")},
-    ),
-    Key("high_pass_order", value_kinds.whole("its order", 1, 10), "its order, default 1", default=1),
-    Key("delay_ms", number(0.0), "delay of an anti-alias filter, taken off again", units.TIME),
-)
-WAVEFORMS = (
-    Key("tacho", TEXT, "channel of the tacho"),
-    Key("pulses", value_kinds.whole("pulses", 1, 10_000), "pulses a turn, default 1", default=1),
-    Key(
-        "edge",
-        value_kinds.choice(get_args(Edge)),
+        "high_pass_Hz",
+        None,
+        units={name: units.SPEED[name] for name in ("Hz", "rad_s")},
+    )
+    high_pass_order: Whole = key("its order, default 1", default=1, ge=1, le=10)
+    delay: NotNegative = key(
+        "delay of an anti-alias filter, taken off again", "delay_ms", 0.0, units=units.TIME
+    )
+
+
+class WaveformsFile(Settings):
+    """A waveforms file."""
+
+    tacho: Text | None = key("channel of the tacho", default=None)
+    pulses: Whole = key("pulses a turn, default 1", default=1, ge=1, le=10_000, expected="pulses a turn")
+    edge: Edge = key(
         'what of the mark is angle 0, default `"leading"`: where it begins, whatever its polarity',
         default="leading",
-    ),
-    Key("tacho_level", number(), "where an edge is, in numbers of the record; default: half-way"),
-    Key("phase", value_kinds.choice(PHASES), "whether phases that are written lead or lag, as in a job"),
-    Key("unit", _UNIT, "unit of all channels that state none"),
-    Key("amplitude", _UNIT, "unit in which vectors are written, default that of the first channel"),
-    Key(
-        "orders",
-        value_kinds.numbers("orders above 0, such as orders = [1, 2]", "1; 2", above_zero=True),
-        "orders, default 1",
-    ),
-    Key("rate_Hz", ABOVE_ZERO, "samples a second, where the records do not say"),
-    Key(
-        "speeds_rpm",
-        value_kinds.numbers("speeds, such as speeds_rpm = [900, 1200]", "900; 1200", above_zero=True),
+    )
+    tacho_level: Number | None = key(
+        "where an edge is, in numbers of the record; default: half-way", default=None
+    )
+    phase: Phase | None = key("whether phases that are written lead or lag, as in a job", default=None)
+    unit: Vibration | None = key("unit of all channels that state none", default=None, example="um")
+    amplitude: Vibration | None = key(
+        "unit in which vectors are written, default that of the first channel", default=None, example="um"
+    )
+    orders: listed(Positive) = key("orders, default 1", default=(1.0,), example="orders = [1, 2]")  # type: ignore[valid-type]
+    rate: Positive | None = key("samples a second, where the records do not say", "rate_Hz", None)
+    speeds: listed(Positive) | None = key(  # type: ignore[valid-type]
         "speeds at which vectors are wanted",
-        units.SPEED,
-    ),
-    Key("records", Kind(_records, _FILES, header="[{}]"), f"{_RECORDS}, relative to this file"),
-    Key("channels", value_kinds.named(CHANNEL), "sensors by name, default all channels but the tacho's"),
-)
+        "speeds_rpm",
+        None,
+        units=units.SPEED,
+        example="speeds_rpm = [900, 1200]",
+    )
+    records: Records = key(f"{_RECORDS}, relative to this file", expected=f"a file for each run: {_RECORDS}")
+    channels: dict[str, ChannelKeys] = key(
+        "sensors by name, default all channels but the tacho's", default={}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,23 +185,22 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}
     if settings is None:
         options["records"] = [str(path) for path in paths]
-    top = Section("the options" if settings is None else str(settings), data | options, problems)
+    source = "the options" if settings is None else str(settings)
     if settings is not None and len(paths) > 1:
-        top.refuse("one waveforms file alone, whose [records] are files; or records without it")
-    values = take(top, WAVEFORMS)
-    if values["records"] is None and "records" not in top.refused and not len(problems):
-        top.missing("records", "a file for each run")
+        words = "one waveforms file alone, whose [records] are files; or records without it"
+        problems.add(source, None, None, None, words)
+    file = problems.need(read_settings(WaveformsFile, data | options, source, problems))
     problems.stop()
     folder = Path() if settings is None else settings.parent
-    read = {run: folder / file for run, file in values["records"].items()}
+    read = {run: folder / name for run, name in file.records.items()}
     records = []
     for run, path in read.items():
         try:
-            records.append(_record(run, path, values))
+            records.append(_record(run, path, file))
         except InputError as error:
             problems.extend(error.problems)
     problems.stop()
-    quantity, speeds = values["amplitude"] or records[0][1][0], values["speeds_rpm"]
+    quantity = file.amplitude or records[0][1][0]
     for record, measured in records:
         for sensor, unit in zip(record.sensors, measured, strict=True):
             if unit.kind != quantity.kind and not {unit.kind, quantity.kind} <= DERIVATIVE.keys():
@@ -192,42 +209,41 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     problems.stop()
     return Waveforms(
         tuple(record for record, _ in records),
-        TachoSettings(values["pulses"], values["edge"], values["tacho_level"]),
-        Labels(quantity.name, quantity.scale, phase=values["phase"] or "lead"),
-        values["orders"] or (1.0,),
-        None if speeds is None else tuple(speeds.unit.to_si(speed) for speed in speeds.value),
+        TachoSettings(file.pulses, file.edge, file.tacho_level),
+        Labels(quantity.name, quantity.scale, phase=file.phase or "lead"),
+        file.orders,
+        file.speeds,
         (*([] if settings is None else [settings]), *read.values()),
-        values["phase"] is None,
+        file.phase is None,
     )
 
 
-def _record(run: str, path: Path, values: Mapping[str, Any]) -> tuple[WaveformRecord, list[Unit]]:
+def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, list[Unit]]:
     """The record and the unit of each of its sensors; raises InputError."""
     sampled = read_samples(path)
-    rate = values["rate_Hz"] or sampled.rate
+    rate = file.rate or sampled.rate
     if rate is None:
         raise refusal(path, "a rate: a channel t_s of times, --rate, or rate_Hz in a waveforms file")
     if sampled.rate is not None and abs(rate / sampled.rate - 1.0) > SAME_RATE:
         raise refusal(path, f"the rate that the file has, {sampled.rate:.6g} Hz, not {rate:.6g} Hz")
-    if values["tacho"] is None:
+    if file.tacho is None:
         expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file); "
         raise refusal(path, f"{expected}the channels are {listing(sampled.channels, 'and')}")
-    key, _ = _find(path, sampled, values["tacho"])
-    pulses = _samples(path, sampled, key)
-    tacho = Channel(key, pulses if sampled.scale == 1.0 else pulses * np.float32(sampled.scale))
-    channels = values["channels"] or _all_but(sampled, key)
+    name, _ = _find(path, sampled, file.tacho)
+    pulses = _samples(path, sampled, name)
+    tacho = Channel(name, pulses if sampled.scale == 1.0 else pulses * np.float32(sampled.scale))
+    channels = file.channels or _all_but(sampled, tacho.name)
     sensors, measured = [], []
     for name, channel in channels.items():
-        column, in_name = _find(path, sampled, channel["channel"] or name)
-        unit = channel["unit"] or in_name or values["unit"] or Unit("", "label ''")
+        column, in_name = _find(path, sampled, channel.channel or name)
+        unit = channel.unit or in_name or file.unit or Unit("", "label ''")
         if in_name is not None and in_name.name != unit.name:
             raise refusal(path, f"the unit {in_name.name} of its name, not {unit.name}", column=column)
         if unit.name.endswith(("_pp", "_rms")) and unit.kind in DERIVATIVE:
             expected = f"the unit of a sample, {unit.name.rpartition('_')[0]}, not {unit.name}"
             raise refusal(path, expected, column=column)
-        corner, delay = channel["high_pass_Hz"], channel["delay_ms"]
-        signal_path = SignalPath(corner and corner.si, channel["high_pass_order"], delay.si if delay else 0.0)
-        factor = channel["scale"] * unit.to_si(sampled.scale)
+        signal_path = SignalPath(channel.high_pass, channel.high_pass_order, channel.delay)
+        factor = channel.scale * unit.to_si(sampled.scale)
         samples = _samples(path, sampled, column)
         sensors.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
         measured.append(unit)
@@ -236,14 +252,13 @@ def _record(run: str, path: Path, values: Mapping[str, Any]) -> tuple[WaveformRe
     return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), measured
 
 
-def _all_but(sampled: Sampled, tacho: str) -> dict[str, dict[str, Any]]:
+def _all_but(sampled: Sampled, tacho: str) -> dict[str, ChannelKeys]:
     """Settings of all channels but the tacho, named without their units where that tells them apart."""
-    plain = {key.names[0]: key.default for key in CHANNEL}
-    channels: dict[str, dict[str, Any]] = {}
+    channels: dict[str, ChannelKeys] = {}
     for name in sampled.channels:
         stem = _parted(name)[0]
         if name != tacho:
-            channels[name if stem in channels else stem] = {**plain, "channel": name}
+            channels[name if stem in channels else stem] = ChannelKeys(channel=name)
     return channels
 
 

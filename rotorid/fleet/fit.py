@@ -160,7 +160,7 @@ def _odd(known: KnownType, tree: Path) -> list[dict[str, Any]]:
     for record, far in known.kind.odd:
         job = read_job(tree / record.job if tree.is_dir() else tree)
         reason = known.kind.why_odd(record, None if job.influence else job.trials) or None
-        odd = {"machine": record.machine, "job": record.job, "times_the_limit": far**0.5, "reason": reason}
+        odd = {"machine": record.machine, "path": record.job, "times_the_limit": far**0.5, "reason": reason}
         told.append(odd)
     return told
 
@@ -169,7 +169,7 @@ def _odd_words(odd: dict[str, Any]) -> str:
     """What an odd machine is, and what would make it fit."""
     why = f"it would fit if {odd['reason']}" if odd["reason"] else "nothing that was tried makes it fit"
     times = f"{odd['times_the_limit']:.2g} times as far off as machines of a type are"
-    return f"{odd['machine']} ({odd['job']}) is odd, {times}, and was left out: {why}"
+    return f"{odd['machine']} ({odd['path']}) is odd, {times}, and was left out: {why}"
 
 
 def _typical(along: FloatArray, across: FloatArray) -> str:

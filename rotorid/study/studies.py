@@ -175,6 +175,7 @@ def _outcome(
         tables=(table,),
         file=table,
         keys={
+            "kind": "balance",
             **drawn,
             "warnings": list(words),
             "probability": met[-1] / n,

@@ -2,93 +2,120 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from balancing import ReadingErrors
 from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
-from rotorid.files import units, value_kinds
+from rotorid.files import units
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.settings_keys import Key, Said, take
-from rotorid.files.toml_file import Section, read_toml
-from rotorid.files.value_kinds import ABOVE_ZERO, TEXT, TURN, named, number, whole
-from rotorid.tables.rotor.bearing import NODE
+from rotorid.files.settings import (
+    NotNegative,
+    Positive,
+    Quantity,
+    Settings,
+    Text,
+    Turn,
+    Whole,
+    by_name,
+    key,
+    listed,
+    of,
+    read_settings,
+)
+from rotorid.files.toml_file import read_toml
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
 if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
 
-MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20
-_CORRECTIONS = whole("corrections", 0, MOST_CORRECTIONS)
-_PERCENT = number(0.0, 100.0)
-_SPEEDS = value_kinds.numbers("speeds, such as speeds_rpm = [1500, 3000]", "1500; 3000", above_zero=True)
 _SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale" = 20'
-_TRIAL = "trial unbalance; default: what moves a reading by half of the largest"
-_SIZE = "size, drawn by Rayleigh: x and y are normal, any angle is as likely"
-_NODE = Key("node", NODE, "the node, a number from 1, or a station", required="a node of the rotor")
+_NODE = "the node, a number from 1, or a station"
+Node = Whole | Text
+Percent = Annotated[NotNegative, Field(le=100)]
+Size = Annotated[Quantity, of(Positive)]
 
 
-PLANE = (
-    _NODE,
-    Key("trial_g_mm", ABOVE_ZERO, _TRIAL, units.UNBALANCE),
-)
-SENSOR = (
-    _NODE,
-    Key("angle_deg", TURN, "direction, with the rotation from x", default=0.0),
-    Key(
-        "limit_um_pp limit_mm_s_rms",
-        ABOVE_ZERO,
+class PlaneKeys(Settings):
+    """A correction plane: `[planes.NAME]`."""
+
+    node: Node = key(_NODE)
+    trial: NotNegative = key(
+        "trial unbalance; default: what moves a reading by half of the largest",
+        "trial_g_mm",
+        0.0,
+        units=units.UNBALANCE,
+    )
+
+
+class SensorKeys(Settings):
+    """A sensor with its limit: `[sensors.NAME]`."""
+
+    node: Node = key(_NODE)
+    angle_deg: Turn = key("direction, with the rotation from x", default=0.0)
+    limit: Size = key(
         "largest amplitude allowed",
-        units.VIBRATION,
-        required="the limit of the sensor",
-    ),
-)
-UNBALANCE = (
-    Key("rms_g_mm median_g_mm", ABOVE_ZERO, _SIZE, units.UNBALANCE, required="how large the unbalance is"),
-)
-READINGS = (
-    Key("amplitude_percent", _PERCENT, "standard deviation of a reading's amplitude", default=0.0),
-    Key("phase_deg", number(0.0, 180.0), "standard deviation of its phase", default=0.0),
-    Key("floor_percent", _PERCENT, "besides in each direction, percent of the sensor's limit", default=0.0),
-    Key("run_percent", _PERCENT, "from run to run; half of its variance common to a run", default=0.0),
-)
-STUDY = (
-    Key("kind", value_kinds.choice(("balance",)), "what a sample is", default="balance"),
-    Key("rotor", TEXT, "rotor table or file, relative to this file", required="the rotor's file"),
-    Key("samples", whole("samples", 1, MOST_SAMPLES), "how many, default 1000", default=1000),
-    Key("seed", whole("the seed", 0, 2**31), "of all that is drawn, default 1", default=1),
-    Key(
-        "speeds_rpm",
-        _SPEEDS,
+        "limit_um_pp limit_mm_s_rms",
+        units=units.VIBRATION,
+        expected="the limit of the sensor",
+    )
+
+
+class UnbalanceKeys(Settings):
+    """What is drawn at a node: `[unbalance.STATION]`."""
+
+    size: Size = key(
+        "size, drawn by Rayleigh: x and y are normal, any angle is as likely",
+        "rms_g_mm median_g_mm",
+        units=units.UNBALANCE,
+        expected="how large the unbalance is",
+    )
+
+
+class ReadingKeys(Settings):
+    """Errors of readings, one standard deviation: `[readings]`."""
+
+    amplitude_percent: Percent = key("standard deviation of a reading's amplitude", default=0.0)
+    phase_deg: Annotated[NotNegative, Field(le=180)] = key("standard deviation of its phase", default=0.0)
+    floor_percent: Percent = key("besides in each direction, percent of the sensor's limit", default=0.0)
+    run_percent: Percent = key("from run to run; half of its variance common to a run", default=0.0)
+
+
+class StudyKeys(Settings):
+    """A study file."""
+
+    kind: Literal["balance"] = key("what a sample is", default="balance")
+    rotor: Text = key("rotor table or file, relative to this file", expected="the rotor's file")
+    samples: Whole = key("how many, default 1000", default=1000, ge=1, le=10**9)
+    seed: Whole = key("of all that is drawn, default 1", default=1, ge=0, le=2**31)
+    speeds: listed(Positive) = key(  # type: ignore[valid-type]
         "speeds at which limits hold and runs are made",
-        units.SPEED,
-        required="the speeds of the runs",
-    ),
-    Key("corrections", _CORRECTIONS, "most corrections, default none", default=0),
-    Key("planes", named(PLANE), "correction planes", default={}),
-    Key(
-        "sensors",
-        named(SENSOR),
-        "sensors with their limits",
-        required="sensors with their limits",
-        default={},
-    ),
-    Key(
-        "unbalance",
-        named(UNBALANCE),
-        "drawn unbalance, by node or station",
-        required="the unbalance that is drawn",
-        default={},
-    ),
-    Key("scatter", value_kinds.by_name(_SCATTER, "disc.scale: 2"), f"log-normal, {_SCATTER}", default={}),
-    Key("readings", value_kinds.table(READINGS), "errors of readings, which are stated, too"),
-)
+        "speeds_rpm",
+        units=units.SPEED,
+        example="speeds_rpm = [1500, 3000]",
+    )
+    corrections: Whole = key("most corrections, default none", default=0, ge=0, le=20)
+    planes: dict[str, PlaneKeys] = key("correction planes", default={})
+    sensors: dict[str, SensorKeys] = key("sensors with their limits", min_length=1)
+    unbalance: dict[str, UnbalanceKeys] = key("drawn unbalance, by node or station", min_length=1)
+    scatter: by_name(NotNegative) = key(  # type: ignore[valid-type]
+        f"log-normal, {_SCATTER}", default={}, example='"bearing[*].stiffness.scale" = 20'
+    )
+    readings: ReadingKeys = key("errors of readings, which are stated, too", default=ReadingKeys())
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Corrections without planes, a speed twice."""
+        if self.corrections and not self.planes:
+            yield "planes", "the planes of the corrections; corrections = 0: as built only"
+        if len({*self.speeds}) < len(self.speeds):
+            yield "speeds", "each speed once"
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,74 +172,76 @@ def read_study(path: str | Path) -> StudyFile:
         With all problems of both.
     """
     path, problems = Path(path), Problems()
-    values = take(Section(str(path), problems.need(read_toml(path, problems)), problems), STUDY)
-    if values["corrections"] and not values["planes"]:
-        values.section.missing("planes", "the planes of the corrections; corrections = 0: as built only")
-    file = path.parent / (values["rotor"] or "")
+    data = problems.need(read_toml(path, problems))
+    values = problems.need(read_settings(StudyKeys, data, str(path), problems))
+    file = path.parent / getattr(values, "rotor", "")
     try:
-        rotor = read_rotor(file) if values["rotor"] else None
+        rotor = read_rotor(file) if values.has("rotor") else None
     except InputError as error:
         problems.extend(error.problems)
     problems.stop()
-    machine = _machine(values, problems.need(rotor))
+    machine = _machine(values, problems.need(rotor), problems)
     problems.stop()
-    return StudyFile(values["samples"], values["seed"], (path, *rotor_files(file)), machine)
+    return StudyFile(values.samples, values.seed, (path, *rotor_files(file)), machine)
 
 
-def _machine(said: Said, rotor: Rotor) -> MachineStudy:
-    """What is drawn; problems are noted with the sections."""
-    top, speeds = said.section, np.array(said["speeds_rpm"].unit.to_si(np.array(said["speeds_rpm"].value)))
+def _machine(values: StudyKeys, rotor: Rotor, problems: Problems) -> MachineStudy:
+    """What is drawn; nodes and numbers that the rotor does not have are noted."""
+    speeds = np.array(values.speeds)
 
-    def node(section: Section, key: str, place: int | str) -> int:
+    def node(section: Settings, field: str, place: int | str) -> int:
         try:
             return rotor.node(place)
         except ValueError as error:
-            section.complain(key, f"a node or station of the rotor: {error}", value=False)
+            problems.extend([section.problem(field, f"a node or station of the rotor: {error}")])
             return 0
 
-    if len({*speeds.tolist()}) < speeds.size:
-        top.complain(said["speeds_rpm"].key, "each speed once")
-    planes = {name: node(plane.section, "node", plane["node"]) for name, plane in said["planes"].items()}
-    sensors = {
-        name: Sensor(node(sensor.section, "node", sensor["node"]), sensor["angle_deg"])
-        for name, sensor in said["sensors"].items()
-    }
-    trials = [plane["trial_g_mm"] for plane in said["planes"].values()]
-    limits = [sensor["limit_um_pp"] for sensor in said["sensors"].values()]
+    limits = [sensor.limit for sensor in values.sensors.values()]
     velocity = [limit.unit.kind == "velocity" for limit in limits]
-    gains = np.where(velocity, 1j * speeds[:, None], 1.0) / np.array([limit.si for limit in limits])
     unbalance: dict[int, float] = {}
-    for place, size in said["unbalance"].items():
-        rayleigh = np.sqrt(2 * np.log(2) if size["rms_g_mm"].key.startswith("median") else 2)
-        at = node(top, "unbalance", place)
-        unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), size["rms_g_mm"].si / rayleigh))
-    scatter: dict[str, tuple[float, float]] = {}
-    taken: set[object] = set()
-    for pattern, share in said["scatter"].items():
-        try:
-            paths = expand(rotor, pattern)
-            for path in paths:
-                own = numbers_of(rotor, path)
-                if not own or own & taken:
-                    raise ValueError(f"{pattern}: each number of the rotor once")
-                scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
-                taken |= own
-            if not any(scatter[path][0] for path in paths):
-                raise ValueError(f"{pattern} is 0, and so is any share of it")
-        except ValueError as error:
-            top.complain("scatter", f"numbers of the rotor: {error}", value=False)
-    errors = said["readings"] or {key.name: 0.0 for key in READINGS}
-    sizes = errors["amplitude_percent"] / 100, np.radians(errors["phase_deg"]), errors["floor_percent"] / 100
+    for place, drawn in values.unbalance.items():
+        rayleigh = np.sqrt(2 * np.log(2) if drawn.written("size").startswith("median") else 2)
+        at = node(values, "unbalance", place)
+        unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), drawn.size.si / rayleigh))
+    readings = values.readings
+    sizes = (
+        readings.amplitude_percent / 100,
+        float(np.radians(readings.phase_deg)),
+        readings.floor_percent / 100,
+    )
     return MachineStudy(
         rotor=rotor,
         speeds=speeds,
-        planes=planes,
-        sensors=sensors,
-        trials=np.array([trial.si if trial else 0.0 for trial in trials]),
-        gains=gains,
+        planes={name: node(plane, "node", plane.node) for name, plane in values.planes.items()},
+        sensors={
+            name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
+            for name, sensor in values.sensors.items()
+        },
+        trials=np.array([plane.trial for plane in values.planes.values()]),
+        gains=np.where(velocity, 1j * speeds[:, None], 1.0) / np.array([limit.si for limit in limits]),
         unbalance=unbalance,
-        scatter=scatter,
-        errors=ReadingErrors(*map(float, sizes)) if any(sizes) else None,
-        run_error=errors["run_percent"] / 100,
-        corrections=said["corrections"],
+        scatter=_scatter(values, rotor, problems),
+        errors=ReadingErrors(*sizes) if any(sizes) else None,
+        run_error=readings.run_percent / 100,
+        corrections=values.corrections,
     )
+
+
+def _scatter(values: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tuple[float, float]]:
+    """Numbers of the rotor by path, each once, with the standard deviation of its logarithm."""
+    scatter: dict[str, tuple[float, float]] = {}
+    taken: set[object] = set()
+    for pattern, share in values.scatter.items():
+        try:
+            paths = expand(rotor, pattern)
+            for path in paths:
+                numbers = numbers_of(rotor, path)
+                if not numbers or numbers & taken:
+                    raise ValueError(f"{pattern}: each number of the rotor once")
+                scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
+                taken |= numbers
+            if not any(scatter[path][0] for path in paths):
+                raise ValueError(f"{pattern} is 0, and so is any share of it")
+        except ValueError as error:
+            problems.extend([values.problem("scatter", f"numbers of the rotor: {error}")])
+    return scatter

@@ -185,7 +185,7 @@ OPTIONS = {
     "orders": ({"tacho": "KEY", "orders": [0]}, "column orders"),
     "pulses": (
         {"tacho": "KEY", "pulses": 0},
-        "column pulses: found '0', expected pulses, a whole number",
+        "column pulses: found '0', expected a number of 1 or more: pulses a turn",
     ),
 }
 
@@ -199,7 +199,7 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
-    'tacho = "KEY"\nrecords = []\n': "key records: expected files by the names of their runs",
+    'tacho = "KEY"\nrecords = []\n': "key records: expected a table, [records]: a file for each run",
     'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
     'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
     'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",
@@ -208,7 +208,7 @@ FILES = {
     FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
     FILE.replace("mm/s", "mm_s_pk"): "key channels.B1Y.unit",
     FILE.replace("high_pass_Hz", "high_pass_rpm"): "key channels.probe.high_pass_rpm",
-    "records = 5\nchannels = 3\n": "key channels: found '3', expected a table of settings",
+    "records = 5\nchannels = 3\n": "key channels: found '3', expected a table, [channels]",
 }
 
 

@@ -60,6 +60,8 @@ def test_the_median_of_rayleigh_and_a_velocity_are_as_their_units_say(tmp_path):
     job = read_study(write(tmp_path, TWO)).machine
     assert job.unbalance[2] * np.sqrt(2 * np.log(2)) == pytest.approx(300e-6)
     assert job.unbalance[4] * np.sqrt(2) == pytest.approx(500e-6)
+    turned = read_study(write(tmp_path, STUDY.replace("limit_um_pp", "angle_deg = 90\nlimit_um_pp"))).machine
+    assert turned.sensors["probe"] == fem.Sensor(3, 90.0)
     omega = 3000 * np.pi / 30
     assert job.gains[0] == pytest.approx([1 / 10e-6, 1j * omega / (1.2e-3 * np.sqrt(2))])
 
