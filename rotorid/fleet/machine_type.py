@@ -32,14 +32,14 @@ from balancing import (
     with_parameters,
 )
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.text import counted, listing
+from rotorid.base.text import counted
 from rotorid.regression import covariance_root, stretch, unstretch
 from rotorid.regression.random_effects import RandomEffects, oddness, random_effects
 
 LEAST_MACHINES = 3
 """Fewer do not show how machines differ."""
 _ALIKE = 4.0
-"""Squared distances that differ by less do not tell two reasons apart."""
+"""Of squared distance, which a reason with a number to choose gives up."""
 
 
 class MachineRecord(NamedTuple):
@@ -135,15 +135,12 @@ class MachineType:
         return all_.part(match_speeds(self.speeds, all_.speeds), [*sensors], [*planes])
 
     def why_odd(self, record: MachineRecord, trials: Trials | None = None) -> str:
-        """What would make a record fit the type, in words; "" where nothing tried does.
+        """What would make a record fit the type best, in words; "" where nothing tried does.
 
         By the runs that it was measured with; None: not known, and the weights taken to be at 0°.
         """
-        changes = list(_changes(self, record, trials))
-        least = min(distance for distance, _ in changes)
-        if least > min(self.limit, self.distance(record.W, record.covariance)):
-            return ""
-        return listing([text for d, text in changes if d <= least + _ALIKE], "or")
+        least, words = min(_changes(self, record, trials))
+        return words if least <= min(self.limit, self.distance(record.W, record.covariance)) else ""
 
     @property
     def widening(self) -> float:
@@ -204,9 +201,15 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
     from scipy.optimize import minimize_scalar
 
     W, V = record.W, record.covariance
+    lag = np.conj(W)
+    with suppress(ValueError):  # runs that do not give all coefficients
+        if trials is not None:
+            read = kind.measured(trials).W
+            other = replace(trials, readings=np.conj(trials.readings), covariance=None)
+            size = np.linalg.norm(W, axis=(0, 1)) / np.linalg.norm(read, axis=(0, 1))  # of other radii
+            lag = kind.measured(other).W * size
     mirror = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    lagging = kind.distance(_lagging(kind, W, trials), V * mirror)
-    yield lagging, "its phases were of the other sense (lag for lead)"
+    yield kind.distance(lag, V * mirror), "its phases were of the other sense (lag for lead)"
     for names, axis, what in ((kind.sensors, 1, "sensors"), (kind.planes, 2, "planes")):
         for a, b in combinations(range(len(names)), 2):
             order = np.arange(len(names))
@@ -224,17 +227,6 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
     degrees = (round(np.degrees(least.x)) + 180) % 360 - 180
     words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
     yield float(least.fun) + _ALIKE, words  # it has a number to choose
-
-
-def _lagging(kind: MachineType, W: ComplexArray, trials: Trials | None) -> ComplexArray:
-    """Coefficients if phases meant the other, at the type's radii; without trial runs conj(W)."""
-    if trials is not None:
-        with suppress(ValueError):
-            read = kind.measured(trials).W
-            lag = replace(trials, readings=np.conj(trials.readings), covariance=None)
-            size = np.linalg.norm(W, axis=(0, 1)) / np.linalg.norm(read, axis=(0, 1))
-            return np.asarray(kind.measured(lag).W * size)
-    return np.conj(W)
 
 
 def _rows(W: ComplexArray, covariance: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from rotorid.base.arrays import FloatArray
 
-_MOST = 20
-"""Grids that are tried."""
 _SAME = 1e-3
 """Coefficients that differ by less, relative, come from the same runs: no two measurements agree so well."""
 
@@ -91,7 +89,9 @@ def known_type(
         grid = _usual(cells)._replace(speeds=grid.speeds, sensors=grid.sensors, quantity=grid.quantity)
     complete = _records(cells, grid)
     if not complete:
-        raise UndeterminedError(_none(name, cells, grid))
+        words = f"no job of {name} has coefficients of all these speeds, sensors and planes; there are"
+        there = (f"{one} {listing(sorted({*cells[one]}), 'and')}" for one in ("sensor", "plane", "quantity"))
+        raise UndeterminedError(f"{words} {', '.join(there)}")
     records: list[MachineRecord] = []
     for record in complete:  # without copies, and stored coefficients that were used again
         near = _SAME * np.abs(record.W).max()
@@ -101,19 +101,6 @@ def known_type(
     jobs = cells.drop_duplicates("job").set_index("job")
     lacking, copies = len(jobs) - len(complete), len(complete) - len(records)
     return KnownType(name, kind, jobs.loc[[record.job for record in records]], lacking, copies)
-
-
-def _none(name: str, cells: pd.DataFrame, grid: Grid) -> str:
-    """That no job has the coefficients of a grid, and what else there is."""
-    words = f"no job of {name} has coefficients of all these speeds, sensors and planes"
-    wanted = {"sensor": grid.sensors, "plane": grid.planes}
-    wanted |= {"quantity": (grid.quantity,), "weight_kind": (grid.weight_kind,)}
-    for column, names in wanted.items():
-        there = sorted({*cells[column]})
-        if lacking := [one for one in names if one not in there]:
-            what = column.replace("_", " ")
-            words += f"; it has no {what} {listing(lacking, 'and')}, but {listing(there, 'and')}"
-    return words
 
 
 def _records(cells: pd.DataFrame, grid: Grid) -> list[MachineRecord]:
@@ -145,18 +132,14 @@ def _records(cells: pd.DataFrame, grid: Grid) -> list[MachineRecord]:
 
 
 def _usual(cells: pd.DataFrame) -> Grid:
-    """The grid of one job that gives most coefficients of all jobs."""
-    grids: dict[object, Grid] = {}
-    for _, part in cells.groupby("job", sort=False):
-        planes = part.drop_duplicates("plane")
-        grid = Grid(
-            speeds=np.unique(part["speed_rad_s"]),
-            sensors=tuple(part["sensor"].unique()),
-            planes=tuple(planes["plane"]),
-            quantity=str(part["quantity"].iloc[0]),
-            weight_kind=str(part["weight_kind"].iloc[0]),
-            radii=tuple(planes["radius_m"]),
-        )
-        grids.setdefault((*(f"{speed:.3g}" for speed in grid.speeds), *grid[1:5]), grid)
-    some = list(grids.values())[:_MOST]
-    return max(some, key=lambda grid: sum(record.W.size for record in _records(cells, grid)))
+    """The grid of the first job of those with most coefficients."""
+    part = cells[cells["job"] == cells.groupby("job", sort=False).size().idxmax()]
+    planes = part.drop_duplicates("plane")
+    return Grid(
+        speeds=np.unique(part["speed_rad_s"]),
+        sensors=tuple(part["sensor"].unique()),
+        planes=tuple(planes["plane"]),
+        quantity=str(part["quantity"].iloc[0]),
+        weight_kind=str(part["weight_kind"].iloc[0]),
+        radii=tuple(planes["radius_m"]),
+    )

@@ -243,8 +243,8 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     table = pd.read_csv(other.parent / "runs.csv")
     for changed, said in (
         (table.assign(speed_rpm=2000), "no job of fan has .* of all these speeds"),
-        (table.assign(sensor=["S1", "S9"]), "it has no sensor S9, but S1 and S2"),
-        (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "no quantity velocity, but"),
+        (table.assign(sensor=["S1", "S9"]), "there are sensor S1 and S2, plane L and R"),
+        (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "quantity displacement"),
     ):
         changed.to_csv(other.parent / "runs.csv", index=False)
         refused(said, UndeterminedError, other, machine_type=address(fleet))
