@@ -116,7 +116,7 @@ class MachineType:
 
     def influence(self, labels: Labels, machine: str = "") -> Influence:
         """Coefficients to expect of one of `machines`, whose own jobs count then; else of a further one."""
-        mean, covariance = self.effects.mean, self.effects.new_group
+        mean, covariance = self.effects.mean, self.effects.new_group + np.diag(self._doubt)
         if machine in self.machines:
             mean, covariance = self.effects.known(self.machines.index(machine))
         covariance = (covariance + self.effects.within) * self.widening
@@ -141,6 +141,23 @@ class MachineType:
         """
         least, words = min(_changes(self, record, trials))
         return words if least <= min(self.limit, self.distance(record.W, record.covariance)) else ""
+
+    @property
+    def _doubt(self) -> FloatArray:
+        """By how much more variances between machines may be expected to be, (n,): the rest after errors.
+
+        Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
+        σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
+        """
+        from scipy.special import ndtr
+
+        between = np.diag(self.effects.between)
+        blocks = self.effects.error.mean(axis=0)
+        rest = np.diag(self.effects.within) * np.mean(1 / self.effects.jobs)
+        total = between + blocks[:, [0, 1], [0, 1]].ravel() + rest
+        std = np.sqrt(2 * (total**2 - between**2) / (len(self.machines) - 1))
+        ratio = np.divide(between, std, out=np.full_like(std, np.inf), where=std > 0)
+        return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
 
     @property
     def widening(self) -> float:
