@@ -26,7 +26,7 @@ import numpy as np
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, has_decimal_comma, parse_number
 from rotorid.files.headings import read_unit, readable
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import InputError, Problem, Problems, printable
@@ -189,7 +189,7 @@ def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str
 
 def _is_number(text: str, *, comma: bool) -> bool:
     try:
-        parse_number(text, comma=comma)
+        parse_number(text, comma=comma and has_decimal_comma(text))
     except NotANumber:
         return False
     return True
