@@ -13,16 +13,16 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.measurements import read_measurements as read_measurements
+    from rotorid.files.modes import MeasuredModes as MeasuredModes
+    from rotorid.files.modes import read_compliance as read_compliance
+    from rotorid.files.modes import read_modes as read_modes
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
+    from rotorid.files.records import read_record as read_record
     from rotorid.files.runs import read_trials as read_trials
     from rotorid.files.table_writing import write_table as write_table
-    from rotorid.tables.data.measurements import read_measurements as read_measurements
-    from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
-    from rotorid.tables.data.modes_table import read_compliance as read_compliance
-    from rotorid.tables.data.modes_table import read_modes as read_modes
-    from rotorid.tables.data.records import read_record as read_record
     from rotorid.tables.job.job_file import Job as Job
     from rotorid.tables.job.job_file import job_from_files as job_from_files
     from rotorid.tables.job.job_file import read_job as read_job
@@ -40,11 +40,11 @@ if TYPE_CHECKING:
     from rotorid.tables.runs.influence_table import write_influence as write_influence
 
 _HOME = {
-    "read_measurements": "data.measurements",
-    "MeasuredModes": "data.modes_table",
-    "read_compliance": "data.modes_table",
-    "read_modes": "data.modes_table",
-    "read_record": "data.records",
+    "read_measurements": ".files.measurements",
+    "MeasuredModes": ".files.modes",
+    "read_compliance": ".files.modes",
+    "read_modes": ".files.modes",
+    "read_record": ".files.records",
     "Job": "job.job_file",
     "job_from_files": "job.job_file",
     "read_job": "job.job_file",

@@ -8,11 +8,10 @@ from cases import each_of
 from keys_in_files import with_tables
 
 import rotorid
-from rotorid.files import runs, weights
+from rotorid.files import modes, runs, weights
 from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import FUNCTIONS
 from rotorid.samples import sample_data
-from rotorid.tables.data import modes_table as modes
 from rotorid.tables.job import job_from_excel as jobbook
 from rotorid.tables.job import job_keys as jobkeys
 from rotorid.tables.rotor import bearing

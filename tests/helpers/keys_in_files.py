@@ -3,11 +3,11 @@
 import re
 from pathlib import Path
 
-from rotorid.tables import study_file
+from rotorid.files import waveforms
+from rotorid.study import study_file
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
-from rotorid.tables.waveforms import waveform_keys
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
@@ -35,14 +35,13 @@ TABLES = {
     "key of a small model": small_model_file.SMALL_MODEL,
     "key of [[unbalance]]": small_model_file.UNBALANCE,
     "key of [[bow]]": small_model_file.BOW,
-    "key of a waveforms file": waveform_keys.WAVEFORMS,
-    "key of [channels.NAME]": waveform_keys.CHANNEL,
-    "key of a study file": study_file.STUDY,
-    "key of [planes.NAME] of a study": study_file.PLANE,
-    "key of [sensors.NAME] of a study": study_file.SENSOR,
-    "key of [unbalance.STATION]": study_file.UNBALANCE,
-    "key of [readings]": study_file.READINGS,
-    "key of [calibrate]": study_file.CALIBRATE,
+    "key of a waveforms file": waveforms.WaveformsFile,
+    "key of [channels.NAME]": waveforms.ChannelKeys,
+    "key of a study file": study_file.StudyKeys,
+    "key of [planes.NAME] of a study": study_file.PlaneKeys,
+    "key of [sensors.NAME] of a study": study_file.SensorKeys,
+    "key of [unbalance.STATION]": study_file.UnbalanceKeys,
+    "key of [readings]": study_file.ReadingKeys,
     **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
 }
 
@@ -50,11 +49,26 @@ TABLES = {
 def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
+    if isinstance(keys, type):
+        return lines + [settings_line(name, key, keys) for name, key in keys.keys().items()]
     for key in keys:
         names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
         words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
         lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
     return lines
+
+
+def settings_line(name, key, model):
+    """The same of a key of typed settings."""
+    field = next(one for field, one in model.model_fields.items() if (one.alias or field) == name)
+    kind = str(field.annotation)
+    header = (
+        "[{}.NAME]" if "dict[str, rotorid" in kind else "[{}]" if "dict[" in kind or "Keys" in kind else "{}"
+    )
+    names = ", ".join(f"`{header.format(each)}`" for each in key.names)
+    words = re.findall(r"'(\w+)'", kind) if "Literal" in kind else []
+    shown = [f'"{word}"' for word in words] or field.examples or []
+    return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in shown)} |"
 
 
 def with_tables(text):

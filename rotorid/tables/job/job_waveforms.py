@@ -21,7 +21,7 @@ def with_vectors(
     for key in ("runs", "check", "slow_roll"):
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
-            from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
+            from rotorid.files.waveforms import read_vectors_grid
 
             grid, phase, read = problems.need(read_vectors_grid(path, overrides.phase or phase, problems))
             tables[key], files = grid, [*files, *read]
