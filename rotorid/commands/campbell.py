@@ -13,7 +13,7 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import percent
-from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
+from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
 from rotorid.report.options import rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
 
@@ -51,7 +51,7 @@ class CampbellOptions:
     operating: Band | None = None
     heavy: float = 6.0
     mesh_check: bool = False
-    cross_coupling: Span | None = None
+    cross_coupling: str | tuple[float, float] | None = None
     panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
@@ -85,8 +85,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     from rotorid.commands.operating_range import Separation, unsearched
 
     operating = band(options.operating)
-    added = options.cross_coupling
-    span, place = (None, None) if added is None else span_at(added, "--cross-coupling", "0:5e7")
+    span, place = _span(options.cross_coupling)
     model, files = rotor_source(rotor)
     speeds = rising_speeds(options.speeds)
     solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
@@ -141,6 +140,17 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         title="Whirl",
         provenance=provenance(files, options),
     )
+
+
+def _span(given: str | tuple[float, float] | None) -> tuple[tuple[float, float] | None, str | None]:
+    """Read "0:5e7" or "0:5e7@impeller 3" as a range, N/m, and the place; None: nowhere said."""
+    if given is None:
+        return None, None
+    text, _, place = given.partition("@") if isinstance(given, str) else ("", "", "")
+    ends = [number(part) for part in text.split(":")] if isinstance(given, str) else given
+    if len(ends) != 2 or not 0 <= ends[0] < ends[1]:
+        raise ValueError(f"--cross-coupling {given!r} is not a range: use LEAST:MOST, such as 0:5e7")
+    return (ends[0], ends[1]), place.strip() or None
 
 
 def _at(whirl: Campbell, s: int) -> Table:

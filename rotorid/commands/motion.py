@@ -26,7 +26,7 @@ from rotorid.commands.quantities import (
     one_of,
     one_speed,
     pairs,
-    speeds,
+    two_speeds,
 )
 from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
@@ -375,13 +375,9 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
             raise ValueError("--acceleration belongs to --run-up")
         ends = (speed, speed)
     else:
-        given = options.run_up or ""
-        found = speeds(given.replace(":", ",") if isinstance(given, str) else given, what="--run-up")
-        if len(found) != 2 or found[0] == found[1]:
-            raise ValueError(
-                f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
-            )
-        ends = (found[0], found[1])
+        ends = two_speeds(options.run_up or "", "--run-up", "FIRST:LAST")
+        if ends[0] == ends[1]:
+            raise ValueError(f"--run-up {options.run_up!r}: two different speeds are needed; else --speed")
     if (options.time is None) == (options.acceleration is None):
         one = (
             "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"

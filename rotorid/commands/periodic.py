@@ -15,7 +15,7 @@ from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
 from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
-from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
+from rotorid.commands.quantities import Band, Sensor, degrees, sensors, two_speeds
 from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
@@ -279,13 +279,11 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
 
 def _range(given: Band) -> tuple[float, float]:
     """First and last speed, rad/s, which may be the same."""
-    ends = given.replace(":", ",") if isinstance(given, str) else given
-    found = speeds(ends, what="--speeds")
-    if not 1 <= len(found) <= 2 or found[0] > found[-1]:
-        raise ValueError(f"--speeds {given!r} is not a range: use LOWEST:HIGHEST, such as 1000:9000rpm")
-    if found[0] <= 0:
-        raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
-    return found[0], found[-1]
+    alone = isinstance(given, str) and ":" not in given
+    low, high = two_speeds(f"{given}:{given}" if alone else given, "--speeds", "LOWEST:HIGHEST")
+    if not 0 < low <= high:
+        raise ValueError(f"--speeds {given!r} is not a range of a turning rotor: use LOWEST:HIGHEST above 0")
+    return low, high
 
 
 def _sensors(

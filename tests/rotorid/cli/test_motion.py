@@ -96,7 +96,7 @@ def test_a_start_in_steady_motion_has_no_transient(unbalance):
         (("--run-up", "1000:2000rpm", "--acceleration", "0rpm/s"), "must be above 0"),
         ((*SHORT, "--acceleration", "3rpm/s"), "belongs to --run-up"),
         (("--speed", "4000rpm", "--time", "-1"), "seconds above 0"),
-        ((*SHORT, "--displaced", "12=3"), "a number with its unit"),
+        ((*SHORT, "--displaced", "12=3"), "expected one of the units"),
         ((*SHORT, "--displaced", "99=3um"), "node 99 does not exist"),
         (
             (*SHORT, "--displaced", "2=300um"),

@@ -62,7 +62,7 @@ def test_the_answer_and_the_picture(cli, tmp_path):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--speeds", "0:3000rpm"), "speeds above 0"),
+        (("--speeds", "0:3000rpm"), "LOWEST:HIGHEST above 0"),
         (("--speeds", "3000:2000rpm"), "is not a range"),
         ((*RANGE, "--sensors", "99"), "node 99 does not exist"),
     ],
