@@ -7,22 +7,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import range_text
-from rotorid.base.text import capital, counted, error_figures
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, error_figures
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from fem import Rotor
     from rotorid.base.arrays import BoolArray
     from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
     from rotorid.regression.estimate import Uncertain
+
+_ROWS = 5
+"""Of the short table, with two numbers each."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,6 @@ class CalibrateOptions:
         bearing (of tables over speed their scales), `bearing.kxx` one value for all.
     prior : LIST
         What is known of them: bearing[*].*=20%, bearing[1].kxx=7e7+-1e7.
-    bounds : LIST
-        Lowest and largest value: bearing[1].kxx=1e6:1e9.
     exact
         Modulus (1 %), discs (1 %), pedestals (10 %) and angles of probes (2°) are not estimated; ± count that
         they may be off by so much. Else they are unknown, too, with these standard deviations.
@@ -49,7 +46,6 @@ class CalibrateOptions:
 
     estimate: Names
     prior: str | Mapping[str, str] = ""
-    bounds: str | Mapping[str, str] = ""
     exact: bool = False
     unbalance_at: Nodes | None = None
     bow: int = 0
@@ -57,124 +53,114 @@ class CalibrateOptions:
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Answered):
-    """The calibrated rotor."""
+def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
+    """Whether the model explains the data; the numbers; what the data do not tell."""
+    import numpy as np
 
-    found: CalibratedRotor
+    from rotorid.regression.estimate import parameter_columns, parameter_dict, parameter_text
 
-    @property
-    def answer(self) -> Answer:
-        """Whether the model explains the data; the wished numbers; what the data do not tell."""
-        from rotorid.regression.estimate import parameter_text
+    estimate, wished = calibrated.fit.estimate, calibrated.wished
+    fits = "explains" if calibrated.explained else "does NOT explain"
+    chi = f"χ² {calibrated.chi_square:.4g} with {counted(calibrated.dof, 'degree')} of freedom"
+    why = {} if calibrated.prior is None else calibrated.prior.why
+    names, every = _part(calibrated, wished | True)
+    parameters = parameter_dict(names, every)
+    for name, unknown, share in zip(names, calibrated.unknowns, calibrated.data_share, strict=True):
+        parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
+    unbalance = _unbalance(calibrated)
+    taken = counted(len(calibrated.exact), "number")
+    notes = {
+        calibrated.seen: bool(calibrated.seen),
+        f"searched from {calibrated.searches} starting values": calibrated.searches > 1,
+        f"± count what {taken} taken as exact may be off": bool(calibrated.exact),
+    }
+    document = {
+        "parameters": parameters,
+        "rank": estimate.rank,
+        "condition_number": estimate.condition_number,
+        "identifiable": estimate.full_rank,
+        "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
+        "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+        "correlation": every.correlation,
+        "seen": calibrated.seen or None,
+        "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
+        "chi_square": calibrated.chi_square,
+        "degrees_of_freedom": calibrated.dof,
+        "probability": calibrated.chance,
+        "exact": calibrated.exact,
+        "explained": calibrated.explained,
+        "lack_of_fit": calibrated.lack_of_fit,
+        "unbalance": unbalance.records,
+        "warnings": calibrated.warnings,
+        "rotor": None,
+    }
 
-        found = self.found
-        fits = "explains" if found.explained else "does NOT explain"
-        chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
-        first = [f"The model {fits} the data ({chi})."]
-        speeds = [speed for data in found.readings for speed in data.trials.speeds.tolist()]
-        if seen := found.seen:
-            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
-            first.append(capital(f"{at}{seen}."))
-        why = {} if found.prior is None else found.prior.why
-        beside = ~found.wished
-        tables = [parameter_text(*self._part(which), why) for which in (~beside, beside) if which.any()]
-        if found.bare:
-            tables.append(text(self._unbalance(), width=COLUMNS))
-        more = "what else is not known exactly" if beside.any() else "unbalance"
-        notes = []
-        if found.searches > 1:
-            notes.append(f"searched from {found.searches} starting values")
-        if found.exact:
-            exact = counted(len(found.exact), "number")
-            notes.append(f"± count what {exact} taken as exact may be off")
-        return Answer(
-            "\n".join(first),
-            tables[0],
-            found.warnings,
-            tuple(notes),
-            tables=tuple(tables[1:]),
-            more=more if tables[1:] else "",
-        )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per number: value, standard deviation, 95 % interval, share of the data."""
-        from rotorid.regression.estimate import parameter_columns
-
-        every = parameter_columns(*self._part(self.found.wished | True))
-        return frame((*every, Column("data_share", self.found.data_share)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance; None where not determined."""
-        import numpy as np
-
-        from rotorid.regression.estimate import parameter_dict
-
-        found, estimate = self.found, self.found.fit.estimate
-        names, every = self._part(found.wished | True)
-        parameters = parameter_dict(names, every)
-        for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
-            parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
-        return plain(
-            {
-                "parameters": parameters,
-                "rank": estimate.rank,
-                "condition_number": estimate.condition_number,
-                "identifiable": estimate.full_rank,
-                "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
-                "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
-                "correlation": every.correlation,
-                "seen": found.seen or None,
-                "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
-                "chi_square": found.chi_square,
-                "degrees_of_freedom": found.dof,
-                "probability": found.chance,
-                "exact": found.exact,
-                "explained": found.explained,
-                "lack_of_fit": found.lack_of_fit,
-                "unbalance": rows(self._unbalance()) if found.bare else [],
-                "warnings": found.warnings,
-                "rotor": None,
-            }
-        )
-
-    def rotor_files(self, path: Path) -> Mapping[Path, bytes]:
-        """The calibrated rotor as a rotor file, with its tables.
-
-        Raises
-        ------
-        ValueError
-            For numbers that the data do not determine.
-        """
+    def rotor_files(path: Path) -> Mapping[Path, bytes]:
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
-        if why := self.found.undetermined:
-            raise ValueError(f"{path}: no rotor file can be written, {why}")
-        return rotor_file_bytes(path, self.found.rotor)
+        if lacking := calibrated.undetermined:
+            raise ValueError(f"{path}: no rotor file can be written, {lacking}")
+        return rotor_file_bytes(path, calibrated.rotor)
 
-    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
-        """Names of some of the numbers, and these with their errors."""
-        import numpy as np
+    columns = [Column(each.name, [*each.values]) for each in parameter_columns(names, every)]
+    parts = [parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()]
+    return Outcome(
+        result=calibrated,
+        sentences=(f"The model {fits} the data ({chi}).",),
+        tables=(_short(*_part(calibrated, wished)),),
+        more=(*parts, *([unbalance] if calibrated.bare else [])),
+        beyond=f"all {counted(len(names), 'number')}, with 95 %",
+        short=True,
+        file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
+        files={".toml": rotor_files},
+        keys=plain(document),
+        warnings=calibrated.warnings,
+        notes=tuple(note for note, there in notes.items() if there),
+        provenance=origin,
+    )
 
-        from rotorid.regression.estimate import Uncertain
 
-        found, part = self.found, Uncertain()
-        part.values, part.errors_stated, part.dof = found.values[which], True, 0
-        part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
-        return tuple(name for name, taken in zip(found.names, which, strict=True) if taken), part
+def _part(calibrated: CalibratedRotor, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+    """Names of some of the numbers, and these with their errors."""
+    import numpy as np
 
-    def _unbalance(self) -> tuple[Column, ...]:
-        """What the bare rotor's readings say of its unbalances and bows."""
-        import numpy as np
+    from rotorid.regression.estimate import Uncertain
 
-        names, values = self.found.bare, np.concatenate(self.found.unbalance)
-        return (
-            Column("unbalance", names, str),
-            Column("size", np.abs(values), "{:.4g}".format),
-            Column("std", np.concatenate(self.found.unbalance_std), error_figures, "±"),
-            Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names], str),
-            Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
-        )
+    part = Uncertain()
+    part.values, part.errors_stated, part.dof = calibrated.values[which], True, 0
+    known = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
+    part.covariance = known[np.ix_(which, which)]
+    return tuple(name for name, taken in zip(calibrated.names, which, strict=True) if taken), part
+
+
+def _short(names: Sequence[str], part: Uncertain) -> str:
+    """The first numbers with one standard deviation, two a line."""
+    from rotorid.base.text import table
+    from rotorid.regression.estimate import value_digits
+
+    cells = []
+    stds = [float("nan")] * len(names) if part.std is None else part.std
+    for name, value, std in zip(names, part.values, stds, strict=True):
+        known = f"{value:.{value_digits(value, std)}g} ± {error_figures(std)}"
+        cells += [name, "not determined" if value != value else known]
+    cells += [""] * (-len(cells) % 4)
+    return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
+
+
+def _unbalance(calibrated: CalibratedRotor) -> Table:
+    """What the bare rotor's readings say of its unbalances and bows."""
+    import numpy as np
+
+    names, values = calibrated.bare, np.concatenate((*calibrated.unbalance, [0]))[:-1]
+    std = np.concatenate((*calibrated.unbalance_std, [0]))[:-1]
+    columns = (
+        Column("unbalance", names),
+        Column("size", np.abs(values), "{:.4g}".format),
+        Column("std", std, error_figures),
+        Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names]),
+        Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format),
+    )
+    return Table("unbalance", columns)
 
 
 class Prepared(NamedTuple):
@@ -232,9 +218,7 @@ def calibrate(
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    calibrated = Calibrated(found=result)
-    made = outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
-    return replace(made, result=result)
+    return outcome(result, origin)
 
 
 def prepared(
@@ -265,7 +249,5 @@ def prepared(
     sources = [file_of(file, "data") for file in given]
     readings, read = read_data(sources, model, places, options.bow)
     without = Prepared(model, [], readings, files, read)
-    numbers = unknowns(
-        model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
-    )
+    numbers = unknowns(model, without.probes, options.estimate, options.prior, exact=options.exact)
     return without._replace(numbers=numbers)

@@ -47,6 +47,8 @@ class Outcome(Answered):
         aligned already.
     beyond
         What `more` shows, in words; empty: the names of its tables.
+    short
+        Whether the first table is a short form of the first of `more`, which then stands for it.
     behind
         Tables that only the page shows.
     file
@@ -76,6 +78,7 @@ class Outcome(Answered):
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
+    short: bool = False
     behind: tuple[Table, ...] = ()
     file: Table | Callable[[], Table]
     lacking: str = ""
@@ -101,6 +104,7 @@ class Outcome(Answered):
                 for each in self.more
             ),
             self.beyond or listing(names, "and"),
+            self.short,
         )
 
     @property

@@ -71,7 +71,6 @@ CALIBRATE = (
     Key("data", Kind(_texts, {"type": "array", "items": TEXT.schema}), "as of the command", required="data"),
     Key("estimate", TEXT, "as `--estimate`", required="the unknown numbers, as --estimate has them"),
     Key("prior", TEXT, "as `--prior`", default=""),
-    Key("bounds", TEXT, "as `--bounds`", default=""),
     Key("exact", FLAG, "as `--exact`", default=False),
     Key("unbalance_at", TEXT, "as `--unbalance-at`"),
     Key("bow", whole("shapes of a bow", 0, 20), "as `--bow`", default=0),

@@ -148,7 +148,9 @@ def test_grades():
     assert [parse_grade(f"G{g:g}") for g in GRADES] == list(GRADES)
     assert parse_grade("g 2,5") == parse_grade(2.5) == 2.5
     for text in ("G3", "G5000", "fine"):
-        with pytest.raises(ValueError, match=rf"no balance quality grade '{text}': the grades are G0.4.*4000"):
+        with pytest.raises(
+            ValueError, match=rf"no balance quality grade '{text}': the grades are G0.4.*4000"
+        ):
             parse_grade(text)
 
 

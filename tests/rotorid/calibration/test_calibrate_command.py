@@ -115,8 +115,6 @@ def job(folder, *, rotor="rotor.csv", runs=("base", "trial"), weights="trial,P,1
         (("", ""), ("--bow", "-1"), "--bow takes a number from 0"),
         (("", ""), ("job.toml",), "is given twice"),
         (("", ""), ("--prior", "bearing[2].stiffness=5%"), "nothing that is estimated is called"),
-        (("", ""), ("--bounds", "bearing[1].stiffness=5:1"), "LOWEST:HIGHEST is needed"),
-        (("", ""), ("--bounds", "bearing[1].stiffness=-5:-1"), "must be finite and not negative"),
     ],
 )
 def test_jobs_and_options_that_cannot_be(cli, folder, change, args, said):
