@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from rotorid.reduction import SmallModel
 
 STANDARD_GRAVITY = 9.80665  # m/s²
-_AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
-"""Relative distances from a critical speed of a small model at which its response is computed."""
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
@@ -218,17 +216,6 @@ class Vibration:
             *std,
         )
         return Table("readings", columns)
-
-    def readings(self) -> Table:
-        """One row per speed, amplitude and phase of each sensor beside each other."""
-        document = self.response.to_dict(self.sensors)
-        columns = [Column("rpm", RPM * self.response.speeds, "{:.1f}".format, "speeds_rad_s.*", RPM)]
-        for k, name in enumerate(self.labels):
-            sizes = [1e6 * size for size in document["amplitude_m"][k]]
-            columns.append(Column(f"{name}: µm peak", sizes, figures, f"amplitude_m.{k}.*", 1e6))
-            phases = document["phase_deg"][k]
-            columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
-        return Table("amplitude and phase (lead)", tuple(columns))
 
     def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
         """What draws amplitude and phase over speed, polar curves, or orbits."""
@@ -467,24 +454,12 @@ def response(
             "no unbalance is given: a table with --unbalance, or own of a small model that has it"
         )
     places = _places(model, options.sensors)
-    if isinstance(model, fem.Rotor):
-        coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
-    else:
-        if options.view == "shape":
-            raise ValueError("--view shape draws a rotor; a small model has nodes alone")
-        by_node = {model.node(node): amount for node, amount in unbalance.items()}
-        coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
-    result = Vibration(
-        response=replace(coarse, windows=finer.windows, warnings=finer.warnings),
-        finer=finer,
-        std=std,
-        sensors=places,
-        peaks=peaks,
-        operating=operating,
-    )
-    at = None if options.at is None else _nearest(finer, options.at)
-    chief, every = critical_peaks(result.labels, peaks), result.named()
-    mounted = _mounted(model, coarse.unbalance)
+    if options.view == "shape" and not isinstance(model, fem.Rotor):
+        raise ValueError("--view shape draws a rotor; a small model has nodes alone")
+    result = _solved(model, unbalance, speeds, places, operating)
+    at = None if options.at is None else _nearest(result.finer, options.at)
+    chief, every = critical_peaks(result.labels, result.peaks), result.named()
+    mounted = _mounted(model, result.response.unbalance)
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
@@ -495,7 +470,6 @@ def response(
             *_peak_table("peaks of every reading", every, "peaks"),
             *(result.shape(at) if options.view == "shape" else ()),
         ),
-        behind=(result.readings(),),
         file=result.file(),
         keys=result.to_dict(),
         warnings=result.response.warnings,
@@ -508,70 +482,39 @@ def response(
     )
 
 
-_Answers = tuple["Response", "Response", "Sequence[Peaks]", "FloatArray | None"]
-"""At the speeds asked for; with speeds between them; peaks of each sensor; deviations of the amplitudes."""
-
-
-def _of_rotor(
-    model: Rotor,
+def _solved(
+    model: Rotor | SmallModel,
     unbalance: Unbalance,
     speeds: Sequence[float],
     places: Sequence[SensorLike],
     operating: tuple[float, float] | None,
-) -> _Answers:
+) -> Vibration:
+    """The response, the peaks between the speeds asked for, and what a calibration leaves open."""
     import numpy as np
 
     import fem
     from fem import as_sensor
     from fem.parameters import band as error_band
 
-    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
-    kept |= dict.fromkeys(support.node for support in model.supports)
-    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+    if isinstance(model, fem.Rotor):
+        kept = [model.node(as_sensor(place, model).node) for place in places]
+        kept = [*dict.fromkeys([*kept, *(support.node for support in model.supports)])]
+        coarse, criticals = fem.unbalance_response(model, unbalance, speeds, nodes=kept), None
+    else:
+        coarse = model.response(speeds, {model.node(node): amount for node, amount in unbalance.items()})
+        criticals = model.critical_speeds(speeds[0], speeds[-1])
+    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating, criticals=criticals)
+    std, doubts = None, tuple[str, ...]()
+    if isinstance(model, fem.Rotor):
 
-    def amplitudes(other: Rotor) -> FloatArray:
-        new = other is not model
-        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
-        return np.abs(again.readings(places))
+        def amplitudes(other: Rotor) -> FloatArray:
+            new = other is not model
+            again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=kept) if new else finer
+            return np.abs(again.readings(places))
 
-    std, doubts = error_band(model, "the amplitudes", amplitudes)
-    return coarse, replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
-
-
-def _of_small_model(
-    model: SmallModel,
-    unbalance: Mapping[int, complex],
-    speeds: Sequence[float],
-    places: Sequence[SensorLike],
-    operating: tuple[float, float] | None,
-) -> _Answers:
-    """The same: its critical speeds say where between the speeds asked for peaks may be."""
-    import numpy as np
-
-    import fem
-
-    coarse = model.response(speeds, unbalance)
-    near = np.multiply.outer(model.critical_speeds(speeds[0], speeds[-1]), 1 + np.array(_AROUND))
-    added = near[(near > speeds[0]) & (near < speeds[-1])]
-    finer, peaks = coarse, []
-    if np.count_nonzero(speeds) > 2:
-        finer = model.response(np.union1d(speeds, added), unbalance)
-        for place in places:
-            found = fem.response_peaks(finer, place, operating=operating).peaks
-            # of an undamped peak the half-power band is rounding
-            each = (replace(one, below=None, above=None) if one.undamped else one for one in found)
-            peaks.append(fem.Peaks(tuple(each), operating))
-        every = [peak for each in peaks for peak in each.peaks]
-        added = np.append(added, [peak.speed for peak in every])
-        # beside undamped peaks the amplitude has no limit and no meaning
-        undamped = np.array([peak.speed for peak in every if peak.undamped])
-        near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
-        finer = model.response(np.union1d(speeds, added[~near]), unbalance)
-        if undamped.size:
-            words = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
-            finer = replace(finer, warnings=(*finer.warnings, words))
-    return coarse, finer, peaks, None
+        std, doubts = error_band(model, "the amplitudes", amplitudes)
+    coarse = replace(coarse, windows=finer.windows, warnings=(*finer.warnings, *doubts))
+    return Vibration(response=coarse, finer=finer, std=std, sensors=places, peaks=peaks, operating=operating)
 
 
 def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
