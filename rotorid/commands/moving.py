@@ -67,7 +67,7 @@ def reduction_notes(system: MotionSystem) -> tuple[str, ...]:
     size, modes = counted(system.size, "unknown"), counted(system.modes, "mode")
     high = f"natural frequencies without films are high by {percent(system.frequency_error)} % at most"
     if system.frequency_error == float("inf"):
-        high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        high = "NOT ENOUGH for its natural frequencies up to twice the speed"
     return (f"of the rotor {size} move, {modes} among them; {high}",)
 
 
