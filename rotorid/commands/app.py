@@ -17,6 +17,7 @@ import contextlib
 import dataclasses
 import inspect
 import io
+import itertools
 import json
 import os
 import sys
@@ -141,28 +142,27 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
     for path, endings in targets:
         if path is None:
             continue
-        if path.suffix.lower() not in endings:
-            raise ValueError(
-                f"{path}: cannot write this kind of file; the name must end in {', '.join(endings)}"
-            )
-        if not path.parent.is_dir():
-            raise ValueError(f"{path}: the folder {path.parent} does not exist")
-        if path.exists() and not path.is_file():
-            what = "a folder" if path.is_dir() else "no regular file"
-            raise ValueError(f"{path}: cannot be written, it is {what}")
-        if not os.access(path if path.exists() else path.parent, os.W_OK):
-            raise ValueError(f"{path}: cannot be written, permission denied")
-        twin = next((other for other in asked if _same_file(path, other)), None)
-        if twin is not None:
-            raise ValueError(f"{path}: two results cannot go into one file; give each its own name")
+        folder, kind = path.parent, "a folder" if path.is_dir() else "no regular file"
+        refused = {
+            f"cannot write this kind of file; the name must end in {', '.join(endings)}": (
+                path.suffix.lower() not in endings
+            ),
+            f"the folder {folder} does not exist": not folder.is_dir(),
+            f"cannot be written, it is {kind}": path.exists() and not path.is_file(),
+            "cannot be written, permission denied": not os.access(path if path.exists() else folder, os.W_OK),
+            "two results cannot go into one file; give each its own name": any(
+                _same_file(path, other) for other in asked
+            ),
+        }
+        if why := [words for words, holds in refused.items() if holds]:
+            raise ValueError(f"{path}: {why[0]}")
         asked.append(path)
 
 
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Refuse to write a result over a file that was read for it."""
-    sources = list(inputs)
-    for path in targets:
-        if any(_same_file(path, source) for source in sources):
+    for path, source in itertools.product(targets, inputs):
+        if _same_file(path, source):
             raise ValueError(
                 f"{path}: this is an input of the command, which must not be overwritten; choose another name"
             )
@@ -232,14 +232,11 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
 
 def _check_sizes(typed: Mapping[str, Any]) -> None:
     """Refuse numbers whose squares no computer holds."""
-    from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size
+    from rotorid.files.decimal_numbers import LARGEST_STATED
 
     for name, value in typed.items():
-        if isinstance(value, float):
-            try:
-                check_size(value, LARGEST_STATED)
-            except NotANumber as error:
-                raise ValueError(f"{option_name(name)} takes {error}, not {value:g}") from None
+        if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
+            raise ValueError(f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}")
 
 
 def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -18,8 +18,6 @@ from rotorid.report.options import rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fem import Campbell, Rotor
     from rotorid.base.arrays import FloatArray
 
@@ -104,15 +102,11 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         peaks = [row["speed_rad_s"] for row in rows if not row["heavily_damped"]]
         beside["operating"] = Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
-    pictures: dict[str, Callable[[], Figure]] = {
-        "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
-    }
     if span:
         from rotorid.commands.cross_coupling import cross_coupling
 
-        coupling = cross_coupling(model, operating[1] if operating else speeds[-1], span, place)
-        beside["cross_coupling"] = coupling
-        pictures["Logarithmic decrements over added cross-coupling."] = coupling.figure
+        at = operating[1] if operating else speeds[-1]
+        beside["cross_coupling"] = cross_coupling(model, at, span, place)
     sentences += [part.sentence() for part in beside.values()]
     keys = {**whirl.to_dict(), **{key: part.to_dict() for key, part in beside.items()}}
     if options.mesh_check:
@@ -136,7 +130,9 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         keys=keys,
         warnings=whirl.warnings,
         notes=(whirl.cut,) if whirl.cut else (),
-        pictures=pictures,
+        pictures={
+            "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
+        },
         title="Whirl",
         provenance=provenance(files, options),
     )

@@ -98,25 +98,17 @@ class Vibration:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: what is largest, and the peaks, with the speeds between."""
         document = self.response.to_dict(self.sensors)
-        warnings = document.pop("warnings")
-        at_support = self._largest(self.finer.bearing_forces().largest)
-        readings = self._largest(self.finer.readings(self.sensors))
+        warnings, limit, forces = document.pop("warnings"), self.limit(), self._largest_forces()
         errors = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
-        limit = self.limit()
         return {
             **document,
             **errors,
             "orbits": self._orbits(),
-            "largest": [
-                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed} | std
-                for name, (size, speed), std in zip(
-                    self.labels, readings, self._std_of(readings), strict=True
-                )
-            ],
+            "largest": self._largest_readings(),
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
-                "largest_N": [size for size, _ in at_support],
-                "largest_at_rad_s": [speed for _, speed in at_support],
+                "largest_N": [size for size, *_ in forces],
+                "largest_at_rad_s": [speed for _, speed, _ in forces],
             },
             "peaks": [
                 {"sensor": name, **peak}
@@ -129,15 +121,16 @@ class Vibration:
 
     def sentences(self, chief: Sequence[Peak]) -> list[str]:
         """Whether it runs steadily, whether the margins are as required, what is largest, and the limit."""
-        first, limit = [*self._judgement(chief).splitlines(), self.finer.highest], self.limit()
-        if not limit:
-            return first
-        largest, allowed = (1e6 * limit[key] for key in ("largest_peak_to_peak_m", "allowed_peak_to_peak_m"))
-        return [
-            *first,
-            f"In the operating range readings reach {figures(largest)} µm peak-to-peak; API 617 allows "
-            f"{allowed:.3g} µm peak-to-peak at {rpm_text(limit['speed_rad_s'])}.",
-        ]
+        unstable = listing([window.where() for window in self.response.windows], "and")
+        first = [f"UNSTABLE {unstable}: there is no steady response there."] if unstable else []
+        first += [self._margins(chief), self.finer.highest]
+        if limit := self.limit():
+            largest, allowed = (1e6 * limit[f"{key}_peak_to_peak_m"] for key in ("largest", "allowed"))
+            first.append(
+                f"In the operating range readings reach {figures(largest)} µm peak-to-peak; API 617 allows "
+                f"{allowed:.3g} µm peak-to-peak at {rpm_text(limit['speed_rad_s'])}."
+            )
+        return first
 
     def limit(self) -> dict[str, float]:
         """The largest reading in the operating range beside the limit of API 617; empty without either."""
@@ -150,52 +143,38 @@ class Vibration:
         if not there.any():
             return {}
         largest = 2 * float(np.abs(self.finer.readings(self.sensors)[there]).max())
-        allowed = fem.api617_limit(high)
         return {
             "speed_rad_s": high,
-            "allowed_peak_to_peak_m": allowed,
+            "allowed_peak_to_peak_m": fem.api617_limit(high),
             "largest_peak_to_peak_m": largest,
         }
 
-    def named(self) -> list[tuple[str, Peak]]:
-        """All peaks, each with its sensor."""
-        pairs = zip(self.labels, self.peaks, strict=False)
-        return [(name, peak) for name, peaks in pairs for peak in peaks.peaks]
-
     def largest(self) -> Table:
         """The largest reading of each sensor."""
-        where = self._largest(self.finer.readings(self.sensors))
-        sizes = [None if size is None else 1e6 * size for size, _ in where]
-        key = "amplitude_std_m"
-        stds = [1e6 * std[key] for std in self._std_of(where) if std]
+        rows = self._largest_readings()
+        sizes = [row["amplitude_m"] and 1e6 * row["amplitude_m"] for row in rows]
+        stds = [1e6 * row["amplitude_std_m"] for row in rows if "amplitude_std_m" in row]
+        key = "largest.*.amplitude_m"
         columns = (
             Column("sensor", self.labels),
-            Column("largest reading, µm peak", sizes, figures, "largest.*.amplitude_m", 1e6),
-            *([Column("±", stds, error_figures, f"largest.*.{key}", 1e6)] if stds else []),
-            Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), "largest.*.amplitude_m", 2e6),
-            Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
+            Column("largest reading, µm peak", sizes, figures, key, 1e6),
+            *([Column("±", stds, error_figures, "largest.*.amplitude_std_m", 1e6)] if stds else []),
+            Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), key, 2e6),
+            _rpm([row["speed_rad_s"] for row in rows], "largest.*.speed_rad_s"),
         )
         return Table("largest readings", columns)
 
-    def _std_of(self, largest: Sequence[tuple[float | None, float | None]]) -> list[dict[str, float]]:
-        """Deviation of the largest amplitude of each sensor by its key in the document; empty if unknown."""
-        if self.std is None:
-            return [{}] * len(largest)
-        rows = [None if speed is None else self.finer.speeds.searchsorted(speed) for _, speed in largest]
-        return [
-            {} if row is None else {"amplitude_std_m": float(self.std[row, k])} for k, row in enumerate(rows)
-        ]
-
     def forces(self) -> tuple[Table, ...]:
         """The largest force on each support."""
-        supports = self.response.rotor.supports
-        where = self._largest(self.finer.bearing_forces().largest)
+        supports, largest, key = (
+            self.response.rotor.supports,
+            self._largest_forces(),
+            "bearing_forces.largest_",
+        )
         columns = (
             Column("support", [support.name or f"node {support.node}" for support in supports]),
-            Column(
-                "largest force, N peak", [size for size, _ in where], figures, "bearing_forces.largest_N.*"
-            ),
-            Column("at rpm", _rpm(where), "{:.1f}".format, "bearing_forces.largest_at_rad_s.*", RPM),
+            Column("largest force, N peak", [size for size, *_ in largest], figures, f"{key}N.*"),
+            _rpm([speed for _, speed, _ in largest], f"{key}at_rad_s.*"),
         )
         return (Table("forces on the supports", columns),) if supports else ()
 
@@ -218,10 +197,10 @@ class Vibration:
         return Table("readings", columns)
 
     def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
-        """What draws amplitude and phase over speed, polar curves, or orbits."""
-        from fem.plots import bode_figure, orbits_figure, polar_figure
+        """What draws amplitude and phase over speed, polar curves, orbits, or the deflected rotor."""
+        from fem.plots import bode_figure, draw_deflected_shape, orbits_figure, polar_figure
+        from rotorid.base.plot_style import on_figure
 
-        one_of(view, "view", get_args(View))
         finer, places = self.finer, self.sensors
         draw: dict[str, tuple[str, Callable[[], Figure]]] = {
             "bode": (
@@ -230,23 +209,16 @@ class Vibration:
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
             "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
-            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
+            "shape": (
+                "Deflected shape.",
+                lambda: on_figure(lambda ax: draw_deflected_shape(self._deflected(at), 0, ax)),
+            ),
         }
         others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
-        return dict(draw[name] for name in (view, *others))
+        return dict(draw[name] for name in (one_of(view, "view", get_args(View)), *others))
 
-    def shape_figure(self, at: int | None) -> Figure:
-        """The deflected rotor at a speed."""
-        from fem.plots import draw_deflected_shape
-        from rotorid.base.plot_style import on_figure
-
-        shape = self._deflected(at)
-        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
-
-    def shape(self, at: int | None) -> tuple[Table, ...]:
-        """The orbit of each node at a speed; nothing without a steady response."""
-        if not self.finer.steady.any():
-            return ()
+    def shape(self, at: int | None) -> Table:
+        """The orbit of each node at a speed."""
         from rotorid.base.rpm import phase_deg
 
         shape = self._deflected(at)
@@ -257,32 +229,29 @@ class Vibration:
             Column("minor axis", 1e6 * shape.minor[0], figures),
             Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
         )
-        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
+        return Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns)
 
-    def _judgement(self, chief: Sequence[Peak]) -> str:
-        """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
-        unstable = listing([window.where() for window in self.response.windows], "and")
-        first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
-        low, high = self.operating or (0.0, 0.0)
-        speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
+    def _margins(self, chief: Sequence[Peak]) -> str:
+        """Whether margins are as required, and what to do where that is unknown."""
         from rotorid.commands.operating_range import open_question
 
+        low, high = self.operating or (0.0, 0.0)
+        speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
         question = open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
+        many = counted(len(chief), "critical speed")
         if self.operating is None or not (chief or question):
-            asked = (
-                f"at {counted(self.response.speeds.size, 'speed')} from {range_text(speeds[0], speeds[-1])}, "
-                f"{counted(len(self.sensors), 'reading')}"
+            few = "No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:"
+            few = few if self.response.steady.any() else "No steady response"
+            return (
+                f"{many if chief else few} at {counted(self.response.speeds.size, 'speed')} from "
+                f"{range_text(speeds[0], speeds[-1])}, {counted(len(self.sensors), 'reading')}."
             )
-            few = "" if self.response.steady.any() else "No steady response"
-            few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
-            return f"{first}{counted(len(chief), 'critical speed') if chief else few} {asked}."
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
         if near:
-            many = "s" * (len(near) > 1)
-            return f"{first}NOT far enough {beside}: critical speed{many} {listing(near, 'and')}."
+            return f"NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} {listing(near, 'and')}."
         if question:
-            return f"{first}NOT KNOWN whether all are far enough {beside}: {question}."
-        return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
+            return f"NOT KNOWN whether all are far enough {beside}: {question}."
+        return f"{many} far enough {beside}."
 
     @property
     def drawn(self) -> bool:
@@ -302,15 +271,26 @@ class Vibration:
         """Of values at the speeds of `finer` those at the speeds asked for."""
         return finer[self.finer.speeds.searchsorted(self.response.speeds)]
 
-    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
-        """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
+    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None, int]]:
+        """The largest size in each column where a steady response exists, its speed, rad/s, and its row."""
         steady, speeds = self.finer.steady, self.finer.speeds
         if not steady.any():
-            return [(None, None)] * values.shape[1]
+            return [(None, None, 0)] * values.shape[1]
         sizes = abs(values) * steady[:, None]
-        return [
-            (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
-        ]
+        return [(float(sizes[row, k]), float(speeds[row]), row) for k, row in enumerate(sizes.argmax(axis=0))]
+
+    def _largest_forces(self) -> list[tuple[float | None, float | None, int]]:
+        return self._largest(self.finer.bearing_forces().largest)
+
+    def _largest_readings(self) -> list[dict[str, Any]]:
+        """The largest amplitude of each sensor, m, its speed, and its deviation where that is known."""
+        rows = []
+        largest = self._largest(self.finer.readings(self.sensors))
+        for k, (name, (size, speed, row)) in enumerate(zip(self.labels, largest, strict=True)):
+            rows.append({"sensor": name, "amplitude_m": size, "speed_rad_s": speed})
+            if self.std is not None and speed is not None:
+                rows[-1]["amplitude_std_m"] = float(self.std[row, k])
+        return rows
 
     def _deflected(self, at: int | None) -> Response:
         """The response of all nodes at a speed."""
@@ -320,21 +300,20 @@ class Vibration:
         return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
 
     def _speed_of(self, at: int | None) -> int:
-        steady = self.finer.steady
-        if not steady.any():
+        if at is not None:
+            return at
+        if not self.finer.steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
-        sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        return int((sizes * steady).argmax()) if at is None else at
+        return int((abs(self.finer.readings(self.sensors)).max(axis=1) * self.finer.steady).argmax())
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
         import numpy as np
 
         import fem
-        from fem import as_sensor
 
         result = self.response
-        nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in self.sensors]
+        nodes = [result.rotor.node(fem.as_sensor(place, result.rotor).node) for place in self.sensors]
         index = [result.column(node) for node in nodes]
         ellipses = fem.orbits(result.x[:, index], result.y[:, index])
         names = {1: "forward", -1: "backward", 0: "straight"}
@@ -347,8 +326,8 @@ class Vibration:
         }
 
 
-def _rpm(where: Iterable[tuple[float | None, float | None]]) -> list[float | None]:
-    return [None if speed is None else speed * RPM for _, speed in where]
+def _rpm(speeds: Sequence[float | None], key: str) -> Column:
+    return Column("at rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, key, RPM)
 
 
 def _peak_table(name: str, named: Sequence[tuple[str, Peak]], place: str = "") -> tuple[Table, ...]:
@@ -441,8 +420,8 @@ def response(
             raise ValueError(f"--unbalance {unbalance} follows from the journals of a rotor: give a table")
         asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
         unbalance = _api_unbalance(model, unbalance, speeds, highest)
-        each = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
-        standard += f"{listing(each, 'and')}, N = {rpm_text(highest)}."
+        planes = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
+        standard += f"{listing(planes, 'and')}, N = {rpm_text(highest)}."
     elif unbalance == "own":
         asked, unbalance = {"unbalance": unbalance}, getattr(model, "unbalance", {})
     elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
@@ -458,17 +437,17 @@ def response(
         raise ValueError("--view shape draws a rotor; a small model has nodes alone")
     result = _solved(model, unbalance, speeds, places, operating)
     at = None if options.at is None else _nearest(result.finer, options.at)
-    chief, every = critical_peaks(result.labels, result.peaks), result.named()
-    mounted = _mounted(model, result.response.unbalance)
+    chief, each = critical_peaks(result.labels, result.peaks), zip(result.labels, result.peaks, strict=False)
+    every = [(name, peak) for name, peaks in each for peak in peaks.peaks]
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
         tables=(*_peak_table("peaks", chief), result.largest()),
         more=(
-            mounted,
+            _mounted(model, result.response.unbalance),
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *(result.shape(at) if options.view == "shape" else ()),
+            *([result.shape(at)] if options.view == "shape" and result.finer.steady.any() else []),
         ),
         file=result.file(),
         keys=result.to_dict(),
@@ -493,11 +472,10 @@ def _solved(
     import numpy as np
 
     import fem
-    from fem import as_sensor
     from fem.parameters import band as error_band
 
     if isinstance(model, fem.Rotor):
-        kept = [model.node(as_sensor(place, model).node) for place in places]
+        kept = [model.node(fem.as_sensor(place, model).node) for place in places]
         kept = [*dict.fromkeys([*kept, *(support.node for support in model.supports)])]
         coarse, criticals = fem.unbalance_response(model, unbalance, speeds, nodes=kept), None
     else:
@@ -519,20 +497,16 @@ def _solved(
 
 def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    from fem import Rotor
     from rotorid.base.rpm import phase_deg
 
-    each, along = sorted(unbalance.items()), list[Column]()
-    names = [str(node) for node, _ in each]
-    if isinstance(rotor, Rotor):
-        stations = [[name for name, at in rotor.stations.items() if at == node] for node, _ in each]
-        names = [f"{node} {', '.join(known)}".strip() for node, known in zip(names, stations, strict=True)]
-        along = [Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format)]
+    nodes, stations = sorted(unbalance), getattr(rotor, "stations", {})
+    names = [" ".join([str(node), *(name for name, at in stations.items() if at == node)]) for node in nodes]
     columns = (
         Column("node", names),
-        *along,
-        Column("unbalance, g·mm", [1e6 * abs(u) for _, u in each], "{:.6g}".format),
-        Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in each], "{:.6g}".format),
+        Column("unbalance, g·mm", [1e6 * abs(unbalance[node]) for node in nodes], "{:.6g}".format),
+        Column(
+            "angle, ° with the rotation", [float(phase_deg(unbalance[n])) for n in nodes], "{:.6g}".format
+        ),
     )
     return Table("what is mounted", columns)
 

@@ -99,13 +99,13 @@ def test_a_driven_record_takes_times_and_inputs_of_another(cli, tmp_path):
     model, given, file = (tmp_path / name for name in ("m.toml", "u.csv", "y.csv"))
     model.write_text('inputs = ["u"]\n[states]\nx = "u - a*x"\n[initial]\nx = 0\n[estimate]\na = 1\n')
     given.write_text("t_ms,u\n0,1\n500,1\n2000,1\n")
-    found = cli("simulate", model, "--with", "a=2", "--input-record", given, "--output", file)
+    found = cli("simulate", model, "--with", "a=2", "--times", given, "--output", file)
     assert found.code == 0, found.err
     table = np.array(printed(file)[1:], dtype=float)
     assert np.allclose(table[:, 1], (1 - np.exp(-2 * np.array([0, 0.5, 2]))) / 2, rtol=1e-9)
     assert printed(file)[0] == ["t_s", "x", "u"]
     assert abs(cli("fit", model, file, "--json").json["parameters"]["a"]["value"] - 2) < 1e-6
-    assert "give --input-record" in cli("simulate", model, "--with", "a=2", "--times", "0:1:0.5").err
+    assert "give a record of it" in cli("simulate", model, "--with", "a=2", "--times", "0:1:0.5").err
 
 
 def test_lesson_7_rounds_z_first(cli, tmp_path):
@@ -183,7 +183,7 @@ def test_amplitudes_without_a_sensor_are_not_written(cli, tmp_path):
 UNDAMPED = 'equations = ["(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]\n'
 EXACT = ("--with", "c=1000,alpha=10")
 USUAL = (*EXACT, "--inputs", "F=10")
-WAYS = "one of --frequencies, --modes, --times or --input-record"
+WAYS = "one of --frequencies, --modes or --times"
 
 
 @pytest.mark.parametrize(
