@@ -99,9 +99,6 @@ def schema(
     kind: Annotated[
         str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")
     ],
-    json: Annotated[
-        bool, typer.Option("--json", help="As without: a schema is JSON.", rich_help_panel="Output")
-    ] = True,
 ) -> None:
     """JSON schema of a job, a rotor file or other settings, for editors to check keys.
 

@@ -72,11 +72,10 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
     if any(Path(os.path.realpath(path)).is_relative_to(samples.resolve()) for path in copies):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     theirs = [p for p, data in copies.items() if p.exists() and not (p.is_file() and p.read_bytes() == data)]
-    if not all(path.exists() for path in copies):  # no demo ran here before
-        theirs += [picture for picture in pictures if picture.exists()]
+    ran = all(path.exists() for path in copies)
+    theirs += [] if ran else [picture for picture in pictures if picture.exists()]
     if theirs:
-        named = ", ".join(map(str, theirs))
-        raise ValueError(f"{named}: differs from the sample and would be overwritten; delete it, or {remedy}")
+        raise ValueError(f"{theirs[0]}: differs from the sample and would be overwritten; {remedy}")
     for path in copies:
         path.parent.mkdir(parents=True, exist_ok=True)
     write_files({path: data for path, data in copies.items() if not path.exists()})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures
+from rotorid.commands.model_places import model_places
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import BoolArray
     from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
     from rotorid.regression.estimate import Uncertain
+    from rotorid.tables import Job
 
 _ROWS = 5
 """Of the short table, with two numbers each."""
@@ -231,8 +233,8 @@ def prepared(
     ValueError
         As `calibrate`.
     """
-    from rotorid.commands.calibration_data import read_data
     from rotorid.commands.unknown_numbers import unknowns
+    from rotorid.tables import read_job
 
     model, files = rotor_source(rotor)
     given = [data] if isinstance(data, Path | str) else list(data)
@@ -247,7 +249,50 @@ def prepared(
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
-    readings, read = read_data(sources, model, places, options.bow)
+    readings, read = [], list[Path]()
+    for file in sources:
+        job = read_job(file)
+        try:
+            readings.append(run_readings(job, model, places, options.bow))
+        except ValueError as error:
+            raise ValueError(f"{file.name}: {error}") from None
+        read += job.files
     without = Prepared(model, [], readings, files, read)
     numbers = unknowns(model, without.probes, options.estimate, options.prior, exact=options.exact)
     return without._replace(numbers=numbers)
+
+
+def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0) -> RunReadings:
+    """The runs of a job at their places in the model.
+
+    Raises
+    ------
+    ValueError
+        Where a plane or a sensor has no place in the model, or the runs say nothing of it.
+    """
+    import numpy as np
+
+    from rotorid.calibration import RunReadings
+
+    trials, places = job.trials, model_places(job)
+    if job.rotor is not None and job.rotor.n_nodes != rotor.n_nodes:
+        raise ValueError(
+            f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, this one has {rotor.n_nodes}: "
+            "its planes and sensors would be elsewhere"
+        )
+    changed = bool((trials.weights != trials.weights[0]).any())
+    if not (unbalance or bow or changed):
+        raise ValueError(
+            "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
+            "are needed, or nodes at which the unbalance may stand (--unbalance-at)"
+        )
+    return RunReadings(
+        trials,
+        tuple(places.nodes[plane] for plane in trials.planes),
+        np.array([1.0 if places.radii is None else places.radii[plane] for plane in trials.planes]),
+        tuple(places.sensors[sensor] for sensor in trials.sensors),
+        places.derivatives,
+        job.key_phasor,
+        tuple(unbalance),
+        bow,
+    )

@@ -158,16 +158,20 @@ def _sentence(fit: FittedModes) -> str:
 
 def _tables(fit: FittedModes) -> tuple[Table, Table]:
     """Frequencies and damping, and shapes."""
-    omega, zeta, error, other = fit.values
     shapes = [Column("point", fit.readings.sensors)]
     for mode, (shape, std) in enumerate(zip(fit.shapes, fit.shape_std, strict=True), 1):
         shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
         shapes.append(Column("±", abs(shape) * std, error_figures))
-    frequencies = (
+    return Table("modes", frequencies(fit, "ω, rad/s")), Table("shapes", tuple(shapes))
+
+
+def frequencies(fit: FittedModes, heading: str, scale: float = 1.0) -> tuple[Column, ...]:
+    """A row a mode: its frequency in a unit of which 1 rad/s has `scale`, and its damping."""
+    omega, zeta, error, other = fit.values
+    return (
         Column("mode", range(1, len(omega) + 1)),
-        Column("ω, rad/s", omega, "{:.7g}".format),
-        Column("±", error, error_figures),
+        Column(heading, scale * omega, "{:.7g}".format),
+        Column("±", scale * error, error_figures),
         Column("ζ, %", 100 * zeta, "{:.4g}".format),
         Column("± ", 100 * other, error_figures),
     )
-    return Table("modes", frequencies), Table("shapes", tuple(shapes))

@@ -12,7 +12,7 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import figures, percent
-from rotorid.commands.moving import moving, reduction, reduction_notes
+from rotorid.commands.moving import SMALL, mounted_nodes, moving, reduction, reduction_notes
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
@@ -41,8 +41,6 @@ View = Literal["motion", "orbits", "bode"]
 Start = Literal["rest", "steady"]
 _TOLERANCE = 1e-6
 """Error of one step, by how far the rotor has moved from where it began."""
-_SMALL = 24
-"""Unknowns above which a rotor is reduced, where nothing else is asked for."""
 _LOOSER = 30.0
 """Times the tolerance: the motion is found twice, and what differs is told as its error."""
 _UNSURE = 1e-3
@@ -270,8 +268,8 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
     shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    if system.size > _SMALL:
-        system = reduced_system(system, [*shown, *shift, *_loaded(system)], None)
+    if system.size > SMALL:
+        system = reduced_system(system, [*shown, *shift, *mounted_nodes(system)], None)
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
     found = move(tolerance=_TOLERANCE)
@@ -344,8 +342,8 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports if support.node in system.nodes]
     chosen = (
-        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
-        if stations or system.size > _SMALL
+        {*map(source.node, stations), *walled, *supports, *mounted_nodes(system)}
+        if stations or system.size > SMALL
         else ()
     )
     return tuple(sorted(chosen)) or system.nodes
@@ -364,12 +362,6 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
         return complex(length * np.exp(1j * np.radians(degrees(angle or "0", "--displaced"))))
 
     return pairs(given or {}, "--displaced", read, "7=20um@90")
-
-
-def _loaded(system: MotionSystem) -> list[int]:
-    """Nodes with unbalance, unless they are too many."""
-    found = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
-    return found if len(found) <= _SMALL // 2 else []
 
 
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
+SMALL = 24
+"""Unknowns above which a rotor is reduced."""
 Table = Mapping[int, complex] | Path | str
 
 
@@ -69,6 +71,12 @@ def reduction_notes(system: MotionSystem) -> tuple[str, ...]:
     if system.frequency_error == float("inf"):
         high = "NOT ENOUGH for its natural frequencies up to twice the speed"
     return (f"of the rotor {size} move, {modes} among them; {high}",)
+
+
+def mounted_nodes(system: MotionSystem) -> list[int]:
+    """Nodes with unbalance, unless they are too many to be kept in a reduced system."""
+    nodes = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
+    return nodes if len(nodes) <= SMALL // 2 else []
 
 
 def moving(

@@ -12,7 +12,14 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
+from rotorid.commands.moving import (
+    SMALL,
+    Moving,
+    mounted_nodes,
+    moving,
+    reduction,
+    reduction_notes,
+)
 from rotorid.commands.quantities import Band, Sensor, degrees, sensors, two_speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
@@ -24,9 +31,6 @@ if TYPE_CHECKING:
     from rotorid.motion.periodic import PeriodicMotion
     from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
-
-_SMALL = 24
-"""Unknowns above which a rotor is reduced, to so many or more."""
 
 
 @dataclass(frozen=True)
@@ -236,9 +240,8 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
-    mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
-    kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
-    system = full if full.size <= _SMALL else reduced_system(full, kept, None)
+    kept = [node for node, _ in sensed] + mounted_nodes(full)
+    system = full if full.size <= SMALL else reduced_system(full, kept, None)
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))

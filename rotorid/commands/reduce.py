@@ -191,10 +191,10 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     rest = (part.answer for part in parts.values() if part is not placement)
 
     def model(path: Path) -> Written:
-        from rotorid.commands.reduce_result import model_files
+        from rotorid.commands.reduce_result import model_files, small_of
 
-        kept = options.keep_supports
-        return model_files(path, result, small, speed, name, keeps_supports=kept, forces=forces)
+        kept, model = options.keep_supports, small or small_of(result)
+        return model_files(path, result, model, speed, name, keeps_supports=kept, forces=forces)
 
     def state_space(path: Path) -> Written:
         from rotorid.commands.reduce_result import small_of, state_space_bytes
@@ -389,21 +389,16 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     if options.compliance is None or options.measured is None:
         raise ValueError("give a rotor, or --compliance and --measured, which take its place")
     data = read_modes(options.measured)
-    wanted = list(data.nodes)
-    if options.nodes is not None:
-        labels = [str(node) for node in nodes(options.nodes, "--nodes")]
-        named = {str(node): node for node in data.nodes}
-        wanted = [named.get(label, label) for label in labels]
+    named: dict[str, Any] = {str(node): node for node in data.nodes}
+    asked = data.nodes if options.nodes is None else nodes(options.nodes, "--nodes")
+    wanted = [named.get(str(node), node) for node in asked]
     data = modes_at(data, None, wanted, options.measured)
     known, alpha = read_compliance(options.compliance, wanted)
     order = [known.index(node) for node in wanted]
     used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
     springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
-    lost = [name for name in springs if name not in map(str, wanted)]
-    if lost:
-        raise ValueError(
-            f"--seals: no mass stands at {lost[0]!r}; masses stand at {', '.join(map(str, wanted))}"
-        )
+    if lost := springs.keys() - {*map(str, wanted)}:
+        raise ValueError(f"--seals: no mass stands at {min(lost)!r}")
     result = reduce_measured(
         alpha[order][:, order],
         data.frequencies,

@@ -358,23 +358,21 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
 
     head, _, planes = given.partition("@")
     times = number(head.partition(":")[2] or "1")
-    journals = [support.node for support in rotor.supports if support.kind == "bearing"]
-    if not times > 0 or not journals:
+    journals = np.array([support.kind == "bearing" for support in rotor.supports])
+    if not times > 0 or not journals.any():
         raise ValueError(f"--unbalance {given}: a number above 0 stands behind api:, and bearings are needed")
     static = fem.static_deflection(rotor, speeds[0])
-    forces = np.hypot(static.reaction_x, static.reaction_y) / STANDARD_GRAVITY
-    loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
+    loads = np.hypot(static.reaction_x, static.reaction_y)[journals] / STANDARD_GRAVITY
     if not planes:
-        total = sum(loads[node] for node in journals)
-        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
+        return {mid_span(rotor): times * fem.api_unbalance(loads.sum(), highest)}
+    places = rotor.positions[[support.node - 1 for support in rotor.supports]][journals]
     mounted: dict[int, complex] = {}
-    for plane in planes.split(","):
-        (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
+    for plane in map(str.strip, planes.split(",")):
+        (name,) = nodes(plane.removeprefix("-"), "--unbalance")
         node = rotor.node(name)
-        apart = [abs(rotor.positions[node - 1] - rotor.positions[each - 1]) for each in journals]
-        sign = -1 if plane.strip().startswith("-") else 1
-        load = loads[journals[int(np.argmin(apart))]]
-        mounted[node] = sign * times * fem.api_unbalance(load, highest)
+        load = loads[abs(places - rotor.positions[node - 1]).argmin()]
+        sign = -1 if plane.startswith("-") else 1
+        mounted[node] = sign * times * fem.api_unbalance(float(load), highest)
     return mounted
 
 

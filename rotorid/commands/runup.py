@@ -11,7 +11,7 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.commands.modes import NO_MODES, bands
+from rotorid.commands.modes import NO_MODES, bands, frequencies
 from rotorid.commands.quantities import Band, Names, acceleration, names, one_of
 from rotorid.commands.quantities import speeds as read_speeds
 from rotorid.report.options import file_of
@@ -117,18 +117,17 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
         modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
     except ValueError as error:
         why = str(error)
-    turned = () if modes is None else _turned(sweeps[0], modes)
-    fit = None if modes is None or modes.undetermined or turned else modes
+    turned = _turned(sweeps[0], modes) if modes else ()
+    doubts = (*turned, *modes.undetermined) if modes else (why,)
+    fit = None if doubts else modes
     roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
     mean, time = 0.0 if rate == 0.0 else None, sweeps[0].time
     if mean is None and time is not None and len(time) > 1:
         mean = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
     slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.covariances)
-    steady = None if modes is None else modes.steady
-    why = why or next(iter(turned or (() if modes is None else modes.undetermined)), "")
-    warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.warnings)
+    steady, estimate = (modes.steady, modes.fit.estimate) if modes else (None, None)
+    warnings = (*turned, *modes.warnings) if modes else (f"no modes: {why}",)
     warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
-    estimate = None if modes is None else modes.fit.estimate
     document = {
         "run": sweeps[0].run,
         "phase": sweeps[0].labels.phase,
@@ -145,7 +144,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
         sentences=(_sentence(sweeps[0].run, fit),),
         tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweeps[0])] if slow else [])),
         file=fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES,
-        lacking=f"there is no table of modes: {why}" if why else "",
+        lacking=f"there is no table of modes: {doubts[0]}" if doubts else "",
         title="Run-up",
         keys=dict(plain(document)),
         pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll)},
@@ -262,18 +261,11 @@ def _slow_roll(
 
 def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
     """A row a mode: with the acceleration, and as a steady fit has it."""
-    omega, zeta, error, other = fit.values
-    columns = [
-        Column("mode", range(1, len(omega) + 1)),
-        Column("critical rpm", RPM * omega, "{:.6g}".format),
-        Column("±", RPM * error, error_figures),
-        Column("ζ %", 100 * zeta, "{:.4g}".format),
-        Column("± ", 100 * other, error_figures),
-    ]
+    columns = frequencies(fit, "critical rpm", RPM)
     if steady is not None:
-        columns.append(Column("steady fit: rpm", RPM * steady.values[0], "{:.6g}".format))
-        columns.append(Column("ζ % ", 100 * steady.values[1], "{:.4g}".format))
-    return Table("critical speeds", tuple(columns))
+        held = frequencies(steady, "steady fit: rpm", RPM)
+        columns = (*columns, held[1], replace(held[3], heading="ζ, % "))
+    return Table("critical speeds", columns)
 
 
 def _roll_table(sweep: Readings, vectors: ComplexArray, covariances: FloatArray | None) -> Table:

@@ -40,7 +40,7 @@ BESIDE = 7
 _NOISE = {"amplitude_error", "phase_error", "sigma"}
 _WAYS = {
     "frequencies": {"inputs", "amplitude_error", "phase_error"},
-    "modes": {"inputs", "round"},
+    "modes": {"inputs"},
     "times": {"sigma"},
 }
 """What can be simulated, and which other options that has."""
@@ -61,9 +61,6 @@ class SimulateOptions:
         0; and what the equations multiply by, Omega=100.
     modes
         All natural frequencies and shapes, without damping.
-    round : z:N
-        Round z = ω² to so many significant digits first, as lessons 7 and 8 do: z:2; shapes follow from it by
-        all equations but the first.
     times : TIMES|RECORD
         A record at FIRST:LAST:STEP or a list, seconds; or at the times of another, with its inputs: u.csv.
     digits : N from 1
@@ -83,7 +80,6 @@ class SimulateOptions:
     frequencies: Speeds | None = None
     inputs: str | Mapping[str, complex] | None = None
     modes: bool = False
-    round: str | None = None
     times: Times | Path | None = None
     digits: int | None = None
     amplitude_error: float | None = None
@@ -128,7 +124,7 @@ def simulate(
     way, *more = [name for name in _WAYS if getattr(options, name)] or [""]
     if more or not way:
         raise ValueError(f"one of {listing(map(option_name, _WAYS))} is needed: what to simulate")
-    refuse(options, {"inputs", "round", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
+    refuse(options, {"inputs", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
     noisy = any(getattr(options, name) is not None for name in _NOISE)
     if not noisy:
         refuse(options, {"seed"}, "belongs to --amplitude-error, --phase-error and --sigma")
@@ -179,7 +175,7 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     check_names(given, "--inputs", [*excited, *equations.varying], "input", needed=equations.varying)
     errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error) if noisy else None
     if options.modes:
-        exact, polynomial = free_vibration(equations, theta, given, _digits_of_z(options.round))
+        exact, polynomial = free_vibration(equations, theta, given)
     else:
         frequencies = speeds(options.frequencies or "", what="--frequencies")
         exact = forced_vibration(equations, theta, frequencies, given)
@@ -187,24 +183,13 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     table = as_read(exact, read, errors, options.digits, options.seed or 0)
     where = counted(len(exact), "frequency", "frequencies")
     about = f"natural modes, {where}" if options.modes else f"amplitudes {listing(read, 'and')} at {where}"
-    unused = "the errors that the model states are not drawn: --amplitude-error or --phase-error does"
-    notes = (unused,) if file.errors and not noisy and not options.modes else ()
+    notes: tuple[str, ...] = ()
     if options.modes:
         powers = [f"z**{k}" if k > 1 else "z" * k for k in reversed(range(len(polynomial)))]
         terms = (f"{x:+.6g}*{z}".removesuffix("*") for x, z in zip(polynomial, powers, strict=True))
         written = " ".join(terms).removeprefix("+1*").replace(" -", " - ").replace(" +", " + ")
         notes = (f"frequency polynomial of z = ω²: {written} = 0",)
     return values, measurement_columns(table, [*filter(given.get, excited), *read]), about, notes
-
-
-def _digits_of_z(given: str | None) -> int | None:
-    """Read "z:2"."""
-    if given is None:
-        return None
-    what, _, digits = given.partition(":")
-    if what != "z" or not digits.isdecimal() or not 1 <= int(digits) <= 15:
-        raise ValueError(f"--round takes z and a number of digits from 1 to 15, z:2, not {given!r}")
-    return int(digits)
 
 
 def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:

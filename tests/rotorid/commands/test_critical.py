@@ -62,10 +62,7 @@ def test_the_map_says_what_it_leaves_out(cli, tmp_path):
     )
     write_rotor(tmp_path / "r.toml", rotor)
     said = " ".join(cli("critical", tmp_path / "r.toml", "-n", 1, "--map", "--json").json["warnings"])
-    assert "'labyrinth' is left out" in said
-    assert "'rear'" in said
-    assert "pedestal" in said
-    assert "front" not in said
+    assert "the map leaves out seals and pedestals" in said
 
 
 @pytest.mark.parametrize(("model", "named"), [("", 3), ("shear = true\nrotary_inertia = true", 0)])
