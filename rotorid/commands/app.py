@@ -241,40 +241,47 @@ def _check_sizes(typed: Mapping[str, Any]) -> None:
 
 def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:
     """A file, several, or a text; after the first a required option, unless it may be left out."""
-    files = str(one.annotation).startswith(("Sequence[", "JobGiven"))
-    needed = one.default is one.empty
-    first = files or not place or not needed
-    declared: Any = typer.Argument if first else typer.Option
-    flag = [] if first else [option_name(name)]
-    told = declared(*flag, metavar=about.metavar, help=about.text, rich_help_panel=None if first else "Input")
+    several = str(one.annotation).startswith(("Sequence[", "JobGiven"))
+    first = several or not place or one.default is not one.empty
     taken: Any = Path if "Path" in str(one.annotation) and first else str
-    taken = list[Path] if files else taken
-    annotation: Any = Annotated[taken if needed else taken | None, told]
-    default = None if one.default == () else one.default
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    declared = typer.Argument if first else typer.Option
+    return _parameter(name, about, list[taken] if several else taken, one.default, declared)
 
 
 def _options(kind: type, panel_of: Mapping[str, str]) -> Iterator[inspect.Parameter]:
     """One option for each field of a dataclass; what it chooses from is told in its help."""
     about, module = _documentation(kind), sys.modules[kind.__module__]
-    choices = getattr(module, "choices", None)
     for field in dataclasses.fields(kind):
-        name, written, kind_of = field.name, about[field.name], str(field.type).partition(" | ")[0]
+        name, kind_of = field.name, str(field.type).partition(" | ")[0]
         alias = getattr(module, kind_of, str)
         taken = _TYPES.get(kind_of, alias if get_origin(alias) is Literal else str)
-        flag = (option_name(name),) if taken is bool else ()  # without its --no-…
-        option = typer.Option(
-            *(written.flags or flag),
-            metavar=written.metavar,
-            help=written.text,
-            min=written.least,
-            rich_help_panel=panel_of.get(name, "Input"),
+        default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+        choices = getattr(module, "choices", None)
+        yield _parameter(
+            name, about[name], taken, default, typer.Option, panel_of.get(name, "Input"), choices
         )
-        default = None if field.default == () else field.default
-        if field.default is dataclasses.MISSING:
-            default = inspect.Parameter.empty
-        annotation: Any = Annotated[taken if default is not None else taken | None, option, choices]
-        yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _parameter(
+    name: str,
+    about: _Documented,
+    taken: Any,  # noqa: ANN401 - a type
+    default: object,
+    declared: Any,  # noqa: ANN401 - of typer
+    panel: str = "Input",
+    choices: object = None,
+) -> inspect.Parameter:
+    flag = (option_name(name),) if taken is bool else ()  # without its --no-…
+    default = None if default == () else default
+    option = declared(
+        *(about.flags or flag),
+        metavar=about.metavar,
+        help=about.text,
+        min=about.least,
+        rich_help_panel=None if declared is typer.Argument else panel,
+    )
+    annotation: Any = Annotated[taken if default is not None else taken | None, option, choices]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
