@@ -111,7 +111,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
         sentences=(f"The model {fits} the data ({chi}).",),
         tables=(_short(*_part(calibrated, wished)),),
         more=(*parts, *([unbalance] if calibrated.bare else [])),
-        beyond=f"all {counted(len(names), 'number')}, with 95 %",
+        beyond="all numbers, with 95 %",
         short=True,
         file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
         files={".toml": rotor_files},
