@@ -14,7 +14,7 @@ PACKAGES = house.PACKAGES
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
 RUFF = PROJECT["ruff"]
 PAIRS, NAMES, SCREEN = 273, 118, 28
-"""Of commands and options, without --help, and of one command: at most so many (issue 48 asks for 230 and 110)."""
+"""Commands with options, without --help, and of one command: at most so many (issue 48: 230 and 110)."""
 EXEMPT = 16
 """Functions that may be longer or take more than ruff's limits: at most so many."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, error_figures
+from rotorid.base.text import counted, error_figures, figures
 from rotorid.commands.model_places import model_places
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
@@ -137,14 +137,18 @@ def _part(calibrated: CalibratedRotor, which: BoolArray) -> tuple[tuple[str, ...
 
 def _short(names: Sequence[str], part: Uncertain) -> str:
     """The first numbers with one standard deviation, two a line."""
-    from rotorid.base.text import table
-    from rotorid.regression.estimate import value_digits
+    import numpy as np
 
+    from rotorid.base.text import table
+
+    stds = [np.nan] * len(names) if part.std is None else part.std
     cells = []
-    stds = [float("nan")] * len(names) if part.std is None else part.std
     for name, value, std in zip(names, part.values, stds, strict=True):
-        known = f"{value:.{value_digits(value, std)}g} ± {error_figures(std)}"
-        cells += [name, "not determined" if value != value else known]
+        digits = 4
+        if std > 0 and value:  # as many as stand before the second digit of the error
+            digits = max(2 + int(np.floor(np.log10(abs(value))) - np.floor(np.log10(std))), 1)
+        known = f"{figures(value, digits)} ± {error_figures(std)}"
+        cells += [name, "not determined" if np.isnan(value) else known]
     cells += [""] * (-len(cells) % 4)
     return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
 
