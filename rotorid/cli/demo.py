@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +14,6 @@ import typer
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.commands.app import json_text
 
-_SOURCES = ("rotor23.csv", "turbo_job")
 _COPIED = (".csv", ".toml", ".md", ".txt")
 STEPS = {
     "critical": "critical {}/rotor23.csv --plot {}/modes.png",
@@ -64,12 +62,11 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
     from rotorid.samples import sample_data
 
     samples, remedy = sample_data(), "choose another folder: rotorid demo DIR"
-    places = [samples / name for name in _SOURCES]
-    sources = [f for place in places for f in ([place] if place.is_file() else sorted(place.iterdir()))]
+    sources = [samples / "rotor23.csv", *sorted((samples / "turbo_job").iterdir())]
     copies = {folder / f.relative_to(samples): f.read_bytes() for f in sources if f.suffix in _COPIED}
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: this is a file; {remedy}")
-    if any(Path(os.path.realpath(path)).is_relative_to(samples.resolve()) for path in copies):
+    if any(path.resolve().is_relative_to(samples.resolve()) for path in copies):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     theirs = [p for p, data in copies.items() if p.exists() and not (p.is_file() and p.read_bytes() == data)]
     ran = all(path.exists() for path in copies)

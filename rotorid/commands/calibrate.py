@@ -42,7 +42,7 @@ class CalibrateOptions:
         they may be off by so much. Else they are unknown, too, with these standard deviations.
     unbalance_at : LIST
         Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
-    bow : N
+    bow : N from 0
         Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
     """
 
@@ -245,11 +245,7 @@ def prepared(
     if len({*map(str, given)}) < len(given):
         raise ValueError("one of the data files is given twice: it would count twice")
     named = [] if options.unbalance_at is None else nodes(options.unbalance_at, "--unbalance-at")
-    places = [model.node(node) for node in named]
-    if len({*places}) < len(places):
-        raise ValueError("--unbalance-at: one of its nodes stands twice")
-    if options.bow < 0:
-        raise ValueError("--bow takes a number from 0")
+    places = [*dict.fromkeys(model.node(node) for node in named)]
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]

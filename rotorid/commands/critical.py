@@ -98,7 +98,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         sentences=(modes.sentence(), *(part.sentence() for part in asked.values())),
         tables=(table,),
         more=tuple(one.under(key) for key, part in asked.items() for one in part.tables()[:1]),
-        behind=(shapes.only({name: _plain(name) for name in shapes.headings}),),
         file=chart.tables()[-1] if chart else shapes,
         keys={**modes.to_dict(), **{key: part.to_dict() for key, part in asked.items()}},
         warnings=modes.warnings,
@@ -107,11 +106,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         title="Critical speeds",
         provenance=provenance(files, options),
     )
-
-
-def _plain(heading: str) -> str:
-    """A heading of a file as people read it."""
-    return heading.replace("_m", ", m").replace("_", " ")
 
 
 def _pictures(

@@ -26,6 +26,7 @@ from rotorid.commands.quantities import (
     pairs,
     two_speeds,
 )
+from rotorid.report.options import refuse
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -267,7 +268,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     source = moving(model, options.unbalance, options.bow, direction)
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
-    shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
+    shift = {source.model.node(node): by for node, by in _displaced(options.displaced).items()}
     if system.size > SMALL:
         system = reduced_system(system, [*shown, *shift, *mounted_nodes(system)], None)
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
@@ -303,28 +304,23 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
 
 def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
     """First and last speed, rad/s, and the time between them, s."""
-    if (options.speed is None) == (options.run_up is None):
+    constant = options.speed is not None
+    if constant == (options.run_up is not None):
         raise ValueError("one of --speed and --run-up is needed")
-    if options.speed is not None:
-        speed = one_speed(options.speed, "--speed")
-        if options.acceleration is not None:
-            raise ValueError("--acceleration belongs to --run-up")
+    if constant:
+        speed = one_speed(options.speed or 0.0, "--speed")
         ends = (speed, speed)
+        refuse(options, ("acceleration",), "belongs to --run-up")
     else:
         ends = two_speeds(options.run_up or "", "--run-up", "FIRST:LAST")
         if ends[0] == ends[1]:
             raise ValueError(f"--run-up {options.run_up!r}: two different speeds are needed; else --speed")
     if (options.time is None) == (options.acceleration is None):
-        one = (
-            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
-        )
-        raise ValueError(one)
+        raise ValueError("--time is needed" if constant else "one of --time and --acceleration is needed")
     if options.time is None:
         rate = acceleration(options.acceleration or 0.0, "--acceleration", bare=True)
         if not rate > 0:
-            raise ValueError(
-                f"--acceleration {options.acceleration!r} must be above 0; the speeds say whether up or down"
-            )
+            raise ValueError(f"--acceleration {options.acceleration!r} must be above 0, also down")
         return ends, abs(ends[1] - ends[0]) / rate
     time = number(str(options.time).strip().removesuffix("s"))
     if not 0 < time < FASTEST:
@@ -338,11 +334,13 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
 
     walled = [force.node for force in system.forces if np.isfinite(force.wall)]
     if given is not None:
-        return tuple(dict.fromkeys([*(source.node(node) for node in nodes(given, "--sensors")), *walled]))
+        return tuple(
+            dict.fromkeys([*(source.model.node(node) for node in nodes(given, "--sensors")), *walled])
+        )
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports if support.node in system.nodes]
     chosen = (
-        {*map(source.node, stations), *walled, *supports, *mounted_nodes(system)}
+        {*map(source.model.node, stations), *walled, *supports, *mounted_nodes(system)}
         if stations or system.size > SMALL
         else ()
     )

@@ -42,10 +42,6 @@ class Moving:
     direction: float
     files: tuple[Path, ...]
 
-    def node(self, name: str | int) -> int:
-        """Number of a node, as the model's `node`."""
-        return self.model.node(name)
-
     def system(self, lowest: float, highest: float) -> MotionSystem:
         """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
         from rotorid.motion.system import rotor_system

@@ -272,4 +272,4 @@ def _sensors(
     places = list(dict.fromkeys(nodes or system.nodes)) if given is None else sensors(given)
     both = [place if isinstance(place, tuple) else (place, 0.0) for place in places]
     labels = tuple(f"{name}" if angle == 0 else f"{name}:{angle:g}" for name, angle in both)
-    return labels, [(what.node(name), angle) for name, angle in both]
+    return labels, [(what.model.node(name), angle) for name, angle in both]

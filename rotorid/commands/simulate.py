@@ -126,17 +126,15 @@ def simulate(
         raise ValueError(f"one of {listing(map(option_name, _WAYS))} is needed: what to simulate")
     refuse(options, {"inputs", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
     noisy = any(getattr(options, name) is not None for name in _NOISE)
-    if not noisy:
-        refuse(options, {"seed"}, "belongs to --amplitude-error, --phase-error and --sigma")
-    if options.digits is not None and not 1 <= options.digits <= 15:
-        raise ValueError(f"--digits takes a number from 1 to 15, not {options.digits}")
+    if options.digits is not None and options.digits < 1:
+        raise ValueError(f"--digits takes a number from 1, not {options.digits}")
     sources = (model, options.times if _is_record(options.times) else None)
     files = [Path(given) for given in sources if isinstance(given, Path | str)]
     solve = _amplitudes if way in ("frequencies", "modes") else _record
-    values, told, about, notes = solve(model, options, noisy)
+    values, simulated, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
-    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in told)
+    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in simulated)
     first, *others = columns
     blocks = [(first, *others[k : k + BESIDE]) for k in range(0, len(others), BESIDE)]
     listed = listing((f"{name} = {value:g}" for name, value in values.items()), "and")

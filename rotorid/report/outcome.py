@@ -49,8 +49,6 @@ class Outcome(Answered):
         What `more` shows, in words; empty: the names of its tables.
     short
         Whether the first table is a short form of the first of `more`, which then stands for it.
-    behind
-        Tables that only the page shows.
     file
         What `--output` writes and `to_frame` gives.
     lacking
@@ -79,7 +77,6 @@ class Outcome(Answered):
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
     short: bool = False
-    behind: tuple[Table, ...] = ()
     file: Table | Callable[[], Table]
     lacking: str = ""
     files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
@@ -163,7 +160,7 @@ class Outcome(Answered):
             sentences=self.sentences,
             tables=list(map(block, self.tables)),
             pictures=[(drawn(draw, caption), caption) for caption, draw in self.pictures.items()],
-            more=list(map(block, (*self.more, *self.behind))),
+            more=list(map(block, self.more)),
         )
 
 

@@ -187,8 +187,6 @@ WAYS = "one of --frequencies, --modes or --times"
         ([*USUAL, "--modes"], "--inputs: 'F' is no input"),
         ([*USUAL, "--frequencies", "10", "--sigma", "1"], "--sigma does not go with --frequencies"),
         ([*EXACT, "--modes", "--amplitude-error", "1"], "--amplitude-error does not go with --modes"),
-        ([*USUAL, "--frequencies", "10", "--seed", "1"], "--seed belongs to"),
-        ([*USUAL, "--frequencies", "10", "--digits", "16"], "--digits takes a number from 1 to 15"),
         ([*EXACT, "--frequencies", "10", "--inputs", "F=x"], "'x' is no amplitude"),
         ([*USUAL, "--frequencies", "ten"], "--frequencies 'ten' is not a range"),
         ([*USUAL, "--frequencies", "10", "--amplitude-error", "-1"], "--amplitude-error takes a number from"),
