@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import shlex
 from pathlib import Path
 from typing import Annotated, Any
@@ -66,7 +67,7 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
     copies = {folder / f.relative_to(samples): f.read_bytes() for f in sources if f.suffix in _COPIED}
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: this is a file; {remedy}")
-    if any(path.resolve().is_relative_to(samples.resolve()) for path in copies):
+    if any(Path(os.path.realpath(path)).is_relative_to(samples.resolve()) for path in copies):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     theirs = [p for p, data in copies.items() if p.exists() and not (p.is_file() and p.read_bytes() == data)]
     ran = all(path.exists() for path in copies)
