@@ -81,19 +81,19 @@ class BearingEquilibria:
 
         from rotorid.motion.linear_coefficients import coefficients
 
-        found = [*self.found[:-1:every], self.found[-1]]
-        bearings, forces = found[0].bearings, found[0].system.forces
+        shown = [*self.found[:-1:every], self.found[-1]]
+        bearings, forces = shown[0].bearings, shown[0].system.forces
         walled = [k for k, force in enumerate(forces) if force in bearings]
-        K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(found))
-        speeds = np.repeat([at.speed for at in found], len(bearings))
+        K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(shown))
+        speeds = np.repeat([at.speed for at in shown], len(bearings))
         load, e, attitude, sommerfeld = (
-            np.concatenate([getattr(at, name) for at in found])
+            np.concatenate([getattr(at, name) for at in shown])
             for name in ("load", "eccentricity", "attitude", "sommerfeld")
         )
-        film = np.tile([one.wall for one in bearings], len(found)) * (1 - e)
+        film = np.tile([one.wall for one in bearings], len(shown)) * (1 - e)
         columns = (
-            Column("bearing", self.labels * len(found)),
-            Column("node", [one.node for one in bearings] * len(found)),
+            Column("bearing", self.labels * len(shown)),
+            Column("node", [one.node for one in bearings] * len(shown)),
             Column("speed_rad_s", speeds),
             Column("speed_rpm", speeds * RPM, "{:.6g}".format),
             Column("load_N", abs(load), figures),

@@ -273,30 +273,30 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
         system = reduced_system(system, [*shown, *shift, *mounted_nodes(system)], None)
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
-    found = move(tolerance=_TOLERANCE)
+    fine = move(tolerance=_TOLERANCE)
     rough = move(tolerance=_LOOSER * _TOLERANCE)
-    if found.stopped:
-        until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
-        raise ValueError(found.stopped + until)
-    k = min(found.time.size, rough.time.size)
-    moved = np.abs(found.z - found.z[0]).max()
-    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    result = Motion(found, steady_end(found), error)
-    warnings = (*unsettled, *_warnings(found, error, bool(shift)))
-    bearings = [force.name or f"node {force.node}" for force, _ in found.bearings]
-    step = figures(1e3 * found.time[-1] / found.steps, 1)
+    if fine.stopped:
+        until = f" (--time {0.999 * fine.time[-1]:.4g} shows it until then)" if fine.time[-1] else ""
+        raise ValueError(fine.stopped + until)
+    k = min(fine.time.size, rough.time.size)
+    moved = np.abs(fine.z - fine.z[0]).max()
+    error = float(np.abs(fine.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(fine.z).max(), 1e-300))
+    result = Motion(fine, steady_end(fine), error)
+    warnings = (*unsettled, *_warnings(fine, error, bool(shift)))
+    bearings = [force.name or f"node {force.node}" for force, _ in fine.bearings]
+    step = figures(1e3 * fine.time[-1] / fine.steps, 1)
     return Outcome(
         result=result,
-        sentences=(_sentence(found, result.end),),
-        tables=_tables(found, result.end, bearings),
-        file=lambda: _samples(found),
+        sentences=(_sentence(fine, result.end),),
+        tables=_tables(fine, result.end, bearings),
+        file=lambda: _samples(fine),
         keys=lambda: _document(result, bearings, warnings),
-        pictures={"": lambda: FIGURES[options.view](found)},
+        pictures={"": lambda: FIGURES[options.view](fine)},
         warnings=warnings,
         notes=(
-            f"steps of about {step} ms, each to {found.tolerance:g} of how far the rotor moves; positions "
+            f"steps of about {step} ms, each to {fine.tolerance:g} of how far the rotor moves; positions "
             f"differ by {error:.1g} of that from those with {_LOOSER:g} times this tolerance",
-            *reduction_notes(found.system),
+            *reduction_notes(fine.system),
         ),
         provenance=provenance(source.files, options),
     )
@@ -362,16 +362,16 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     return pairs(given or {}, "--displaced", read, "7=20um@90")
 
 
-def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
-    said = []
-    if not found.resolved:
-        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
+def _warnings(run: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
+    warnings = []
+    if not run.resolved:
+        warnings.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
-        said.append(
+        warnings.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "
             "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase; "
             "where it is chaotic, positions cannot be compared"
         )
-    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
-        said.append("nothing excites it: no unbalance, no bow (--unbalance)")
-    return tuple(said)
+    if not shifted and not run.system.unbalance.any() and not run.system.bow.any():
+        warnings.append("nothing excites it: no unbalance, no bow (--unbalance)")
+    return tuple(warnings)

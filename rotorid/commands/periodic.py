@@ -245,14 +245,14 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    found = periodic_motion(
+    motion = periodic_motion(
         system,
         low,
         high,
         limit_cycle=options.limit_cycle,
         max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
     )
-    return _outcome(found, labels, directions, provenance(what.files, options))
+    return _outcome(motion, labels, directions, provenance(what.files, options))
 
 
 def _range(given: Band) -> tuple[float, float]:

@@ -61,12 +61,12 @@ def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sens
         raise ValueError(f"{what}: at least one node or station is needed")
     if not isinstance(given, str):
         return list(given)
-    found: list[Sensor] = []
+    places: list[Sensor] = []
     for part in given.split(","):
         head, colon, tail = part.partition(":")  # names of stations hold no colon
         (node,) = nodes(head, what)
-        found.append((node, degrees(tail, what)) if colon else node)
-    return found
+        places.append((node, degrees(tail, what)) if colon else node)
+    return places
 
 
 def degrees(given: str | float, what: str) -> float:
@@ -81,10 +81,10 @@ def names(given: Names | None) -> list[str] | None:
     """Read "A,B" as names; None stays None."""
     if given is None:
         return None
-    found = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
-    if not found or not all(found):
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not parts or not all(parts):
         raise ValueError(f"names with commas between them are needed, such as left,right; got {given!r}")
-    return found
+    return parts
 
 
 def pairs(
@@ -119,7 +119,7 @@ def pairs(
     """
     if isinstance(given, Mapping):
         return {str(key): read(str(key), v) if isinstance(v, str) else v for key, v in given.items()}
-    parts, found = given.split(",") if isinstance(given, str) else given, dict[str, _T]()
+    parts, values = given.split(",") if isinstance(given, str) else given, dict[str, _T]()
     if not all(isinstance(part, str) for part in parts):
         raise ValueError(f"{what} {given!r}: texts are needed, such as {example}")
     for part in parts:
@@ -129,10 +129,10 @@ def pairs(
             raise ValueError(
                 f"{what} {','.join(parts)!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}"
             )
-        if twice := next((one for one in new if one in found), None):
+        if twice := next((one for one in new if one in values), None):
             raise ValueError(f"{what} {','.join(parts)!r}: {twice} stands twice")
-        found |= new
-    return found
+        values |= new
+    return values
 
 
 def numbers(
