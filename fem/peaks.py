@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -293,6 +294,7 @@ def resolve_peaks(
     sensors: Sequence[SensorLike],
     *,
     operating: tuple[float, float] | None = None,
+    criticals: FloatArray | None = None,
 ) -> tuple[Response, list[Peaks]]:
     """Find the peaks of readings whatever the steps between the speeds of the response are.
 
@@ -304,6 +306,9 @@ def resolve_peaks(
         Where it is read.
     operating
         As in `response_peaks`.
+    criticals
+        Critical speeds, rad/s, of a model that is no `Rotor` and whose response is judged for stability; by
+        default those of the rotor.
 
     Returns
     -------
@@ -318,12 +323,13 @@ def resolve_peaks(
     asked = response.speeds
     if np.count_nonzero(asked) < 3:  # rest is no part of a peak
         return response, []
-    try:
-        criticals = critical_speeds_below(response.rotor, 1.01 * asked[-1], 32)
-    except ValueError:  # fewer modes than one asks for, or none inside the tables
-        criticals = np.empty(0)
-    near = np.multiply.outer(criticals, 1 + _AROUND).clip(asked[0], asked[-1])
-    finer = judged(smooth_curves(_with(response, near), sensors))
+    speeds = np.empty(0) if criticals is None else criticals
+    if criticals is None:
+        with suppress(ValueError):  # fewer modes than one asks for, or none inside the tables
+            speeds = critical_speeds_below(response.rotor, 1.01 * asked[-1], 32)
+    near = np.multiply.outer(speeds, 1 + _AROUND).clip(asked[0], asked[-1])
+    finer = smooth_curves(_with(response, near), sensors)
+    finer = judged(finer) if criticals is None else finer
     peaks = [response_peaks(finer, place, operating=operating) for place in sensors]
     every = [peak for each in peaks for peak in each.peaks]
     undamped = np.array([peak.speed for peak in every if peak.undamped])

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import house
 import pytest
+from option_pairs import options_of_commands
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = house.PACKAGES
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
 RUFF = PROJECT["ruff"]
+PAIRS, NAMES, SCREEN = 273, 118, 28
+"""Commands with options, without --help, and of one command: at most so many (issue 48: 230 and 110)."""
 EXEMPT = 16
 """Functions that may be longer or take more than ruff's limits: at most so many."""
 
@@ -131,3 +134,10 @@ def test_what_the_floor_has_is_written_there_only(pattern):
 def test_no_plural_is_built_by_hand():
     """One function counts words: `counted`; no text says "mode(s)"."""
     assert lines_with(r"\} ?\w*\w\((?:e?s)\)|\} [\w ]*\{(?:''|'s') if ") == []
+
+
+def test_options_are_few():
+    options = options_of_commands()
+    assert sum(map(len, options.values())) <= PAIRS
+    assert len({name for names in options.values() for name in names}) <= NAMES
+    assert max(map(len, options.values())) <= SCREEN

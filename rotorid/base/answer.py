@@ -56,6 +56,8 @@ class Answer:
         Blocks that only the whole text has.
     more
         What these show, in words.
+    short
+        Whether `found` is a short form of the first of these, which the whole text leaves out.
     """
 
     judgement: str
@@ -64,6 +66,7 @@ class Answer:
     notes: tuple[str, ...] = ()
     tables: tuple[str, ...] = ()
     more: str = ""
+    short: bool = False
 
     def brief(self, lines: int = LINES) -> str:
         """At most so many lines; of each kind of remark (the same words with other names or numbers) one."""
@@ -84,7 +87,8 @@ class Answer:
         """Everything."""
         remarks = [_remark("Warning", each) for each in self.warnings]
         remarks += [_remark("Note", each) for each in self.notes]
-        first = (_wrapped(part.splitlines()) for part in (self.judgement, self.found))
+        head = (self.judgement,) if self.short else (self.judgement, self.found)
+        first = (_wrapped(part.splitlines()) for part in head)
         parts = (*map("\n".join, [*first, *remarks]), *self.tables)
         return "\n\n".join(part for part in parts if part)
 

@@ -144,6 +144,11 @@ class Table:
         """Values row by row."""
         return list(zip(*(column.values for column in self.columns), strict=True))
 
+    @property
+    def records(self) -> list[dict[str, Value]]:
+        """Values row by row, by their headings."""
+        return [dict(zip(self.headings, row, strict=True)) for row in self.rows]
+
 
 def terminal(table: Table, width: int = WIDTH) -> str:
     """Aligned text: words and the first column to the left, other numbers to the right."""

@@ -9,32 +9,10 @@ from typing import Annotated
 
 import typer
 
+from rotorid import commands
 from rotorid.base.answer import COLUMNS
 from rotorid.cli.choices import Command, Commands
 from rotorid.cli.demo import demo
-from rotorid.commands import (
-    Outcome,
-    balance,
-    bearings,
-    calibrate,
-    campbell,
-    critical,
-    fit,
-    identify,
-    influence,
-    modes,
-    motion,
-    periodic,
-    reduce,
-    response,
-    runup,
-    simulate,
-    split,
-    tolerance,
-    trial_weight,
-    unbalance,
-    vectors,
-)
 from rotorid.commands.app import json_text, run, typer_command, written_help
 from rotorid.commands.progress import markup_mode
 from rotorid.fleet.fit import fleet_fit
@@ -52,11 +30,11 @@ app = typer.Typer(
 fleet = typer.Typer(
     no_args_is_help=True, help="Jobs of many machines as a table, and coefficients of their type."
 )
-_JOBS: dict[str, tuple[Callable[..., Outcome], ...]] = {
-    "Balance rotors": (balance, vectors, trial_weight, split, tolerance, unbalance),
-    "Compute rotors": (critical, campbell, response, influence, study),
-    "Reduce rotors, let them move": (reduce, bearings, motion, periodic),
-    "Identify coefficients": (identify, fit, simulate, modes, runup, calibrate),
+_JOBS = {
+    "Balance rotors": "balance vectors trial_weight split tolerance unbalance",
+    "Compute rotors": "critical campbell response influence study",
+    "Reduce rotors, let them move": "reduce bearings motion periodic",
+    "Identify coefficients": "identify fit simulate modes runup calibrate",
 }
 """Commands by what they are for, the chief one first."""
 
@@ -97,9 +75,6 @@ def schema(
     kind: Annotated[
         str, typer.Argument(metavar="KIND", help="What file: job, rotor, small (model), study or waveforms.")
     ],
-    json: Annotated[
-        bool, typer.Option("--json", help="As without: a schema is JSON.", rich_help_panel="Output")
-    ] = True,
 ) -> None:
     """JSON schema of a job, a rotor file or other settings, for editors to check keys.
 
@@ -114,10 +89,15 @@ def schema(
     typer.echo(json_text(schema_of(kind)))
 
 
-for _job, _works in _JOBS.items():
-    for _work in _works:
-        _name = _work.__name__.replace("_", "-")
-        app.command(_name, cls=Command, rich_help_panel=_job)(typer_command(_work))
+def _work_of(name: str) -> Callable[..., commands.Outcome]:
+    work: Callable[..., commands.Outcome] = study if name == "study" else getattr(commands, name)
+    return work
+
+
+for _job, _names in _JOBS.items():
+    for _name in _names.split():
+        _command = typer_command(_work_of(_name))
+        app.command(_name.replace("_", "-"), cls=Command, rich_help_panel=_job)(_command)
 fleet.command("fit", cls=Command)(typer_command(fleet_fit))
 app.add_typer(fleet, name="fleet", rich_help_panel="More")
 for _more in (worksheet, demo, schema):
@@ -158,9 +138,10 @@ _rotorid.__doc__ = written_help(_rotorid)
 def _overview() -> str:
     """The four jobs, each with the first example of its first command, and what else there is for it."""
     lines = ["An example of each job, run in a checkout (else: rotorid demo DIR):"]
-    for job, (chief, *others) in _JOBS.items():
-        example = " ".join(written_help(chief).split("Example: ")[1].partition("\n\n")[0].split())
-        names = ", ".join(work.__name__.replace("_", "-") for work in others)
+    for job, every in _JOBS.items():
+        chief, *others = every.replace("_", "-").split()
+        example = written_help(_work_of(chief)).split("Example: ")[1].partition("\n\n")[0]
+        example, names = " ".join(example.split()), ", ".join(others)
         lines += ["", f"{job}:", f"  {example}"]
         lines += textwrap.wrap(f"also {names}", COLUMNS, initial_indent="  ", subsequent_indent="  ")
     return "\n".join([*lines, "", "More: fleet, worksheet, demo, schema; each: rotorid COMMAND --help"])

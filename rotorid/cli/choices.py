@@ -75,8 +75,8 @@ def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no pub
 
 def nearest_choice(message: str) -> str:
     """A complaint about a value that is none of a few, with the nearest one; others as they are."""
-    found = _CHOICE.fullmatch(message)
-    if found is None:
+    match = _CHOICE.fullmatch(message)
+    if match is None:
         return message
-    near = suggest(found[2], re.findall(r"'([^']*)'", found[3]))
-    return f"{found[1]}." + (f" Did you mean {near!r}?" if near else "")
+    near = suggest(match[2], re.findall(r"'([^']*)'", match[3]))
+    return f"{match[1]}." + (f" Did you mean {near!r}?" if near else "")

@@ -15,7 +15,6 @@ import typer
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.commands.app import json_text
 
-_SOURCES = ("rotor23.csv", "turbo_job")
 _COPIED = (".csv", ".toml", ".md", ".txt")
 STEPS = {
     "critical": "critical {}/rotor23.csv --plot {}/modes.png",
@@ -64,19 +63,17 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
     from rotorid.samples import sample_data
 
     samples, remedy = sample_data(), "choose another folder: rotorid demo DIR"
-    places = [samples / name for name in _SOURCES]
-    sources = [f for place in places for f in ([place] if place.is_file() else sorted(place.iterdir()))]
+    sources = [samples / "rotor23.csv", *sorted((samples / "turbo_job").iterdir())]
     copies = {folder / f.relative_to(samples): f.read_bytes() for f in sources if f.suffix in _COPIED}
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: this is a file; {remedy}")
     if any(Path(os.path.realpath(path)).is_relative_to(samples.resolve()) for path in copies):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     theirs = [p for p, data in copies.items() if p.exists() and not (p.is_file() and p.read_bytes() == data)]
-    if not all(path.exists() for path in copies):  # no demo ran here before
-        theirs += [picture for picture in pictures if picture.exists()]
+    ran = all(path.exists() for path in copies)
+    theirs += [] if ran else [picture for picture in pictures if picture.exists()]
     if theirs:
-        named = ", ".join(map(str, theirs))
-        raise ValueError(f"{named}: differs from the sample and would be overwritten; delete it, or {remedy}")
+        raise ValueError(f"{theirs[0]}: differs from the sample and would be overwritten; {remedy}")
     for path in copies:
         path.parent.mkdir(parents=True, exist_ok=True)
     write_files({path: data for path, data in copies.items() if not path.exists()})

@@ -17,6 +17,7 @@ import contextlib
 import dataclasses
 import inspect
 import io
+import itertools
 import json
 import os
 import sys
@@ -141,28 +142,27 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
     for path, endings in targets:
         if path is None:
             continue
-        if path.suffix.lower() not in endings:
-            raise ValueError(
-                f"{path}: cannot write this kind of file; the name must end in {', '.join(endings)}"
-            )
-        if not path.parent.is_dir():
-            raise ValueError(f"{path}: the folder {path.parent} does not exist")
-        if path.exists() and not path.is_file():
-            what = "a folder" if path.is_dir() else "no regular file"
-            raise ValueError(f"{path}: cannot be written, it is {what}")
-        if not os.access(path if path.exists() else path.parent, os.W_OK):
-            raise ValueError(f"{path}: cannot be written, permission denied")
-        twin = next((other for other in asked if _same_file(path, other)), None)
-        if twin is not None:
-            raise ValueError(f"{path}: two results cannot go into one file; give each its own name")
+        folder, kind = path.parent, "a folder" if path.is_dir() else "no regular file"
+        refused = {
+            f"cannot write this kind of file; the name must end in {', '.join(endings)}": (
+                path.suffix.lower() not in endings
+            ),
+            f"the folder {folder} does not exist": not folder.is_dir(),
+            f"cannot be written, it is {kind}": path.exists() and not path.is_file(),
+            "cannot be written, permission denied": not os.access(path if path.exists() else folder, os.W_OK),
+            "two results cannot go into one file; give each its own name": any(
+                _same_file(path, other) for other in asked
+            ),
+        }
+        if why := [words for words, holds in refused.items() if holds]:
+            raise ValueError(f"{path}: {why[0]}")
         asked.append(path)
 
 
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Refuse to write a result over a file that was read for it."""
-    sources = list(inputs)
-    for path in targets:
-        if any(_same_file(path, source) for source in sources):
+    for path, source in itertools.product(targets, inputs):
+        if _same_file(path, source):
             raise ValueError(
                 f"{path}: this is an input of the command, which must not be overwritten; choose another name"
             )
@@ -232,52 +232,56 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
 
 def _check_sizes(typed: Mapping[str, Any]) -> None:
     """Refuse numbers whose squares no computer holds."""
-    from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size
+    from rotorid.files.decimal_numbers import LARGEST_STATED
 
     for name, value in typed.items():
-        if isinstance(value, float):
-            try:
-                check_size(value, LARGEST_STATED)
-            except NotANumber as error:
-                raise ValueError(f"{option_name(name)} takes {error}, not {value:g}") from None
+        if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
+            raise ValueError(f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}")
 
 
 def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:
     """A file, several, or a text; after the first a required option, unless it may be left out."""
-    files = str(one.annotation).startswith(("Sequence[", "JobGiven"))
-    needed = one.default is one.empty
-    first = files or not place or not needed
-    declared: Any = typer.Argument if first else typer.Option
-    flag = [] if first else [option_name(name)]
-    told = declared(*flag, metavar=about.metavar, help=about.text, rich_help_panel=None if first else "Input")
+    several = str(one.annotation).startswith(("Sequence[", "JobGiven"))
+    first = several or not place or one.default is not one.empty
     taken: Any = Path if "Path" in str(one.annotation) and first else str
-    taken = list[Path] if files else taken
-    annotation: Any = Annotated[taken if needed else taken | None, told]
-    default = None if one.default == () else one.default
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    declared = typer.Argument if first else typer.Option
+    return _parameter(name, about, list[taken] if several else taken, one.default, declared)
 
 
 def _options(kind: type, panel_of: Mapping[str, str]) -> Iterator[inspect.Parameter]:
     """One option for each field of a dataclass; what it chooses from is told in its help."""
     about, module = _documentation(kind), sys.modules[kind.__module__]
-    choices = getattr(module, "choices", None)
     for field in dataclasses.fields(kind):
-        name, written, kind_of = field.name, about[field.name], str(field.type).partition(" | ")[0]
+        name, kind_of = field.name, str(field.type).partition(" | ")[0]
         alias = getattr(module, kind_of, str)
         taken = _TYPES.get(kind_of, alias if get_origin(alias) is Literal else str)
-        flag = (option_name(name),) if taken is bool else ()  # without its --no-…
-        option = typer.Option(
-            *(written.flags or flag),
-            metavar=written.metavar,
-            help=written.text,
-            min=written.least,
-            rich_help_panel=panel_of.get(name, "Input"),
+        default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+        choices = getattr(module, "choices", None)
+        yield _parameter(
+            name, about[name], taken, default, typer.Option, panel_of.get(name, "Input"), choices
         )
-        default = None if field.default == () else field.default
-        if field.default is dataclasses.MISSING:
-            default = inspect.Parameter.empty
-        annotation: Any = Annotated[taken if default is not None else taken | None, option, choices]
-        yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _parameter(
+    name: str,
+    about: _Documented,
+    taken: Any,  # noqa: ANN401 - a type
+    default: object,
+    declared: Any,  # noqa: ANN401 - of typer
+    panel: str = "Input",
+    choices: object = None,
+) -> inspect.Parameter:
+    flag = (option_name(name),) if taken is bool else ()  # without its --no-…
+    default = None if default == () else default
+    option = declared(
+        *(about.flags or flag),
+        metavar=about.metavar,
+        help=about.text,
+        min=about.least,
+        rich_help_panel=None if declared is typer.Argument else panel,
+    )
+    annotation: Any = Annotated[taken if default is not None else taken | None, option, choices]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import figures, sentence
 from rotorid.commands.moving import moving
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from fem import Rotor, Stability
@@ -26,6 +24,11 @@ if TYPE_CHECKING:
 
 _ROWS = 6
 """Of the table that is printed with the answer."""
+_HEADINGS = {
+    **{"bearing": "bearing", "speed_rpm": "rpm", "load_N": "load, N", "eccentricity": "eccentricity"},
+    **{"attitude_deg": "attitude, °", "film_m": "least film, µm", "sommerfeld": "Sommerfeld"},
+}
+"""Of the printed tables."""
 _AXES = ("xx", "xy", "yx", "yy")
 
 
@@ -48,7 +51,7 @@ class BearingsOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BearingEquilibria(Answered):
+class BearingEquilibria:
     """Equilibria at ascending speeds, the linear rotor with their coefficients, and where it loses stability.
 
     Attributes
@@ -59,42 +62,11 @@ class BearingEquilibria(Answered):
         The rotor with bearing tables in place of its forces.
     stability
         Of the linear rotor; None for one speed alone.
-    warnings
-        What the reader must know.
     """
 
     found: Sequence[Equilibrium]
     linear: Rotor | SmallModel
     stability: Stability | None
-    warnings: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return plain(
-            {
-                "speeds_rad_s": [at.speed for at in self.found],
-                "bearings": rows(self._columns(self.found)),
-                "stability": self.stability and self.stability.to_dict(),
-                "warnings": self.warnings,
-            }
-        )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per bearing and speed."""
-        return frame(self._columns(self.found))
-
-    @property
-    def answer(self) -> Answer:
-        """Stability, and the bearings at a few of the speeds; behind it at all."""
-        every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
-        shown = [*self.found[:-1:every], self.found[-1]]
-        return Answer(
-            sentence(self.stability.sentence()) if self.stability else "One speed: no threshold is sought.",
-            text(self._columns(shown), width=COLUMNS),
-            self.warnings,
-            tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),
-            more="every speed",
-        )
 
     @property
     def labels(self) -> list[str]:
@@ -103,33 +75,36 @@ class BearingEquilibria(Answered):
 
         return [one.name or named(one).removeprefix("the ") for one in self.found[0].bearings]
 
-    def _columns(self, found: Sequence[Equilibrium]) -> tuple[Column, ...]:
+    def table(self, every: int = 1) -> Table:
+        """One row per bearing and speed, of each so many speeds and the last one."""
         import numpy as np
 
         from rotorid.motion.linear_coefficients import coefficients
 
-        bearings, forces = found[0].bearings, found[0].system.forces
+        shown = [*self.found[:-1:every], self.found[-1]]
+        bearings, forces = shown[0].bearings, shown[0].system.forces
         walled = [k for k, force in enumerate(forces) if force in bearings]
-        K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(found))
-        speeds = np.repeat([at.speed for at in found], len(bearings))
+        K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(shown))
+        speeds = np.repeat([at.speed for at in shown], len(bearings))
         load, e, attitude, sommerfeld = (
-            np.concatenate([getattr(at, name) for at in found])
+            np.concatenate([getattr(at, name) for at in shown])
             for name in ("load", "eccentricity", "attitude", "sommerfeld")
         )
-        film = np.tile([one.wall for one in bearings], len(found)) * (1 - e)
-        return (
-            Column("bearing", self.labels * len(found), str),
-            Column("node", [one.node for one in bearings] * len(found)),
+        film = np.tile([one.wall for one in bearings], len(shown)) * (1 - e)
+        columns = (
+            Column("bearing", self.labels * len(shown)),
+            Column("node", [one.node for one in bearings] * len(shown)),
             Column("speed_rad_s", speeds),
-            Column("speed_rpm", speeds * RPM, "{:.6g}".format, "rpm"),
-            Column("load_N", abs(load), figures, "load, N"),
+            Column("speed_rpm", speeds * RPM, "{:.6g}".format),
+            Column("load_N", abs(load), figures),
             Column("eccentricity", e, "{:.4f}".format),
-            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format, "attitude, °"),
-            Column("film_m", film, lambda film: figures(1e6 * film), "least film, µm"),
-            Column("sommerfeld", sommerfeld, figures, "Sommerfeld"),
+            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format),
+            Column("film_m", film, lambda film: figures(1e6 * film)),
+            Column("sommerfeld", sommerfeld, figures),
             *(Column(f"k{n}_N_per_m", values) for n, values in zip(_AXES, K, strict=True)),
             *(Column(f"c{n}_N_s_per_m", values) for n, values in zip(_AXES, C, strict=True)),
         )
+        return Table("every speed", columns)
 
     def figure(self) -> Figure:
         """Paths of the journals in their clearance circles."""
@@ -195,11 +170,25 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     small = "stiffness and damping are those at its centre, they hold for small orbits about it"
     films = [f"{named(f)}: {small}" for f in system.forces if isinstance(f, SqueezeFilm)]
     touched = dict.fromkeys(named(stop) for at in resting for stop in at.touched)
-    result = BearingEquilibria(
-        found=resting,
-        linear=linear_rotor(what.model, resting),
-        stability=stability,
-        warnings=(*(f"the shaft rests on {stop}" for stop in touched), *films),
+    result = BearingEquilibria(found=resting, linear=linear_rotor(what.model, resting), stability=stability)
+    every = max(1, -(-(len(resting) - 1) // max(_ROWS // len(result.labels) - 1, 1)))
+    table, warnings = result.table(), (*(f"the shaft rests on {stop}" for stop in touched), *films)
+    document = {
+        "speeds_rad_s": speeds,
+        "bearings": table.records,
+        "stability": stability and stability.to_dict(),
+        "warnings": warnings,
+    }
+    return Outcome(
+        result=result,
+        sentences=(sentence(stability.sentence()) if stability else "One speed: no threshold is sought.",),
+        tables=(result.table(every).only(_HEADINGS),),
+        more=(table.only(_HEADINGS),) if every > 1 else (),
+        short=every > 1,
+        file=table,
+        files={".toml": result.linear_files},
+        keys=plain(document),
+        pictures={"": result.figure},
+        warnings=warnings,
+        provenance=provenance(what.files, options),
     )
-    files = {".toml": result.linear_files}
-    return outcome_of(result, provenance(what.files, options), files=files)

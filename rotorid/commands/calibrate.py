@@ -7,22 +7,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import range_text
-from rotorid.base.text import capital, counted, error_figures
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted, error_figures, figures
+from rotorid.commands.model_places import model_places
 from rotorid.commands.quantities import Names, Nodes, nodes
 from rotorid.report.options import file_of, rotor_source
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from fem import Rotor
     from rotorid.base.arrays import BoolArray
     from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
     from rotorid.regression.estimate import Uncertain
+    from rotorid.tables import Job
+
+_ROWS = 5
+"""Of the short table, with two numbers each."""
 
 
 @dataclass(frozen=True)
@@ -36,20 +37,17 @@ class CalibrateOptions:
         bearing (of tables over speed their scales), `bearing.kxx` one value for all.
     prior : LIST
         What is known of them: bearing[*].*=20%, bearing[1].kxx=7e7+-1e7.
-    bounds : LIST
-        Lowest and largest value: bearing[1].kxx=1e6:1e9.
     exact
         Modulus (1 %), discs (1 %), pedestals (10 %) and angles of probes (2°) are not estimated; ± count that
         they may be off by so much. Else they are unknown, too, with these standard deviations.
     unbalance_at : LIST
         Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
-    bow : N
+    bow : N from 0
         Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
     """
 
     estimate: Names
     prior: str | Mapping[str, str] = ""
-    bounds: str | Mapping[str, str] = ""
     exact: bool = False
     unbalance_at: Nodes | None = None
     bow: int = 0
@@ -57,124 +55,118 @@ class CalibrateOptions:
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Calibrated(Answered):
-    """The calibrated rotor."""
+def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
+    """Whether the model explains the data; the numbers; what the data do not tell."""
+    import numpy as np
 
-    found: CalibratedRotor
+    from rotorid.regression.estimate import parameter_columns, parameter_dict, parameter_text
 
-    @property
-    def answer(self) -> Answer:
-        """Whether the model explains the data; the wished numbers; what the data do not tell."""
-        from rotorid.regression.estimate import parameter_text
+    estimate, wished = calibrated.fit.estimate, calibrated.wished
+    fits = "explains" if calibrated.explained else "does NOT explain"
+    chi = f"χ² {calibrated.chi_square:.4g} with {counted(calibrated.dof, 'degree')} of freedom"
+    why = {} if calibrated.prior is None else calibrated.prior.why
+    names, every = _part(calibrated, wished | True)
+    parameters = parameter_dict(names, every)
+    for name, unknown, share in zip(names, calibrated.unknowns, calibrated.data_share, strict=True):
+        parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
+    unbalance = _unbalance(calibrated)
+    taken = counted(len(calibrated.exact), "number")
+    notes = {
+        calibrated.seen: bool(calibrated.seen),
+        f"searched from {calibrated.searches} starting values": calibrated.searches > 1,
+        f"± count what {taken} taken as exact may be off": bool(calibrated.exact),
+    }
+    document = {
+        "parameters": parameters,
+        "rank": estimate.rank,
+        "condition_number": estimate.condition_number,
+        "identifiable": estimate.full_rank,
+        "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
+        "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
+        "correlation": every.correlation,
+        "seen": calibrated.seen or None,
+        "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
+        "chi_square": calibrated.chi_square,
+        "degrees_of_freedom": calibrated.dof,
+        "probability": calibrated.chance,
+        "exact": calibrated.exact,
+        "explained": calibrated.explained,
+        "lack_of_fit": calibrated.lack_of_fit,
+        "unbalance": unbalance.records,
+        "warnings": calibrated.warnings,
+        "rotor": None,
+    }
 
-        found = self.found
-        fits = "explains" if found.explained else "does NOT explain"
-        chi = f"χ² {found.chi_square:.4g} with {counted(found.dof, 'degree')} of freedom"
-        first = [f"The model {fits} the data ({chi})."]
-        speeds = [speed for data in found.readings for speed in data.trials.speeds.tolist()]
-        if seen := found.seen:
-            at = f"at {range_text(min(speeds), max(speeds))} " if speeds else ""
-            first.append(capital(f"{at}{seen}."))
-        why = {} if found.prior is None else found.prior.why
-        beside = ~found.wished
-        tables = [parameter_text(*self._part(which), why) for which in (~beside, beside) if which.any()]
-        if found.bare:
-            tables.append(text(self._unbalance(), width=COLUMNS))
-        more = "what else is not known exactly" if beside.any() else "unbalance"
-        notes = []
-        if found.searches > 1:
-            notes.append(f"searched from {found.searches} starting values")
-        if found.exact:
-            exact = counted(len(found.exact), "number")
-            notes.append(f"± count what {exact} taken as exact may be off")
-        return Answer(
-            "\n".join(first),
-            tables[0],
-            found.warnings,
-            tuple(notes),
-            tables=tuple(tables[1:]),
-            more=more if tables[1:] else "",
-        )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per number: value, standard deviation, 95 % interval, share of the data."""
-        from rotorid.regression.estimate import parameter_columns
-
-        every = parameter_columns(*self._part(self.found.wished | True))
-        return frame((*every, Column("data_share", self.found.data_share)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance; None where not determined."""
-        import numpy as np
-
-        from rotorid.regression.estimate import parameter_dict
-
-        found, estimate = self.found, self.found.fit.estimate
-        names, every = self._part(found.wished | True)
-        parameters = parameter_dict(names, every)
-        for name, unknown, share in zip(names, found.unknowns, found.data_share, strict=True):
-            parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
-        return plain(
-            {
-                "parameters": parameters,
-                "rank": estimate.rank,
-                "condition_number": estimate.condition_number,
-                "identifiable": estimate.full_rank,
-                "unidentifiable": [] if estimate.full_rank else [estimate.describe_rank()],
-                "combinations": {c.words: {"value": c.value, "std": c.std} for c in estimate.combinations},
-                "correlation": every.correlation,
-                "seen": found.seen or None,
-                "residual_rms": np.sqrt(np.mean(estimate.residuals**2)),
-                "chi_square": found.chi_square,
-                "degrees_of_freedom": found.dof,
-                "probability": found.chance,
-                "exact": found.exact,
-                "explained": found.explained,
-                "lack_of_fit": found.lack_of_fit,
-                "unbalance": rows(self._unbalance()) if found.bare else [],
-                "warnings": found.warnings,
-                "rotor": None,
-            }
-        )
-
-    def rotor_files(self, path: Path) -> Mapping[Path, bytes]:
-        """The calibrated rotor as a rotor file, with its tables.
-
-        Raises
-        ------
-        ValueError
-            For numbers that the data do not determine.
-        """
+    def rotor_files(path: Path) -> Mapping[Path, bytes]:
         from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
 
-        if why := self.found.undetermined:
-            raise ValueError(f"{path}: no rotor file can be written, {why}")
-        return rotor_file_bytes(path, self.found.rotor)
+        if lacking := calibrated.undetermined:
+            raise ValueError(f"{path}: no rotor file can be written, {lacking}")
+        return rotor_file_bytes(path, calibrated.rotor)
 
-    def _part(self, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
-        """Names of some of the numbers, and these with their errors."""
-        import numpy as np
+    columns = [Column(each.name, [*each.values]) for each in parameter_columns(names, every)]
+    parts = [parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()]
+    return Outcome(
+        result=calibrated,
+        sentences=(f"The model {fits} the data ({chi}).",),
+        tables=(_short(*_part(calibrated, wished)),),
+        more=(*parts, *([unbalance] if calibrated.bare else [])),
+        beyond="all numbers, with 95 %",
+        short=True,
+        file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
+        files={".toml": rotor_files},
+        keys=plain(document),
+        warnings=calibrated.warnings,
+        notes=tuple(note for note, there in notes.items() if there),
+        provenance=origin,
+    )
 
-        from rotorid.regression.estimate import Uncertain
 
-        found, part = self.found, Uncertain()
-        part.values, part.errors_stated, part.dof = found.values[which], True, 0
-        part.covariance = np.where(np.isnan(found.std), np.nan, found.covariance)[np.ix_(which, which)]
-        return tuple(name for name, taken in zip(found.names, which, strict=True) if taken), part
+def _part(calibrated: CalibratedRotor, which: BoolArray) -> tuple[tuple[str, ...], Uncertain]:
+    """Names of some of the numbers, and these with their errors."""
+    import numpy as np
 
-    def _unbalance(self) -> tuple[Column, ...]:
-        """What the bare rotor's readings say of its unbalances and bows."""
-        import numpy as np
+    from rotorid.regression.estimate import Uncertain
 
-        names, values = self.found.bare, np.concatenate(self.found.unbalance)
-        return (
-            Column("unbalance", names, str),
-            Column("size", np.abs(values), "{:.4g}".format),
-            Column("std", np.concatenate(self.found.unbalance_std), error_figures, "±"),
-            Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names], str),
-            Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format, "angle, °"),
-        )
+    part = Uncertain()
+    part.values, part.errors_stated, part.dof = calibrated.values[which], True, 0
+    known = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
+    part.covariance = known[np.ix_(which, which)]
+    return tuple(name for name, taken in zip(calibrated.names, which, strict=True) if taken), part
+
+
+def _short(names: Sequence[str], part: Uncertain) -> str:
+    """The first numbers with one standard deviation, two a line."""
+    import numpy as np
+
+    from rotorid.base.text import table
+
+    stds = [np.nan] * len(names) if part.std is None else part.std
+    cells = []
+    for name, value, std in zip(names, part.values, stds, strict=True):
+        digits = 4
+        if std > 0 and value:  # as many as stand before the second digit of the error
+            digits = max(2 + int(np.floor(np.log10(abs(value))) - np.floor(np.log10(std))), 1)
+        known = f"{figures(value, digits)} ± {error_figures(std)}"
+        cells += [name, "not determined" if np.isnan(value) else known]
+    cells += [""] * (-len(cells) % 4)
+    return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
+
+
+def _unbalance(calibrated: CalibratedRotor) -> Table:
+    """What the bare rotor's readings say of its unbalances and bows."""
+    import numpy as np
+
+    names, values = calibrated.bare, np.concatenate((*calibrated.unbalance, [0]))[:-1]
+    std = np.concatenate((*calibrated.unbalance_std, [0]))[:-1]
+    columns = (
+        Column("unbalance", names),
+        Column("size", np.abs(values), "{:.4g}".format),
+        Column("std", std, error_figures),
+        Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names]),
+        Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format),
+    )
+    return Table("unbalance", columns)
 
 
 class Prepared(NamedTuple):
@@ -232,9 +224,7 @@ def calibrate(
     hashes = {Path(one["file"]).name: one["sha256"] for one in made_from}
     numbers = replace(result.rotor.calibration, data=hashes)  # type: ignore[type-var]
     result = replace(result, rotor=replace(result.rotor, calibration=numbers))
-    calibrated = Calibrated(found=result)
-    made = outcome_of(calibrated, origin, files={".toml": calibrated.rotor_files})
-    return replace(made, result=result)
+    return outcome(result, origin)
 
 
 def prepared(
@@ -247,25 +237,62 @@ def prepared(
     ValueError
         As `calibrate`.
     """
-    from rotorid.commands.calibration_data import read_data
     from rotorid.commands.unknown_numbers import unknowns
+    from rotorid.tables import read_job
 
     model, files = rotor_source(rotor)
     given = [data] if isinstance(data, Path | str) else list(data)
     if len({*map(str, given)}) < len(given):
         raise ValueError("one of the data files is given twice: it would count twice")
     named = [] if options.unbalance_at is None else nodes(options.unbalance_at, "--unbalance-at")
-    places = [model.node(node) for node in named]
-    if len({*places}) < len(places):
-        raise ValueError("--unbalance-at: one of its nodes stands twice")
-    if options.bow < 0:
-        raise ValueError("--bow takes a number from 0")
+    places = [*dict.fromkeys(model.node(node) for node in named)]
     if options.bow and not places:
         raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
-    readings, read = read_data(sources, model, places, options.bow)
+    readings, read = [], list[Path]()
+    for file in sources:
+        job = read_job(file)
+        try:
+            readings.append(run_readings(job, model, places, options.bow))
+        except ValueError as error:
+            raise ValueError(f"{file.name}: {error}") from None
+        read += job.files
     without = Prepared(model, [], readings, files, read)
-    numbers = unknowns(
-        model, without.probes, options.estimate, options.prior, options.bounds, exact=options.exact
-    )
+    numbers = unknowns(model, without.probes, options.estimate, options.prior, exact=options.exact)
     return without._replace(numbers=numbers)
+
+
+def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0) -> RunReadings:
+    """The runs of a job at their places in the model.
+
+    Raises
+    ------
+    ValueError
+        Where a plane or a sensor has no place in the model, or the runs say nothing of it.
+    """
+    import numpy as np
+
+    from rotorid.calibration import RunReadings
+
+    trials, places = job.trials, model_places(job)
+    if job.rotor is not None and job.rotor.n_nodes != rotor.n_nodes:
+        raise ValueError(
+            f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, this one has {rotor.n_nodes}: "
+            "its planes and sensors would be elsewhere"
+        )
+    changed = bool((trials.weights != trials.weights[0]).any())
+    if not (unbalance or bow or changed):
+        raise ValueError(
+            "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
+            "are needed, or nodes at which the unbalance may stand (--unbalance-at)"
+        )
+    return RunReadings(
+        trials,
+        tuple(places.nodes[plane] for plane in trials.planes),
+        np.array([1.0 if places.radii is None else places.radii[plane] for plane in trials.planes]),
+        tuple(places.sensors[sensor] for sensor in trials.sensors),
+        places.derivatives,
+        job.key_phasor,
+        tuple(unbalance),
+        bow,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,13 +13,11 @@ from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import percent
-from rotorid.commands.quantities import Band, Span, Speeds, band, rising_speeds, span_at
+from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
 from rotorid.report.options import rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fem import Campbell, Rotor
     from rotorid.base.arrays import FloatArray
 
@@ -51,7 +49,7 @@ class CampbellOptions:
     operating: Band | None = None
     heavy: float = 6.0
     mesh_check: bool = False
-    cross_coupling: Span | None = None
+    cross_coupling: str | tuple[float, float] | None = None
     panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
@@ -85,8 +83,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     from rotorid.commands.operating_range import Separation, unsearched
 
     operating = band(options.operating)
-    added = options.cross_coupling
-    span, place = (None, None) if added is None else span_at(added, "--cross-coupling", "0:5e7")
+    span, place = _span(options.cross_coupling)
     model, files = rotor_source(rotor)
     speeds = rising_speeds(options.speeds)
     solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
@@ -105,15 +102,11 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         peaks = [row["speed_rad_s"] for row in rows if not row["heavily_damped"]]
         beside["operating"] = Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
-    pictures: dict[str, Callable[[], Figure]] = {
-        "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
-    }
     if span:
         from rotorid.commands.cross_coupling import cross_coupling
 
-        coupling = cross_coupling(model, operating[1] if operating else speeds[-1], span, place)
-        beside["cross_coupling"] = coupling
-        pictures["Logarithmic decrements over added cross-coupling."] = coupling.figure
+        at = operating[1] if operating else speeds[-1]
+        beside["cross_coupling"] = cross_coupling(model, at, span, place)
     sentences += [part.sentence() for part in beside.values()]
     keys = {**whirl.to_dict(), **{key: part.to_dict() for key, part in beside.items()}}
     if options.mesh_check:
@@ -137,10 +130,23 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
         keys=keys,
         warnings=whirl.warnings,
         notes=(whirl.cut,) if whirl.cut else (),
-        pictures=pictures,
+        pictures={
+            "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
+        },
         title="Whirl",
         provenance=provenance(files, options),
     )
+
+
+def _span(given: str | tuple[float, float] | None) -> tuple[tuple[float, float] | None, str | None]:
+    """Read "0:5e7" or "0:5e7@impeller 3" as a range, N/m, and the place; None: nowhere said."""
+    if given is None:
+        return None, None
+    text, _, place = given.partition("@") if isinstance(given, str) else ("", "", "")
+    ends = [number(part) for part in text.split(":")] if isinstance(given, str) else given
+    if len(ends) != 2 or not 0 <= ends[0] < ends[1]:
+        raise ValueError(f"--cross-coupling {given!r} is not a range: use LEAST:MOST, such as 0:5e7")
+    return (ends[0], ends[1]), place.strip() or None
 
 
 def _at(whirl: Campbell, s: int) -> Table:

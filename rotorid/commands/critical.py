@@ -98,7 +98,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         sentences=(modes.sentence(), *(part.sentence() for part in asked.values())),
         tables=(table,),
         more=tuple(one.under(key) for key, part in asked.items() for one in part.tables()[:1]),
-        behind=(shapes.only({name: _plain(name) for name in shapes.headings}),),
         file=chart.tables()[-1] if chart else shapes,
         keys={**modes.to_dict(), **{key: part.to_dict() for key, part in asked.items()}},
         warnings=modes.warnings,
@@ -107,11 +106,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         title="Critical speeds",
         provenance=provenance(files, options),
     )
-
-
-def _plain(heading: str) -> str:
-    """A heading of a file as people read it."""
-    return heading.replace("_m", ", m").replace("_", " ")
 
 
 def _pictures(
@@ -144,12 +138,10 @@ def _stubby(model: Rotor, modes: Modes) -> list[str]:
         other = dataclasses.replace(model, model=counted_in, discs=discs)
         full = fem.critical_speeds(other, modes.frequencies.size) if missing else modes
         high, low = (each.frequencies[each.frequencies > 0] for each in (modes, full))
-        first = 1 + modes.frequencies.size - high.size
-        excess = [(k, 100 * (f / g - 1)) for k, (f, g) in enumerate(zip(high, low, strict=False), first)]
-        large = [f"mode {k} by {percent:.1f} %" for k, percent in excess if percent > 1]
-        if large:
+        excess = max((100 * (f / g - 1) for f, g in zip(high, low, strict=False)), default=0.0)
+        if excess > 1:
             keys = ", ".join(f"{key} = true" for key in missing)
-            return [f"these speeds are too high, {listing(large, 'and')}: [model] {keys} in a rotor file"]
+            return [f"these speeds are too high, by up to {excess:.1f} %: [model] {keys} in a rotor file"]
     return []
 
 
@@ -171,11 +163,9 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
         np.geomspace(stiffnesses.min() / 100, stiffnesses.max() * 100, 49) if stiffnesses.size else None
     )
     chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
-    remarks = []
-    for i, support in enumerate(model.supports, start=1):
-        name = repr(support.name) if support.name else f"{i} at node {support.node}"
-        if support.kind == "seal":
-            remarks.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
-        elif support.pedestal is not None:
-            remarks.append(f"map: bearing {name} stands on the ground there, its pedestal is left out")
-    return chart, remarks
+    left_out = {
+        "seals": len(bearings) < len(model.supports),
+        "pedestals": any(bearing.pedestal is not None for bearing in bearings),
+    }
+    words = listing((name for name, there in left_out.items() if there), "and")
+    return chart, [f"the map leaves out {words}"] if words else []

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _STEPS, _MODES = 11, 12
 
@@ -85,27 +82,6 @@ class CrossCoupling:
         if self.threshold is not None:
             most, left = self.threshold, "there the smallest log decrement is 0"
         return f"It bears {most:.4g} N/m of {place}: {left} ({first:z.4f} without)."
-
-    def figure(self) -> Figure:
-        """Decrements over stiffness, with the limit of stability."""
-        from rotorid.base.plot_style import look, on_figure
-        from rotorid.base.plot_style import plain as plain_axes
-
-        def draw(ax: Any) -> None:  # noqa: ANN401 - axes
-            mega = 1e-6 * self.added
-            ax.plot(mega, self.smallest, label="smallest of all modes", **look(0))
-            ax.plot(mega, self.forward, label="first forward mode", **look(1))
-            ax.axhline(0.0, color="black", linewidth=1.1)
-            if self.threshold is not None:
-                ax.plot(1e-6 * self.threshold, 0.0, "o", color="black", label="limit of stability")
-            plain_axes(ax)
-            ax.legend(frameon=False)
-            ax.set(
-                xlabel=f"cross-coupling added at node {self.node}, MN/m",
-                ylabel=f"logarithmic decrement at {rpm_text(self.speed)}",
-            )
-
-        return on_figure(draw)
 
 
 def cross_coupling(

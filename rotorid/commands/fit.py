@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -168,12 +169,10 @@ def fit(
 
 def _check_once(records: Sequence[Path]) -> None:
     """Refuse a file that is given twice, perhaps by another name: its samples would count double."""
-    for i, path in enumerate(records):
-        for other in records[:i]:
-            same = path.samefile(other) if path.exists() and other.exists() else path == other
-            if same:
-                also = "" if path == other else f" (it is {other}, too)"
-                raise ValueError(f"{path}: this record is given twice{also}; its samples would count double")
+    files = [os.path.realpath(path) for path in records]  # of a circle of links, too
+    for path, file in zip(records, files, strict=True):
+        if files.count(file) > 1:
+            raise ValueError(f"{path}: this record is given twice; its samples would count double")
 
 
 def _read(

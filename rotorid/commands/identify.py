@@ -36,16 +36,12 @@ class IdentifyOptions:
         One standard deviation of an amplitude, in place of the one that the model states.
     phase_error : DEGREES
         One standard deviation of a phase, in place of the one that the model states.
-    ridge : LAMBDA
-        Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
-        intervals.
     """
 
     loss: str = "linear"
     amplitude_error: float | None = None
     phase_error: float | None = None
-    ridge: float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "loss ridge"}
+    panels: ClassVar[Mapping[str, str]] = {"Method": "loss"}
     to: ClassVar[tuple[str, ...]] = (*WITH_REPORT, *EQUATIONS)
 
 
@@ -87,7 +83,7 @@ def identify(
     options = options or IdentifyOptions()
     check_choices(options, choices())
     if data is None:
-        refuse(options, ("loss", "ridge"), "belongs to DATA: nothing is fitted without them")
+        refuse(options, ("loss",), "belongs to DATA: nothing is fitted without them")
     files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
@@ -105,7 +101,6 @@ def identify(
         loss=options.loss,
         start=file.start or None,
         prior=file.prior,
-        ridge=options.ridge or 0.0,
     )
 
     def picture() -> Figure:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.base.tables import LONG
 from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
 from rotorid.report.options import rotor_source
 from rotorid.report.outcome import Outcome, command, provenance
@@ -68,7 +67,6 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
         result=result,
         sentences=tuple(result.sentence().splitlines()),
         tables=tuple(largest),
-        behind=(every,) if len(every.rows) <= LONG else (),
         file=every,
         keys=result.to_dict(),
         warnings=result.warnings,

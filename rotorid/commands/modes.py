@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing
+from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
@@ -114,11 +114,9 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
     from rotorid.files.measurements import read_amplitudes
     from rotorid.identify.modes_result import Readings
 
-    errors = options.amplitude_error, options.phase_error
-    if None in errors and any(error is not None for error in errors):
+    if (options.amplitude_error is None) != (options.phase_error is None):
         raise ValueError("--amplitude-error and --phase-error belong together")
-    if errors == (0, 0):
-        raise ValueError("--amplitude-error and --phase-error: one of them must be above 0")
+    errors = amplitude_errors(None, options.amplitude_error, options.phase_error)
     table = read_amplitudes(file)
     if options.excitation is not None:
         one_of(options.excitation, "--excitation", get_args(Excitation))
@@ -136,9 +134,7 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
         vibration_scale=unit.scale if unit else 1.0,
         speed_unit=table.axis.word.rpartition(", ")[2].replace("/", "_"),
     )
-    shares = None
-    if None not in errors:
-        shares = (float(errors[0] or 0.0) / 100, math.radians(errors[1] or 0.0))
+    shares = (errors.relative, errors.phase) if errors else None
     readings = Readings(
         "", None, table.frequencies, points, table.table(points), labels=labels, shares=shares
     )
@@ -158,16 +154,20 @@ def _sentence(fit: FittedModes) -> str:
 
 def _tables(fit: FittedModes) -> tuple[Table, Table]:
     """Frequencies and damping, and shapes."""
-    omega, zeta, error, other = fit.values
     shapes = [Column("point", fit.readings.sensors)]
     for mode, (shape, std) in enumerate(zip(fit.shapes, fit.shape_std, strict=True), 1):
         shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
         shapes.append(Column("±", abs(shape) * std, error_figures))
-    frequencies = (
+    return Table("modes", frequencies(fit, "ω, rad/s")), Table("shapes", tuple(shapes))
+
+
+def frequencies(fit: FittedModes, heading: str, scale: float = 1.0) -> tuple[Column, ...]:
+    """A row a mode: its frequency in a unit of which 1 rad/s has `scale`, and its damping."""
+    omega, zeta, error, other = fit.values
+    return (
         Column("mode", range(1, len(omega) + 1)),
-        Column("ω, rad/s", omega, "{:.7g}".format),
-        Column("±", error, error_figures),
+        Column(heading, scale * omega, "{:.7g}".format),
+        Column("±", scale * error, error_figures),
         Column("ζ, %", 100 * zeta, "{:.4g}".format),
         Column("± ", 100 * other, error_figures),
     )
-    return Table("modes", frequencies), Table("shapes", tuple(shapes))

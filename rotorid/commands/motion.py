@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import figures, percent
-from rotorid.commands.moving import moving, reduction, reduction_notes
+from rotorid.commands.moving import SMALL, mounted_nodes, moving, reduction, reduction_notes
 from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
     Speeds,
+    acceleration,
     degrees,
     nodes,
     number,
     one_of,
     one_speed,
     pairs,
-    speeds,
+    two_speeds,
 )
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.report.options import refuse
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from fem import Rotor
     from rotorid.commands.moving import Moving
     from rotorid.motion.run import MotionRun
@@ -46,8 +42,6 @@ View = Literal["motion", "orbits", "bode"]
 Start = Literal["rest", "steady"]
 _TOLERANCE = 1e-6
 """Error of one step, by how far the rotor has moved from where it began."""
-_SMALL = 24
-"""Unknowns above which a rotor is reduced, where nothing else is asked for."""
 _LOOSER = 30.0
 """Times the tolerance: the motion is found twice, and what differs is told as its error."""
 _UNSURE = 1e-3
@@ -78,11 +72,7 @@ class MotionOptions:
     displaced : LIST
         Nodes moved from there, with the direction from x: 7=20um@90,12=5um.
     sensors : NODES
-        Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
-    modes : N from 0
-        Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
-        together; default: as many as its natural frequencies up to twice the highest speed need to agree
-        to 0.03 %; small models keep all.
+        Where the motion is given: nodes or stations with commas; default: stations and bearings, or all.
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
     view
@@ -99,214 +89,149 @@ class MotionOptions:
     start: Start = "rest"
     displaced: str | Mapping[str, complex] | None = None
     sensors: Nodes | None = None
-    modes: int | None = None
     rate: float | None = None
     view: View = "motion"
     panels: ClassVar[Mapping[str, str]] = {
         "Start": "start displaced",
-        "Method": "modes rate",
+        "Method": "rate",
         "Output": "view",
     }
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Motion(Answered):
+class Motion(NamedTuple):
     """Motion in time, what it comes to, and how sure it is.
 
-    Attributes
-    ----------
-    motion
-        What was found.
-    end
-        What it has come to; None where the speed changes or too little is known.
-    error
-        Largest difference of positions from those with a tolerance thirty times as large, by its way;
-        the error itself is smaller, except where two motions part.
-    warnings
-        What the reader must know.
-    view
-        What the picture shows.
+    `end` is None where the speed changes or too little is known; `error` the largest difference of positions
+    from those with a tolerance thirty times as large, by its way: the error itself is smaller, except where
+    two motions part.
     """
 
     motion: MotionRun
     end: SteadyEnd | None
     error: float
-    warnings: tuple[str, ...]
-    view: View = "motion"
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        import numpy as np
 
-        motion, end = self.motion, self.end
-        ranges = motion.eccentricity() if end is None else end.eccentricity
-        nodes = [str(node) for node in motion.nodes]
-        deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
-        return plain(
-            {
-                "time_s": motion.time,
-                "speed_rad_s": motion.speed,
-                "angle_rad": motion.turned,
-                "positions_m": {node: deflections[:, i] for i, node in enumerate(nodes)},
-                "furthest": {
-                    **dict(
-                        zip(("node", "time_s", "speed_rad_s", "distance_m"), self._furthest(), strict=True)
-                    )
-                },
-                "steady": end and end.steady,
-                "at_rest": end and end.at_rest,
-                "chaotic": end and end.chaotic,
-                "trend": end and (end.trend or None),
-                "change": end and end.change,
-                "periodic": end and end.periodic,
-                "period_s": end and end.period,
-                "whirl_ratio": end and end.whirl_ratio,
-                "whirl_frequency_rad_s": end and end.frequency,
-                "multipliers": [[value.real, value.imag] for value in self._multipliers()] or None,
-                "amplitude_m": end and dict(zip(nodes, end.amplitude, strict=True)),
-                "eccentricity": dict(zip(self._bearings, ranges.tolist(), strict=True)),
-                "tolerance": motion.tolerance,
-                "position_error": self.error,
-                "reduction": reduction(motion.system),
-                "warnings": self.warnings,
-            }
-        )
+def _furthest(motion: MotionRun) -> tuple[int, float, float, float]:
+    """Node, time, speed and distance where it is furthest from the line of bearings."""
+    size = abs(motion.z)
+    k, i = divmod(int(size.argmax()), len(motion.nodes))
+    return motion.nodes[i], float(motion.time[k]), float(motion.speed[k]), float(size[k, i])
 
-    def _multipliers(self) -> list[complex]:
-        """Floquet multipliers of the periodic motion at the end, the largest first, if there is one."""
-        import numpy as np
 
-        from rotorid.motion.run import run
-        from rotorid.motion.steady import repeating
+def _document(result: Motion, bearings: Sequence[str], warnings: Sequence[str]) -> dict[str, Any]:
+    import numpy as np
 
-        motion, end = self.motion, self.end
-        if end is None or end.at_rest or not end.periodic or not end.speed:
-            return []
-        angle = float(motion.turned[-1]) % (2 * np.pi)
-        on = run(  # to the angle 0
-            *(motion.system, (end.speed, end.speed), (2 * np.pi - angle) / end.speed, (motion.q, motion.v)),
-            angle=angle,
-        )
-        found = repeating(motion.system, end.speed, end.period, on.q, on.v)
-        return [] if found is None else found.multipliers.tolist()
+    motion, end = result.motion, result.end
+    ranges = motion.eccentricity() if end is None else end.eccentricity
+    nodes = [str(node) for node in motion.nodes]
+    deflections = np.stack([motion.z.real, motion.z.imag], axis=2)
+    furthest = zip(("node", "time_s", "speed_rad_s", "distance_m"), _furthest(motion), strict=True)
+    return plain(
+        {
+            "time_s": motion.time,
+            "speed_rad_s": motion.speed,
+            "angle_rad": motion.turned,
+            "positions_m": {node: deflections[:, i] for i, node in enumerate(nodes)},
+            "furthest": dict(furthest),
+            "steady": end and end.steady,
+            "at_rest": end and end.at_rest,
+            "chaotic": end and end.chaotic,
+            "trend": end and (end.trend or None),
+            "change": end and end.change,
+            "periodic": end and end.periodic,
+            "period_s": end and end.period,
+            "whirl_ratio": end and end.whirl_ratio,
+            "whirl_frequency_rad_s": end and end.frequency,
+            "amplitude_m": end and dict(zip(nodes, end.amplitude, strict=True)),
+            "eccentricity": dict(zip(bearings, ranges.tolist(), strict=True)),
+            "tolerance": motion.tolerance,
+            "position_error": result.error,
+            "reduction": reduction(motion.system),
+            "warnings": warnings,
+        }
+    )
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row a sample: time, speed, angle, deflections."""
-        import numpy as np
 
-        motion = self.motion
-        places = [
-            Column(f"{axis}_{node}_um", 1e6 * part)
-            for node, z in zip(motion.nodes, motion.z.T, strict=True)
-            for axis, part in (("x", z.real), ("y", z.imag))
-        ]
-        return frame(
-            (
-                Column("t_s", motion.time),
-                Column("speed_rpm", motion.speed * RPM),
-                Column("angle_deg", np.degrees(motion.turned)),
-                *places,
-            )
-        )
+def _samples(motion: MotionRun) -> Table:
+    """One row a sample: time, speed, angle, deflections."""
+    import numpy as np
 
-    @property
-    def answer(self) -> Answer:
-        """What it has come to or where it was largest, and each node; how it was found."""
-        tables = [text(self._nodes(), width=COLUMNS)]
-        if self._bearings:
-            when = "" if self.end is None else "at the end "
-            least, most = (self.motion.eccentricity() if self.end is None else self.end.eccentricity).T
-            ranges = (
-                Column("bearing", self._bearings, str),
-                Column("least", least, "{:.4f}".format, f"eccentricity {when}from"),
-                Column("most", most, "{:.4f}".format, "to"),
-            )
-            tables.append(text(ranges, width=COLUMNS))
-        return Answer(self._judgement(), "\n\n".join(tables), self.warnings, self._notes())
+    columns = [
+        Column("t_s", motion.time),
+        Column("speed_rpm", motion.speed * RPM),
+        Column("angle_deg", np.degrees(motion.turned)),
+    ]
+    for node, z in zip(motion.nodes, motion.z.T, strict=True):
+        columns += [Column(f"x_{node}_um", 1e6 * z.real), Column(f"y_{node}_um", 1e6 * z.imag)]
+    return Table("motion", tuple(columns))
 
-    @property
-    def _bearings(self) -> list[str]:
-        return [force.name or f"node {force.node}" for force, _ in self.motion.bearings]
 
-    def _judgement(self) -> str:
-        end, motion = self.end, self.motion
-        first, last = motion.speeds
-        if end is None and first == last:
-            return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
-        if end is None:
-            node, _, speed, distance = self._furthest()
-            return (
-                f"From {rpm_text(first)} to {rpm_text(last)} in {figures(motion.time[-1])} s: furthest from "
-                f"the line of bearings at node {node}, {figures(1e6 * distance)} µm at {rpm_text(speed)}."
-            )
-        where = f"At {rpm_text(first)}"
-        if end.at_rest:
-            return f"{where} it comes to rest."
-        whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
-        if end.speed:
-            way = ", against the rotation" if end.frequency < 0 else ""
-            whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
-        if not end.steady:
-            more = {
-                "grows": "it grows, to a limit cycle or to a wall: more --time shows which",
-                "decays": "it dies down: give it more --time to settle",
-                "drifts": "its mean drifts: give it more --time to settle",
-                "": "with more --time still so, it beats",
-            }[end.trend]
-            if end.chaotic:
-                more = "it does not come again, and its spectrum is no few lines: it is chaotic"
-            return (
-                f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
-                f"{percent(end.change)} % in its last part; {more}; {whirl}."
-            )
-        again = "does not come again"
-        if end.periodic:
-            turns = end.period * end.speed * RPM / 60
-            unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
-            again = f"comes again every {turns or end.period:.5g} {unit}"
-        return f"{where} the motion is steady to {percent(max(end.change, 1e-4))} % and {again}; {whirl}."
-
-    def _furthest(self) -> tuple[int, float, float, float]:
-        """Node, time, speed and distance where it is furthest from the line of bearings."""
-        motion, size = self.motion, abs(self.motion.z)
-        k, i = divmod(int(size.argmax()), len(motion.nodes))
-        return motion.nodes[i], float(motion.time[k]), float(motion.speed[k]), float(size[k, i])
-
-    def _nodes(self) -> tuple[Column, ...]:
-        """A row for each node: where it was furthest from the line of bearings, and what the end is."""
-        motion, end = self.motion, self.end
-        size = abs(motion.z)
-        at = size.argmax(axis=0)
-        columns = (
-            Column("node", motion.nodes, str),
-            Column("largest_m", 1e6 * size.max(axis=0), figures, "furthest, µm"),
-            Column("at_s", motion.time[at], figures, "at, s"),
-            Column("at_rpm", motion.speed[at] * RPM, "{:.6g}".format, "at, rpm"),
-        )
-        if end is None:
-            return columns
+def _sentence(motion: MotionRun, end: SteadyEnd | None) -> str:
+    first, last = motion.speeds
+    if end is None and first == last:
+        return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
+    if end is None:
+        node, _, speed, distance = _furthest(motion)
         return (
-            *columns,
-            Column("amplitude", 1e6 * end.amplitude, figures, "at the end: amplitude, µm"),
-            Column("x", 1e6 * end.mean.real, figures, "mean x, µm"),
-            Column("y", 1e6 * end.mean.imag, figures, "mean y, µm"),
+            f"From {rpm_text(first)} to {rpm_text(last)} in {figures(motion.time[-1])} s: furthest from "
+            f"the line of bearings at node {node}, {figures(1e6 * distance)} µm at {rpm_text(speed)}."
         )
-
-    def _notes(self) -> tuple[str, ...]:
-        motion = self.motion
-        step = 1e3 * motion.time[-1] / motion.steps
-        found = (
-            f"steps of about {figures(step, 1)} ms, each to {motion.tolerance:g} of how far the rotor moves; "
-            f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
+    where = f"At {rpm_text(first)}"
+    if end.at_rest:
+        return f"{where} it comes to rest."
+    whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
+    if end.speed:
+        way = ", against the rotation" if end.frequency < 0 else ""
+        whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
+    if not end.steady:
+        more = {
+            "grows": "it grows, to a limit cycle or to a wall: more --time shows which",
+            "decays": "it dies down: give it more --time to settle",
+            "drifts": "its mean drifts: give it more --time to settle",
+            "": "with more --time still so, it beats",
+        }[end.trend]
+        if end.chaotic:
+            more = "it does not come again, and its spectrum is no few lines: it is chaotic"
+        return (
+            f"{where} it is NOT STEADY after {figures(motion.time[-1])} s: size or mean change by "
+            f"{percent(end.change)} % in its last part; {more}; {whirl}."
         )
-        return (*found, *reduction_notes(motion.system))
+    again = "does not come again"
+    if end.periodic:
+        turns = end.period * end.speed * RPM / 60
+        unit = "s" if not turns else "turn" if round(turns, 3) == 1 else "turns"
+        again = f"comes again every {turns or end.period:.5g} {unit}"
+    return f"{where} the motion is steady to {percent(max(end.change, 1e-4))} % and {again}; {whirl}."
 
-    def figure(self) -> Figure:
-        """What was asked for: time and spectrum, orbits, or the Bode picture of a run-up."""
-        from rotorid.motion.plots import FIGURES
 
-        return FIGURES[self.view](self.motion)
+def _tables(motion: MotionRun, end: SteadyEnd | None, bearings: Sequence[str]) -> tuple[Table, ...]:
+    """A row for each node: where it was furthest from the line of bearings, and the end; the bearings."""
+    size = abs(motion.z)
+    at = size.argmax(axis=0)
+    columns = [
+        Column("node", [str(node) for node in motion.nodes]),
+        Column("furthest, µm", 1e6 * size.max(axis=0), figures),
+        Column("at, s", motion.time[at], figures),
+        Column("at, rpm", motion.speed[at] * RPM, "{:.6g}".format),
+    ]
+    if end is not None:
+        columns += [
+            Column("at the end: amplitude, µm", 1e6 * end.amplitude, figures),
+            Column("mean x, µm", 1e6 * end.mean.real, figures),
+            Column("mean y, µm", 1e6 * end.mean.imag, figures),
+        ]
+    nodes = Table("nodes", tuple(columns))
+    if not bearings:
+        return (nodes,)
+    when = "" if end is None else "at the end "
+    least, most = (motion.eccentricity() if end is None else end.eccentricity).T
+    ranges = (
+        Column("bearing", bearings),
+        Column(f"eccentricity {when}from", least, "{:.4f}".format),
+        Column("to", most, "{:.4f}".format),
+    )
+    return nodes, Table("bearings", ranges)
 
 
 @command
@@ -332,6 +257,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     """
     import numpy as np
 
+    from rotorid.motion.plots import FIGURES
     from rotorid.motion.run import run
     from rotorid.motion.steady import begin, steady_end
     from rotorid.motion.system import reduced_system
@@ -342,84 +268,80 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     source = moving(model, options.unbalance, options.bow, direction)
     system = source.system(min(ends), max(ends))
     shown = _shown(source, system, options.sensors)
-    shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
-    if options.modes is not None or system.size > _SMALL:
-        system = reduced_system(system, [*shown, *shift, *_loaded(system)], options.modes)
+    shift = {source.model.node(node): by for node, by in _displaced(options.displaced).items()}
+    if system.size > SMALL:
+        system = reduced_system(system, [*shown, *shift, *mounted_nodes(system)], None)
     q, v, unsettled = begin(system, ends[0], options.start, shift, _TOLERANCE)
     move = partial(run, system, ends, time, (q, v), nodes=shown, rate=options.rate)
-    found = move(tolerance=_TOLERANCE)
+    fine = move(tolerance=_TOLERANCE)
     rough = move(tolerance=_LOOSER * _TOLERANCE)
-    if found.stopped:
-        until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
-        raise ValueError(found.stopped + until)
-    k = min(found.time.size, rough.time.size)
-    moved = np.abs(found.z - found.z[0]).max()
-    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    result = Motion(
-        motion=found,
-        end=steady_end(found),
-        error=error,
-        warnings=(*unsettled, *_warnings(found, error, bool(shift))),
-        view=options.view,
+    if fine.stopped:
+        until = f" (--time {0.999 * fine.time[-1]:.4g} shows it until then)" if fine.time[-1] else ""
+        raise ValueError(fine.stopped + until)
+    k = min(fine.time.size, rough.time.size)
+    moved = np.abs(fine.z - fine.z[0]).max()
+    error = float(np.abs(fine.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(fine.z).max(), 1e-300))
+    result = Motion(fine, steady_end(fine), error)
+    warnings = (*unsettled, *_warnings(fine, error, bool(shift)))
+    bearings = [force.name or f"node {force.node}" for force, _ in fine.bearings]
+    step = figures(1e3 * fine.time[-1] / fine.steps, 1)
+    return Outcome(
+        result=result,
+        sentences=(_sentence(fine, result.end),),
+        tables=_tables(fine, result.end, bearings),
+        file=lambda: _samples(fine),
+        keys=lambda: _document(result, bearings, warnings),
+        pictures={"": lambda: FIGURES[options.view](fine)},
+        warnings=warnings,
+        notes=(
+            f"steps of about {step} ms, each to {fine.tolerance:g} of how far the rotor moves; positions "
+            f"differ by {error:.1g} of that from those with {_LOOSER:g} times this tolerance",
+            *reduction_notes(fine.system),
+        ),
+        provenance=provenance(source.files, options),
     )
-    return outcome_of(result, provenance(source.files, options))
 
 
 def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
     """First and last speed, rad/s, and the time between them, s."""
-    if (options.speed is None) == (options.run_up is None):
+    constant = options.speed is not None
+    if constant == (options.run_up is not None):
         raise ValueError("one of --speed and --run-up is needed")
-    if options.speed is not None:
-        speed = one_speed(options.speed, "--speed")
-        if options.acceleration is not None:
-            raise ValueError("--acceleration belongs to --run-up")
+    if constant:
+        speed = one_speed(options.speed or 0.0, "--speed")
         ends = (speed, speed)
+        refuse(options, ("acceleration",), "belongs to --run-up")
     else:
-        given = options.run_up or ""
-        found = speeds(given.replace(":", ",") if isinstance(given, str) else given, what="--run-up")
-        if len(found) != 2 or found[0] == found[1]:
-            raise ValueError(
-                f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
-            )
-        ends = (found[0], found[1])
+        ends = two_speeds(options.run_up or "", "--run-up", "FIRST:LAST")
+        if ends[0] == ends[1]:
+            raise ValueError(f"--run-up {options.run_up!r}: two different speeds are needed; else --speed")
     if (options.time is None) == (options.acceleration is None):
-        one = (
-            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
-        )
-        raise ValueError(one)
+        raise ValueError("--time is needed" if constant else "one of --time and --acceleration is needed")
     if options.time is None:
-        return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
+        rate = acceleration(options.acceleration or 0.0, "--acceleration", bare=True)
+        if not rate > 0:
+            raise ValueError(f"--acceleration {options.acceleration!r} must be above 0, also down")
+        return ends, abs(ends[1] - ends[0]) / rate
     time = number(str(options.time).strip().removesuffix("s"))
     if not 0 < time < FASTEST:
         raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")
     return ends, time
 
 
-def _acceleration(given: str | float) -> float:
-    """Read "300rpm/s", or a number in rad/s², as --run-up without a unit is in rad/s."""
-    text = re.sub(r"/s(²|\^?2)$", "/s/s", str(given).strip())
-    if math.isnan(number(text)) and not re.search("(rpm|Hz|rad[/_]s)/s$", text):
-        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
-    value = one_speed(text.removesuffix("/s") if math.isnan(number(text)) else text, "--acceleration")
-    if not value > 0:
-        raise ValueError(
-            f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"
-        )
-    return value
-
-
 def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[int, ...]:
-    """Nodes whose motion is told."""
+    """Nodes whose motion is given."""
     import numpy as np
 
     walled = [force.node for force in system.forces if np.isfinite(force.wall)]
     if given is not None:
-        return tuple(dict.fromkeys([*(source.node(node) for node in nodes(given, "--sensors")), *walled]))
+        return tuple(
+            dict.fromkeys([*(source.model.node(node) for node in nodes(given, "--sensors")), *walled])
+        )
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports if support.node in system.nodes]
     chosen = (
-        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
-        if stations or system.size > _SMALL
+        {*map(source.model.node, stations), *walled, *supports, *mounted_nodes(system)}
+        if stations or system.size > SMALL
         else ()
     )
     return tuple(sorted(chosen)) or system.nodes
@@ -440,22 +362,16 @@ def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     return pairs(given or {}, "--displaced", read, "7=20um@90")
 
 
-def _loaded(system: MotionSystem) -> list[int]:
-    """Nodes with unbalance, unless they are too many."""
-    found = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
-    return found if len(found) <= _SMALL // 2 else []
-
-
-def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
-    said = []
-    if not found.resolved:
-        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
+def _warnings(run: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
+    warnings = []
+    if not run.resolved:
+        warnings.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
-        said.append(
+        warnings.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "
             "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase; "
             "where it is chaotic, positions cannot be compared"
         )
-    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
-        said.append("nothing excites it: no unbalance, no bow (--unbalance)")
-    return tuple(said)
+    if not shifted and not run.system.unbalance.any() and not run.system.bow.any():
+        warnings.append("nothing excites it: no unbalance, no bow (--unbalance)")
+    return tuple(warnings)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
 
+SMALL = 24
+"""Unknowns above which a rotor is reduced."""
 Table = Mapping[int, complex] | Path | str
 
 
@@ -40,10 +42,6 @@ class Moving:
     direction: float
     files: tuple[Path, ...]
 
-    def node(self, name: str | int) -> int:
-        """Number of a node, as the model's `node`."""
-        return self.model.node(name)
-
     def system(self, lowest: float, highest: float) -> MotionSystem:
         """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
         from rotorid.motion.system import rotor_system
@@ -67,8 +65,14 @@ def reduction_notes(system: MotionSystem) -> tuple[str, ...]:
     size, modes = counted(system.size, "unknown"), counted(system.modes, "mode")
     high = f"natural frequencies without films are high by {percent(system.frequency_error)} % at most"
     if system.frequency_error == float("inf"):
-        high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        high = "NOT ENOUGH for its natural frequencies up to twice the speed"
     return (f"of the rotor {size} move, {modes} among them; {high}",)
+
+
+def mounted_nodes(system: MotionSystem) -> list[int]:
+    """Nodes with unbalance, unless they are too many to be kept in a reduced system."""
+    nodes = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
+    return nodes if len(nodes) <= SMALL // 2 else []
 
 
 def moving(

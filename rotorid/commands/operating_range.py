@@ -39,11 +39,12 @@ def critical_peaks(names: Sequence[str], peaks: Sequence[Peaks]) -> list[tuple[s
     every = [(name, peak) for name, each in zip(names, peaks, strict=False) for peak in each.peaks]
     groups, low, high = list[dict[str, Peak]](), np.inf, 0.0
     for name, peak in sorted(every, key=lambda one: one[1].speed):
-        beside = low >= (peak.below or peak.speed * (1 - _NARROW)) and peak.speed <= high
+        below, above = (None, None) if peak.undamped else (peak.below, peak.above)  # which are rounding
+        beside = low >= (below or peak.speed * (1 - _NARROW)) and peak.speed <= high
         if not beside or name in groups[-1]:
             groups.append({})
         groups[-1][name], low = peak, peak.speed
-        high = peak.above or low * (1 + _NARROW)
+        high = above or low * (1 + _NARROW)
 
     def rank(one: tuple[str, Peak]) -> tuple[bool, bool, float]:
         return one[1].enough is not False, not one[1].amplification, -one[1].amplitude

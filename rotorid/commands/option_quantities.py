@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, get_args
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import Angles
-from rotorid.commands.quantities import degrees, one_of, one_speed, pairs
+from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
-from rotorid.files.units import Unit, UnitError, spelt
+from rotorid.files.units import Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:
     from balancing import Labels
@@ -33,31 +33,31 @@ Weights = Amount | Mapping[str, Amount]
 """One of all planes, or by plane, in SI as the weights of the job are: kg or kg·m."""
 Amplitudes = str | Sequence[str] | Mapping[str, Amount]
 """`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
-_WORD = re.compile(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d].*)?")
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
 
 
-def quantity(given: Amount, what: str, known: Mapping[str, Unit], example: str) -> float:
-    """Read "500kg" or "500 kg" in SI.
+def read_with_unit(text: str, what: str, unit: UnitReader, example: str) -> tuple[float, Unit]:
+    """Read "500 kg" as a number and its unit, which `unit` reads.
 
     Raises
     ------
     ValueError
-        For no number, no unit or another one; says which there are.
+        For no number, no unit or another one; says what was expected.
     """
+    match = WITH_UNIT.fullmatch(text)
+    try:
+        value = parse_number(match[1] if match else text.strip())
+        check_size(value, LARGEST_STATED)
+        return value, unit(match[2] if match else "")
+    except (NotANumber, UnitError) as error:
+        raise ValueError(f"{what} {text.strip()!r}: expected {error}, such as {example}") from None
+
+
+def quantity(given: Amount, what: str, known: Mapping[str, Unit], example: str) -> float:
+    """Read "500kg" or "500 kg" in SI."""
     if not isinstance(given, str):
         return given
-    body = given.strip()
-    split = next((i for i in range(len(body), 0, -1) if body[i - 1] in "0123456789."), 0)
-    unit = known.get(spelt(body[split:].strip()))
-    try:
-        value = parse_number(body[:split].strip())
-    except NotANumber:
-        unit = None
-    if unit is None:
-        raise ValueError(
-            f"{what} {given!r}: a number with its unit ({', '.join(known)}) is needed, such as {example}"
-        )
+    value, unit = read_with_unit(given, what, units.one_of(dict(known)), example)
     return unit.to_si(value)
 
 
@@ -121,15 +121,16 @@ def weight(
     from rotorid.files.settings_keys import Quantity
     from rotorid.files.weights_with_units import in_job_units
 
-    own = labels.weight_unit
-    value, unit = _weight(given, what, example) if isinstance(given, str) else (given, _si(own))
-    _above_zero(value, given, what, example)
-    found = in_job_units(Quantity(what, value, unit), own, radius)
-    if found is None:
+    unit = labels.weight_unit
+    amount = _weight(given, what, example) if isinstance(given, str) else (given, _si(unit))
+    _above_zero(amount[0], given, what, example)
+    converted = in_job_units(Quantity(what, *amount), unit, radius)
+    if converted is None:
         raise ValueError(
-            f"{what}: the weight to be split is in {own}, to which {unit.name} converts only with --radius"
+            f"{what}: the weight to be split is in {unit}, to which {amount[1].name} converts only with "
+            "--radius"
         )
-    return found[0]
+    return converted[0]
 
 
 def weights(
@@ -155,29 +156,21 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
         raise ValueError(f"{what}: a text such as 35g@120 or one complex weight is needed, not {given!r}")
     if not isinstance(given, str):
         return Labels(weight_unit="g", weight_scale=1e3, angles=way), [complex(given)]
-    labels, found = None, []
-    for part in _PLUS.split(given):
-        head, at, tail = part.partition("@")
-        if not at:
-            raise ValueError(
-                f"{what} {part.strip()!r}: write a weight at an angle in degrees, such as 35g@120"
-            )
-        value, unit = _weight(head, what, "35g@120")
-        if value < 0:
-            raise ValueError(
-                f"{what} {head.strip()!r}: a weight must not be negative; turn its angle by 180°"
-            )
-        if labels is None:
-            labels = Labels(weight_unit=unit.name, weight_scale=unit.scale, angles=way)
-        elif units.weight(labels.weight_unit).kind != unit.kind:
-            raise ValueError(
-                f"{what} {given!r}: masses and unbalances (mass × radius) cannot be added; "
-                "write all as one kind"
-            )
-        angle = radians(degrees(tail.removesuffix("°"), what))
-        found.append(complex(labels.weight_from(unit.to_si(value), angle)))
-    assert labels is not None  # a split text has at least one part
-    return labels, found
+    parts = [(part.strip(), *part.partition("@")) for part in _PLUS.split(given)]
+    if lost := [part for part, _, at, _ in parts if not at]:
+        raise ValueError(f"{what} {lost[0]!r}: write a weight at an angle in degrees, such as 35g@120")
+    each = [_weight(head, what, "35g@120") for _, head, _, _ in parts]
+    first = each[0][1]
+    if any(value < 0 for value, _ in each):
+        raise ValueError(f"{what} {given!r}: a weight must not be negative; turn its angle by 180°")
+    if any(unit.kind != first.kind for _, unit in each):
+        raise ValueError(
+            f"{what} {given!r}: masses and unbalances (mass × radius) cannot be added; write all as one kind"
+        )
+    labels = Labels(weight_unit=first.name, weight_scale=first.scale, angles=way)
+    turned = [radians(degrees(tail.removesuffix("°"), what)) for *_, tail in parts]
+    sizes = [unit.to_si(value) for value, unit in each]
+    return labels, [complex(labels.weight_from(*one)) for one in zip(sizes, turned, strict=True)]
 
 
 def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -> dict[str, Quantity]:
@@ -190,22 +183,19 @@ def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -
     ValueError
         Naming the option and what is wrong with it.
     """
-    own = job.trials.labels.weight_unit
-    example = "5g; to use no weight at all, leave the plane out"
+    unit = job.trials.labels.weight_unit
 
-    def read(value: Amount) -> Quantity:
-        if not isinstance(value, str):
-            return _limit(value, _si(own), value, what, "0.005 kg")
-        size, word = _number(value, what, "5g")
-        return _limit(size, _weight_unit(word or own, value, what), value, what, example)
+    def read(value: Amount) -> tuple[float, Unit]:
+        if isinstance(value, str):
+            return read_with_unit(value, what, lambda word: units.weight(word or unit), "5g")
+        return value, _si(unit)
 
-    if given is None:
-        return {}
     if isinstance(given, str) and "," in given and "=" not in given:
         raise ValueError(
             f"{what} {given!r}: give one value for all planes, or each plane once (a decimal sign is a point)"
         )
-    return _limits(given, what, read, "5g or left=5g,right=3g", "plane", job.planes, job.used)
+    example = "5g or left=5g,right=3g; to use no weight at all, leave the plane out"
+    return {} if given is None else _limits(given, what, read, example, "plane", job.planes, job.used)
 
 
 def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> dict[str, Quantity]:
@@ -218,30 +208,29 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
     ValueError
         Naming the option and what is wrong with it.
     """
-    own, sensors = units.vibration(job.trials.labels.vibration_unit), job.trials.sensors
+    unit, sensors = units.vibration(job.trials.labels.vibration_unit), job.trials.sensors
 
-    def read(value: Amount) -> Quantity:
-        if not isinstance(value, str):
-            return _limit(value * own.scale, own, value, what, "20e-6")
-        size, word = _number(value, what, "20")
-        try:
-            unit = units.vibration(word or own.name)
-        except UnitError as error:
-            raise ValueError(f"{what} {value!r}: expected {error}") from None
-        if unit.kind != own.kind:
-            raise ValueError(
-                f"{what} {value!r}: the readings are in {own.name or 'no unit'}, to which {word} does not "
-                "convert"
+    def known(word: str) -> Unit:
+        other = units.vibration(word or unit.name)
+        if other.kind != unit.kind:
+            raise UnitError(
+                f"a unit that converts to that of the readings, {unit.name or 'none'}, not {word}"
             )
-        return _limit(size, unit, value, what, "20")
+        return other
+
+    def read(value: Amount) -> tuple[float, Unit]:
+        if isinstance(value, str):
+            return read_with_unit(value, what, known, "20")
+        return value * unit.scale, unit
 
     several = [given] if isinstance(given, str | Mapping) else given
-    found: dict[str, Quantity] = {}
+    limits: dict[str, Quantity] = {}
     for one in several:
         if not isinstance(one, str | Mapping):
             raise ValueError(f"{what} {given!r}: texts are needed, such as SENSOR=20")
-        found |= _limits(one, what, read, "SENSOR=20", "sensor", sensors, sensors)
-    return found
+        names = [one] if isinstance(one, str) else one  # names of sensors may hold commas
+        limits |= _limits(names, what, read, "SENSOR=20", "sensor", sensors, sensors)
+    return limits
 
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
@@ -252,51 +241,32 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
 
 
 def _limits(
-    given: Amount | Mapping[str, Amount],
+    given: Amount | Sequence[str] | Mapping[str, Amount],
     what: str,
-    read: Callable[[Amount], Quantity],
+    read: Callable[[Amount], tuple[float, Unit]],
     example: str,
-    kind: str,
+    noun: str,
     known: Sequence[str],
     every: Sequence[str],
 ) -> dict[str, Quantity]:
-    """Limits of known planes or sensors, or one of every."""
-    if isinstance(given, Mapping):
-        found = {name: read(value) for name, value in given.items()}
-    elif isinstance(given, str):
-        found = pairs(
-            [given] if kind == "sensor" else given,
-            what,
-            lambda _, text: read(text),
-            example,
-            lambda text: dict.fromkeys(every, read(text)),
-        )
-    else:
-        found = dict.fromkeys(every, read(given))
-    for name in found:
-        if name not in known:
-            raise ValueError(
-                f"{what} {given!r}: there is no {kind} {name!r}{did_you_mean(name, known)}; "
-                f"there are {listing(map(repr, known), 'and')}"
-            )
-    return found
-
-
-def _limit(value: float, unit: Unit, given: object, what: str, example: str) -> Quantity:
+    """Limits above 0 of known planes or sensors, or one of every."""
     from rotorid.files.settings_keys import Quantity
 
-    return Quantity(f"{what} {given!r}", _above_zero(value, given, what, example), unit)
-
-
-def _number(text: str, what: str, example: str) -> tuple[float, str]:
-    """A number and the unit behind it ("" without)."""
-    match = _WORD.fullmatch(text)
-    try:
-        value = parse_number(match[1] if match else text.strip())
-        check_size(value, LARGEST_STATED)
-    except NotANumber as error:
-        raise ValueError(f"{what} {text.strip()!r}: expected {error}, such as {example}") from None
-    return value, (match[2] or "").strip() if match else ""
+    texts: dict[str, Amount]
+    if isinstance(given, int | float):
+        texts = dict.fromkeys(every, given)
+    else:
+        texts = pairs(given, what, lambda _, text: text, example, lambda text: dict.fromkeys(every, text))
+    limits = {}
+    for name, text in texts.items():
+        if name not in known:
+            raise ValueError(
+                f"{what} {given!r}: there is no {noun} {name!r}{did_you_mean(name, known)}; there are "
+                f"{listing(map(repr, known), 'and')}"
+            )
+        value, unit = read(text)
+        limits[name] = Quantity(f"{what} {text!r}", _above_zero(value, text, what, example), unit)
+    return limits
 
 
 def _above_zero(value: float, given: object, what: str, example: str) -> float:
@@ -306,17 +276,7 @@ def _above_zero(value: float, given: object, what: str, example: str) -> float:
 
 
 def _weight(text: str, what: str, example: str) -> tuple[float, Unit]:
-    value, word = _number(text, what, example)
-    if not word:
-        raise ValueError(f"{what} {text.strip()!r}: a weight needs its unit, such as {example}")
-    return value, _weight_unit(word, text, what)
-
-
-def _weight_unit(word: str, text: str, what: str) -> Unit:
-    try:
-        return units.weight(word)
-    except UnitError as error:
-        raise ValueError(f"{what} {text.strip()!r}: expected {error}") from None
+    return read_with_unit(text, what, units.weight, example)
 
 
 def _si(unit: str) -> Unit:
@@ -330,15 +290,13 @@ def grade(text: str | float) -> float:
     Raises
     ------
     ValueError
-        For a grade that the standard does not have, with its neighbours.
+        For a grade that the standard does not have.
     """
     from balancing import GRADES
 
     body = str(text).strip().lstrip("Gg").strip().replace(",", ".")
     value = float(body) if body.replace(".", "", 1).isdecimal() else float("nan")
-    if value in GRADES:
-        return value
-    near = [g for g in GRADES if g < value][-1:] + [g for g in GRADES if g > value][:1]
-    hint = f"the nearest are {' and '.join(f'G{g:g}' for g in near)}; " if near else ""
-    known = ", ".join(f"G{g:g}" for g in GRADES)
-    raise ValueError(f"there is no balance quality grade {str(text)!r}: {hint}the grades are {known}")
+    if value not in GRADES:
+        known = ", ".join(f"G{g:g}" for g in GRADES)
+        raise ValueError(f"there is no balance quality grade {str(text)!r}: the grades are {known}")
+    return value

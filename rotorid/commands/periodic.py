@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.commands.moving import Moving, moving, reduction, reduction_notes
-from rotorid.commands.quantities import Band, Sensor, degrees, sensors, speeds
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.commands.moving import (
+    SMALL,
+    Moving,
+    mounted_nodes,
+    moving,
+    reduction,
+    reduction_notes,
+)
+from rotorid.commands.quantities import Band, Sensor, degrees, sensors, two_speeds
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from fem import Rotor
     from rotorid.base.arrays import FloatArray
     from rotorid.motion.branches import Branch
@@ -29,9 +31,6 @@ if TYPE_CHECKING:
     from rotorid.motion.periodic import PeriodicMotion
     from rotorid.motion.system import MotionSystem
     from rotorid.reduction import SmallModel
-
-_SMALL = 24
-"""Unknowns above which a rotor is reduced, to so many or more."""
 
 
 @dataclass(frozen=True)
@@ -71,43 +70,21 @@ class PeriodicOptions:
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PeriodicMotions(Answered):
-    """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced.
+def _outcome(
+    motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray, origin: Mapping[str, Any]
+) -> Outcome:
+    """Branches as sensors read them, which have names and unit vectors (k, n): stability, bifurcations."""
+    from rotorid.base.plot_style import on_figure
+    from rotorid.motion.branches import amplitudes, jumps
+    from rotorid.motion.plots import draw_bifurcations
 
-    Attributes
-    ----------
-    motion
-        The branches.
-    labels, directions
-        Names of the k sensors, and unit vectors of what they read in the coordinates, shape (k, n).
-    """
-
-    motion: PeriodicMotion
-    labels: tuple[str, ...]
-    directions: FloatArray
-
-    @cached_property
-    def along(self) -> list[FloatArray]:
-        """Amplitudes at the points of each branch, m, shape (points, k)."""
-        return [self._amplitudes(branch.points) for branch in self.motion.branches]
-
-    @cached_property
-    def jumps(self) -> list[tuple[float, FloatArray, FloatArray]]:
-        """Speed, rad/s, amplitudes at a fold and where the motion jumps to from there, m, shape (k,)."""
-        from rotorid.motion.branches import jumps
-
-        return jumps(self.motion.branches, self.directions)
-
-    def _amplitudes(self, orbits: Sequence[Orbit]) -> FloatArray:
-        from rotorid.motion.branches import amplitudes
-
-        return amplitudes(orbits, self.directions)
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        motion = self.motion
-        branches = [
+    branches, first = motion.branches, labels[0]
+    along = [amplitudes(branch.points, directions) for branch in branches]
+    leaps = jumps(branches, directions)
+    bifurcations = _bifurcations(branches, labels, directions)
+    document = {
+        "sensors": labels,
+        "branches": [
             {
                 "kind": branch.kind,
                 "turns": branch.orbits[0].turns or None,
@@ -119,100 +96,103 @@ class PeriodicMotions(Answered):
                 "steps": max(len(p.velocities) for p in branch.points),
                 "amplitude_m": sizes.T,
             }
-            for branch, sizes in zip(motion.branches, self.along, strict=True)
-        ]
-        return plain(
-            {
-                "sensors": self.labels,
-                "branches": branches,
-                "bifurcations": rows(self._bifurcations()),
-                "jumps": [
-                    {"speed_rad_s": speed, "from_m": before, "to_m": after}
-                    for speed, before, after in self.jumps
-                ],
-                "tried": motion.tried,
-                "warnings": motion.warnings,
-                "reduction": reduction(motion.system),
-            }
-        )
-
-    @property
-    def answer(self) -> Answer:
-        """Where the motion is stable, and the bifurcations; behind it the branches."""
-        bifurcations, motion = self._bifurcations(), self.motion
-        told = [self._judgement(k) for k in range(len(motion.branches))]
-        return Answer(
-            "\n".join(told),
-            f"{text(bifurcations, width=COLUMNS) if bifurcations[0].values else 'No bifurcation.'}\n"
-            f"{motion.tried}",
-            tuple(motion.warnings),
-            (
-                *reduction_notes(motion.system),
-                *(
-                    f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
-                    f"{self.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
-                    for speed, at, to in self.jumps
-                ),
-            ),
-        )
-
-    def _judgement(self, k: int) -> str:
-        branch, sizes = self.motion.branches[k], 1e6 * self.along[k][:, 0]
-        low, high = min(branch.speeds), max(branch.speeds)
-        over = range_text(low, high) if high > low else rpm_text(low)
-        parts = [f"{least * RPM:.6g} to {rpm_text(most)}" for least, most in branch.stable_ranges]
-        where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
-        where = "stable throughout" if branch.stable.all() else where
-        return (
-            f"Branch {k + 1}, {branch.kind}, {over}, up to {sizes.max():.4g} µm at {self.labels[0]}: {where}."
-        )
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per point of a branch."""
-        each = [(k, branch, p) for k, branch in enumerate(self.motion.branches, 1) for p in branch.points]
-        amplitudes = zip(*(column for values in self.along for column in values), strict=True)
-        return frame(
-            (
-                Column("branch", [k for k, _, _ in each]),
-                Column("kind", [branch.kind for _, branch, _ in each]),
-                Column("speed_rad_s", [p.speed for _, _, p in each]),
-                Column("period_s", [_period(branch, p) for _, branch, p in each]),
-                Column("stable", [p.stable for _, _, p in each]),
-                Column("largest_multiplier", [abs(p.multipliers[0]) for _, _, p in each]),
-                *(
-                    Column(f"amplitude_{label}_m", values)
-                    for label, values in zip(self.labels, amplitudes, strict=True)
-                ),
-            )
-        )
-
-    def _bifurcations(self) -> tuple[Column, ...]:
-        """One row a bifurcation."""
-        branches = enumerate(self.motion.branches, 1)
-        each = [(k, branch, b) for k, branch in branches for b in branch.bifurcations]
-        sizes = self._amplitudes([b for _, _, b in each])
-        return (
-            Column("branch", [k for k, _, _ in each], str),
-            Column("kind", [branch.kind for _, branch, _ in each], str, "motion"),
-            Column("bifurcation", [b.bifurcation for _, _, b in each], str),
-            Column("speed_rad_s", [b.speed for _, _, b in each]),
-            Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format, "rpm"),
-            Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format, "whirl/speed"),
+            for branch, sizes in zip(branches, along, strict=True)
+        ],
+        "bifurcations": bifurcations.records,
+        "jumps": [{"speed_rad_s": speed, "from_m": at, "to_m": to} for speed, at, to in leaps],
+        "tried": motion.tried,
+        "warnings": motion.warnings,
+        "reduction": reduction(motion.system),
+    }
+    shown = {
+        name: _HEADINGS.get(name, f"{name[10:-2]}, µm")
+        for name in bifurcations.headings
+        if name != "speed_rad_s"
+    }
+    return Outcome(
+        result=motion,
+        sentences=tuple(
+            f"Branch {k}, {_judgement(branch, 1e6 * sizes[:, 0], first)}"
+            for k, (branch, sizes) in enumerate(zip(branches, along, strict=True), 1)
+        ),
+        tables=(bifurcations.only(shown) if bifurcations.rows else "No bifurcation.",),
+        file=lambda: _points(branches, labels, along),
+        keys=plain(document),
+        pictures={
+            "": lambda: on_figure(lambda ax: draw_bifurcations(branches, directions, first, ax), height=4.6)
+        },
+        warnings=tuple(motion.warnings),
+        notes=(
+            *reduction_notes(motion.system),
             *(
-                Column(f"amplitude_{name}_m", values, _micrometres, f"{name}, µm")
-                for name, values in zip(self.labels, sizes.T, strict=True)
+                f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at {first}, from "
+                f"{1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
+                for speed, at, to in leaps
             ),
-        )
+            motion.tried,
+        ),
+        provenance=origin,
+    )
 
-    def figure(self) -> Figure:
-        """The bifurcation diagram."""
-        from rotorid.base.plot_style import on_figure
-        from rotorid.motion.plots import draw_bifurcations
 
-        return on_figure(
-            lambda ax: draw_bifurcations(self.motion.branches, self.directions, self.labels[0], ax),
-            height=4.6,
-        )
+def _judgement(branch: Branch, sizes: FloatArray, label: str) -> str:
+    """Over which speeds it goes, how large, µm, and where it is stable."""
+    low, high = min(branch.speeds), max(branch.speeds)
+    over = range_text(low, high) if high > low else rpm_text(low)
+    parts = [f"{least * RPM:.6g} to {rpm_text(most)}" for least, most in branch.stable_ranges]
+    where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
+    where = "stable throughout" if branch.stable.all() else where
+    return f"{branch.kind}, {over}, up to {sizes.max():.4g} µm at {label}: {where}."
+
+
+def _points(branches: Sequence[Branch], labels: Sequence[str], along: Sequence[FloatArray]) -> Table:
+    """One row per point of a branch."""
+    each = [(k, branch, p) for k, branch in enumerate(branches, 1) for p in branch.points]
+    columns = [
+        Column("branch", [k for k, _, _ in each]),
+        Column("kind", [branch.kind for _, branch, _ in each]),
+        Column("speed_rad_s", [p.speed for _, _, p in each]),
+        Column("period_s", [_period(branch, p) for _, branch, p in each]),
+        Column("stable", [p.stable for _, _, p in each]),
+        Column("largest_multiplier", [abs(p.multipliers[0]) for _, _, p in each]),
+    ]
+    for k, label in enumerate(labels):
+        values = [size for sizes in along for size in sizes[:, k].tolist()]
+        columns.append(Column(f"amplitude_{label}_m", values))
+    return Table("branches", tuple(columns))
+
+
+def _bifurcations(branches: Sequence[Branch], labels: Sequence[str], directions: FloatArray) -> Table:
+    """One row a bifurcation."""
+    from rotorid.motion.branches import amplitudes
+
+    each = [(k, branch, b) for k, branch in enumerate(branches, 1) for b in branch.bifurcations]
+    sizes = amplitudes([b for _, _, b in each], directions)
+    return Table(
+        "bifurcations",
+        (
+            Column("branch", [k for k, _, _ in each]),
+            Column("kind", [branch.kind for _, branch, _ in each]),
+            Column("bifurcation", [b.bifurcation for _, _, b in each]),
+            Column("speed_rad_s", [b.speed for _, _, b in each]),
+            Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format),
+            Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format),
+            *(
+                Column(f"amplitude_{name}_m", values, _micrometres)
+                for name, values in zip(labels, sizes.T, strict=True)
+            ),
+        ),
+    )
+
+
+_HEADINGS = {
+    "branch": "branch",
+    "kind": "motion",
+    "bifurcation": "bifurcation",
+    "speed_rpm": "rpm",
+    "whirl_ratio": "whirl/speed",
+}
+"""Of the bifurcations, in the answer."""
 
 
 def _micrometres(metres: float) -> str:
@@ -260,32 +240,28 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
-    mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
-    kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
-    system = full if full.size <= _SMALL else reduced_system(full, kept, None)
+    kept = [node for node, _ in sensed] + mounted_nodes(full)
+    system = full if full.size <= SMALL else reduced_system(full, kept, None)
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    found = periodic_motion(
+    motion = periodic_motion(
         system,
         low,
         high,
         limit_cycle=options.limit_cycle,
         max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
     )
-    result = PeriodicMotions(motion=found, labels=labels, directions=directions)
-    return outcome_of(result, provenance(what.files, options))
+    return _outcome(motion, labels, directions, provenance(what.files, options))
 
 
 def _range(given: Band) -> tuple[float, float]:
     """First and last speed, rad/s, which may be the same."""
-    ends = given.replace(":", ",") if isinstance(given, str) else given
-    found = speeds(ends, what="--speeds")
-    if not 1 <= len(found) <= 2 or found[0] > found[-1]:
-        raise ValueError(f"--speeds {given!r} is not a range: use LOWEST:HIGHEST, such as 1000:9000rpm")
-    if found[0] <= 0:
-        raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
-    return found[0], found[-1]
+    alone = isinstance(given, str) and ":" not in given
+    low, high = two_speeds(f"{given}:{given}" if alone else given, "--speeds", "LOWEST:HIGHEST")
+    if not 0 < low <= high:
+        raise ValueError(f"--speeds {given!r} is not a range of a turning rotor: use LOWEST:HIGHEST above 0")
+    return low, high
 
 
 def _sensors(
@@ -296,4 +272,4 @@ def _sensors(
     places = list(dict.fromkeys(nodes or system.nodes)) if given is None else sensors(given)
     both = [place if isinstance(place, tuple) else (place, 0.0) for place in places]
     labels = tuple(f"{name}" if angle == 0 else f"{name}:{angle:g}" for name, angle in both)
-    return labels, [(what.node(name), angle) for name, angle in both]
+    return labels, [(what.model.node(name), angle) for name, angle in both]

@@ -1,4 +1,4 @@
-"""Values of options as people write them: speeds, ranges, nodes, sensors, names, pairs, a reader each.
+"""Values of options as people write them: speeds, ranges, times, nodes, sensors, names, pairs, a reader each.
 
 Each takes a text of the command line or, from Python, what it stands for, in SI. Weights, lengths and other
 quantities with units are read by `rotorid.commands.option_quantities`.
@@ -14,6 +14,7 @@ from typing import TypeVar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.suggestions import one_of as one_of
 from rotorid.base.text import listing
+from rotorid.files.units import SPEED, TIME, Unit, spelt
 from rotorid.report.options import option_name as option_name
 
 _T = TypeVar("_T")
@@ -23,8 +24,6 @@ Times = str | Sequence[float]
 """As `times` reads them, or one by one, s."""
 Band = str | tuple[float | str, float | str]
 """As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
-Span = str | tuple[float, float]
-"""As `span_at` reads it, or the least and the most, in SI."""
 Nodes = str | Sequence[str | int]
 """As `nodes` reads them, or numbers of nodes and names of stations."""
 Sensor = str | int | tuple[str | int, float]
@@ -33,8 +32,8 @@ Names = str | Sequence[str]
 """As `names` reads them."""
 SLOWEST, FASTEST = 1e-9, 1e9
 """rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
-_SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
-_SPEED = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(rad_s|rad/s|rpm|Hz|)\s*")
+WITH_UNIT = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(|[^\W\d].*?)\s*")
+"""A number, and the unit behind it, which may be missing."""
 
 
 def number(text: str) -> float:
@@ -49,7 +48,7 @@ def number(text: str) -> float:
 def nodes(given: Nodes, what: str) -> list[str | int]:
     """Read "7,12,impeller 3" as node numbers and names of stations."""
     parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
-    if not parts or not all(part != "" for part in parts):
+    if not parts or "" in parts:
         raise ValueError(
             f"{what} takes nodes or names of stations with commas, such as 7,12,18; got {given!r}"
         )
@@ -58,17 +57,16 @@ def nodes(given: Nodes, what: str) -> list[str | int]:
 
 def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sensor]:
     """Read "2,22:45,probe DE:-30" as nodes with angles in degrees from x, with the rotation; 0 without."""
+    if not given:
+        raise ValueError(f"{what}: at least one node or station is needed")
     if not isinstance(given, str):
-        if not given:
-            raise ValueError(f"{what}: at least one node or station is needed")
         return list(given)
-    found: list[Sensor] = []
+    places: list[Sensor] = []
     for part in given.split(","):
-        head, colon, tail = part.partition(":")
-        angle = degrees(tail, what) if colon else None  # names of stations hold no colon
+        head, colon, tail = part.partition(":")  # names of stations hold no colon
         (node,) = nodes(head, what)
-        found.append(node if angle is None else (node, angle))
-    return found
+        places.append((node, degrees(tail, what)) if colon else node)
+    return places
 
 
 def degrees(given: str | float, what: str) -> float:
@@ -83,10 +81,10 @@ def names(given: Names | None) -> list[str] | None:
     """Read "A,B" as names; None stays None."""
     if given is None:
         return None
-    found = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
-    if not found or not all(found):
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not parts or not all(parts):
         raise ValueError(f"names with commas between them are needed, such as left,right; got {given!r}")
-    return found
+    return parts
 
 
 def pairs(
@@ -121,19 +119,20 @@ def pairs(
     """
     if isinstance(given, Mapping):
         return {str(key): read(str(key), v) if isinstance(v, str) else v for key, v in given.items()}
-    parts = given.split(",") if isinstance(given, str) else given
+    parts, values = given.split(",") if isinstance(given, str) else given, dict[str, _T]()
     if not all(isinstance(part, str) for part in parts):
         raise ValueError(f"{what} {given!r}: texts are needed, such as {example}")
-    shown, found = ",".join(parts), dict[str, _T]()
     for part in parts:
-        name, found_sign, text = (piece.strip() for piece in part.rpartition(sign))
-        if not (name and found_sign) and (found_sign or not text or alone is None):
-            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}")
-        new = alone(text) if alone is not None and not found_sign else {name: read(name, text)}
-        if twice := next((one for one in new if one in found), None):
-            raise ValueError(f"{what} {shown!r}: {twice} stands twice")
-        found |= new
-    return found
+        name, paired, text = (piece.strip() for piece in part.rpartition(sign))
+        new = {name: read(name, text)} if name else alone(text) if alone and text and not paired else {}
+        if not new:
+            raise ValueError(
+                f"{what} {','.join(parts)!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}"
+            )
+        if twice := next((one for one in new if one in values), None):
+            raise ValueError(f"{what} {','.join(parts)!r}: {twice} stands twice")
+        values |= new
+    return values
 
 
 def numbers(
@@ -162,75 +161,27 @@ def check_names(
         raise ValueError(f"{what}: the value of {listing(lost, 'and')} is missing, such as {lost[0]}=1")
 
 
-def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") -> tuple[float, float] | None:
-    """Read "9000:10500rpm" (without a unit: the usual) as the ends of a range in rad/s; None stays None."""
-    if given is None:
-        return None
-    ends = given.replace(":", ",") if isinstance(given, str) else given
-    try:
-        low, high = speeds(ends, usual, what)
-    except ValueError:
-        low = high = 0.0
-    if not low < high:
-        unit = usual.replace("_", "/")
-        raise ValueError(
-            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in {unit}, or with "
-            f"{_others(unit)} at the end"
-        )
-    return low, high
-
-
-def _others(unit: str) -> str:
-    return " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != unit)
-
-
-def span_at(given: Span, what: str, example: str) -> tuple[tuple[float, float], str | None]:
-    """Read "0:5e7" or "0:5e7@impeller 3" as a range of numbers and where it is meant; None: nowhere said."""
-    text, _, place = given.partition("@") if isinstance(given, str) else ("", "", "")
-    ends = [number(part) for part in text.split(":")] if isinstance(given, str) else [*given]
-    if len(ends) != 2 or not 0 <= ends[0] < ends[1] < math.inf:
-        raise ValueError(f"{what} {given!r} is not a range: use LEAST:MOST, such as {example}")
-    return (ends[0], ends[1]), place.strip() or None
-
-
 def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[float]:
     """Read speeds, rad/s: "100:700:50" (first:last:step) or "100,200", "1000:6000:50rpm", "20Hz,1500rpm".
 
     A unit at the end holds for all; or each speed has its own. Without any it is `unit`. The last speed of a
     range is included where the steps meet it.
     """
-    if not isinstance(given, str):
-        each = [one_speed(value, what) if isinstance(value, str) else value for value in given]
-        return _possible([float(value) for value in each], what, given)
-    sign = ":" if ":" in given else ","
-    read = [_SPEED.fullmatch(part) for part in given.split(sign)]
-    values = [math.nan if one is None else number(one[1]) for one in read]
-    if any(map(math.isnan, values)) or (sign == ":" and len(values) != 3):
-        usual = unit.replace("_", "/")
-        raise ValueError(
-            f"{what} {given!r} is not a range: use FIRST:LAST:STEP or a list with commas, in {usual}, "
-            f"or with {_others(usual)} at the end"
-        )
-    own = [one[2] for one in read if one is not None]
-    if any(own[:-1]) and not all(own):
-        raise ValueError(f"{what} {given!r}: give the unit at every speed, or once at the end")
-    if sign == ":" and any(own[:-1]) and len({*own}) > 1:
-        raise ValueError(f"{what} {given!r}: a range has one unit")
-    factors = [_SPEED_UNITS[name or own[-1] or unit] for name in own]
-    if sign == ":":
-        values = [*_range(values, what, given)]
-        factors = factors[:1] * len(values)
-    return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
+    if isinstance(given, str):
+        values = _series(given, SPEED, unit, what)
+    else:
+        values = [one_speed(value, what) if isinstance(value, str) else float(value) for value in given]
+    if not values or not all(value == 0 or SLOWEST <= value <= FASTEST for value in values):
+        raise ValueError(f"{what} {given!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
+    return values
 
 
 def times(given: Times, what: str = "--times") -> list[float]:
     """Read times, s: "0:50:0.2" (first:last:step) or "0,0.5,2"."""
-    parts = given.split(":" if ":" in given else ",") if isinstance(given, str) else given
-    found = [number(part) if isinstance(part, str) else part for part in parts]
-    ranged = isinstance(given, str) and ":" in given
-    if not found or not all(map(math.isfinite, found)) or (ranged and len(found) != 3):
-        raise ValueError(f"{what} {given!r}: use FIRST:LAST:STEP or a list with commas, in seconds")
-    return [float(f"{t:.12g}") for t in _range(found, what, given, "time")] if ranged else found
+    values = _series(given, TIME, "s", what) if isinstance(given, str) else list(given)
+    if not values or not all(map(math.isfinite, values)):
+        raise ValueError(f"{what} {given!r}: finite numbers are needed, seconds")
+    return [float(f"{value:.12g}") for value in values]
 
 
 def rising_speeds(given: Speeds, what: str = "--speeds") -> list[float]:
@@ -246,19 +197,64 @@ def one_speed(given: str | float, what: str) -> float:
     return values[0]
 
 
-def _range(ends: Sequence[float], what: str, given: object, noun: str = "speed") -> tuple[float, ...]:
-    """First, last and step as all values between them."""
-    first, last, step = ends
-    if step <= 0 or last < first:
+def acceleration(given: str | float, what: str, *, bare: bool = False) -> float:
+    """Read "-50rpm/s" or "0", and with `bare` any number alone, in rad/s²."""
+    if not isinstance(given, str):
+        return given
+    text = re.sub(r"/s(²|\^?2)$", "/s/s", given.strip())
+    size = text.lstrip("+-").removesuffix("/s")
+    if math.isnan(alone := number(text)):
+        unit = WITH_UNIT.fullmatch(size)
+        if f"{size}/s" == text.lstrip("+-") and unit and spelt(unit[2]) in SPEED:
+            return (-1.0 if text.startswith("-") else 1.0) * one_speed(size, what)
+    elif bare or alone == 0:
+        return alone
+    raise ValueError(f"{what} {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
+
+
+def two_speeds(given: Speeds, what: str, example: str, usual: str = "rad_s") -> tuple[float, float]:
+    """Read "500:9000rpm" (without a unit: the usual) as two speeds, rad/s."""
+    ends = speeds(given.replace(":", ",") if isinstance(given, str) else given, usual, what)
+    if len(ends) != 2:
+        raise ValueError(f"{what} {given!r} is not a range: use {example}, such as 500:9000rpm")
+    return ends[0], ends[1]
+
+
+def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") -> tuple[float, float] | None:
+    """`two_speeds`, the lower one first; None stays None."""
+    if given is None:
+        return None
+    low, high = two_speeds(given, what, "LOWEST:HIGHEST", usual)
+    if not low < high:
+        raise ValueError(f"{what} {given!r} is not a range: the lower speed comes first, and both differ")
+    return low, high
+
+
+def _series(given: str, known: Mapping[str, Unit], usual: str, what: str) -> list[float]:
+    """First:last:step, or a list, in SI; each with a unit, or once at the end for all."""
+    sign = ":" if ":" in given else ","
+    parts = [WITH_UNIT.fullmatch(part) for part in given.split(sign)]
+    values = [math.nan if part is None else number(part[1]) for part in parts]
+    words = [part[2] if part else "" for part in parts]
+    if not any(words[:-1]):
+        words = [words[-1] or usual] * len(words)
+    scales = [known.get(spelt(word)) for word in words]
+    if (
+        any(map(math.isnan, values))
+        or not all(scales)
+        or (sign == ":" and (len(values) != 3 or len({*words}) > 1))
+    ):
+        others = listing(name.replace("_", "/") for name in known if name != usual)
         raise ValueError(
-            f"{what} {given!r}: the step must be positive and the last {noun} not below the first"
+            f"{what} {given!r} is not a range: use FIRST:LAST:STEP or a list with commas, in "
+            f"{usual.replace('_', '/')}, or with {others} at the end, or at every one"
         )
-    if (last - first) / step > 1e6:
-        raise ValueError(f"{what} {given!r} has more than a million {noun}s")
-    return tuple(first + step * i for i in range(math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1))
-
-
-def _possible(found: list[float], what: str, given: Speeds) -> list[float]:
-    if not found or not all(value == 0 or SLOWEST <= value <= FASTEST for value in found):
-        raise ValueError(f"{what} {given!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
-    return found
+    if sign == ":":
+        first, last, step = values
+        if step <= 0 or last < first:
+            raise ValueError(f"{what} {given!r}: the step must be positive, the last one not below the first")
+        if (last - first) / step > 1e6:
+            raise ValueError(f"{what} {given!r}: more than a million are too many")
+        count = math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1
+        values, scales = [first + step * k for k in range(count)], scales[:1] * count
+    return [scale.to_si(value) for scale, value in zip(scales, values, strict=True) if scale]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -22,7 +23,7 @@ from rotorid.commands.quantities import (
     one_speed,
     rising_speeds,
 )
-from rotorid.report.options import option_name, rotor_source
+from rotorid.report.options import refuse, rotor_source
 from rotorid.report.outcome import (
     EQUATIONS,
     WITH_REPORT,
@@ -190,10 +191,10 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     rest = (part.answer for part in parts.values() if part is not placement)
 
     def model(path: Path) -> Written:
-        from rotorid.commands.reduce_result import model_files
+        from rotorid.commands.reduce_result import model_files, small_of
 
-        kept = options.keep_supports
-        return model_files(path, result, small, speed, name, keeps_supports=kept, forces=forces)
+        kept, model = options.keep_supports, small or small_of(result)
+        return model_files(path, result, model, speed, name, keeps_supports=kept, forces=forces)
 
     def state_space(path: Path) -> Written:
         from rotorid.commands.reduce_result import small_of, state_space_bytes
@@ -213,36 +214,33 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
         keys={**keys.pop(""), **keys},
         file=lambda: table_of((placement or result).to_frame()),
         files={"model": model, "state_space": state_space},
-        pictures=_pictures(parts),
+        pictures={
+            caption: partial(_picture, key, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
+        },
         title=f"Rotor reduced to {counted(len(result.nodes), 'mass', 'masses')}",
         solved=solved,
     )
 
 
-def _pictures(parts: Mapping[str, Any]) -> dict[str, Callable[[], Figure]]:
-    """Of what was asked for, the last first, and the shapes."""
-    captions = {
-        "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
-        "response": "Response of both models, and their difference.",
-        "methods": "What each method loses: errors of frequencies.",
-        "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
-        "": "Mode shapes of the small model over those it was made from.",
-    }
+_CAPTIONS = {
+    "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
+    "response": "Response of both models, and their difference.",
+    "methods": "What each method loses: errors of frequencies.",
+    "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
+    "": "Mode shapes of the small model over those it was made from.",
+}
+"""Of pictures by what was asked for, the last first."""
 
-    def drawn(key: str) -> Callable[[], Figure]:
-        def draw() -> Figure:
-            from rotorid.base.plot_style import new_figure
-            from rotorid.plots import plot
 
-            two = key == "response"
-            figure = new_figure(6.2 if two else 5.0)
-            axes = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
-            plot(parts[key], axes)
-            return figure
+def _picture(key: str, part: Any) -> Figure:  # noqa: ANN401 - one of the results
+    from rotorid.base.plot_style import new_figure
+    from rotorid.plots import plot
 
-        return draw
-
-    return {caption: drawn(key) for key, caption in captions.items() if key in parts}
+    two = key == "response"
+    figure = new_figure(6.2 if two else 5.0)
+    axes = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
+    plot(part, axes)
+    return figure
 
 
 def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
@@ -256,33 +254,23 @@ def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
     computed = ("rank", "place", "methods", "response", "stability")
-    given = [name for name, value in vars(options).items() if value is not None and value is not False]
-    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "state_space", "force")
-    ranks = options.rank or options.place is not None
-    wrong = (
-        (
-            not has_rotor,
-            (*computed, "candidates", "speed", "supports_apart", "damping", "keep_supports"),
-            "needs a rotor: give ROTOR instead of --compliance",
-        ),
-        (has_rotor, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both"),
-        (not ranks, ("masses", "candidates"), "does nothing without --rank or --place"),
-        (options.model is None, ("force",), "does nothing without --model"),
-        (
-            options.keep_supports,
-            on_supports,
-            "asks for the rotor on its supports; with --keep-supports the masses are found on rigid ones: "
-            "leave out one of them",
-        ),
-        (
-            options.measured is not None,
-            computed,
-            "compares with the computed rotor, not with the measured modes: leave out one of them",
-        ),
-    )
-    for case, names, words in wrong:
-        if case and (first := next((name for name in names if name in given), None)):
-            raise ValueError(f"{option_name(first)} {words}")
+    if has_rotor:
+        refuse(options, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both")
+    else:
+        others = ("candidates", "speed", "supports_apart", "damping", "keep_supports")
+        refuse(options, (*computed, *others), "needs a rotor: give ROTOR instead of --compliance")
+    if not options.rank and options.place is None:
+        refuse(options, ("masses", "candidates"), "does nothing without --rank or --place")
+    if options.model is None:
+        refuse(options, ("force",), "does nothing without --model")
+    if options.keep_supports:
+        on_supports = ("measured", "supports_apart", "speed", "response", "stability", "force")
+        rigid = "asks for the rotor on its supports; with --keep-supports the masses are found on rigid ones"
+        refuse(options, on_supports, rigid)
+        if options.state_space:
+            raise ValueError(f"--state-space {rigid}")
+    if options.measured is not None:
+        refuse(options, computed, "compares with the computed rotor, not with the measured modes")
 
 
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
@@ -401,21 +389,16 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     if options.compliance is None or options.measured is None:
         raise ValueError("give a rotor, or --compliance and --measured, which take its place")
     data = read_modes(options.measured)
-    wanted = list(data.nodes)
-    if options.nodes is not None:
-        labels = [str(node) for node in nodes(options.nodes, "--nodes")]
-        named = {str(node): node for node in data.nodes}
-        wanted = [named.get(label, label) for label in labels]
+    named: dict[str, Any] = {str(node): node for node in data.nodes}
+    asked = data.nodes if options.nodes is None else nodes(options.nodes, "--nodes")
+    wanted = [named.get(str(node), node) for node in asked]
     data = modes_at(data, None, wanted, options.measured)
     known, alpha = read_compliance(options.compliance, wanted)
     order = [known.index(node) for node in wanted]
     used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
     springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
-    lost = [name for name in springs if name not in map(str, wanted)]
-    if lost:
-        raise ValueError(
-            f"--seals: no mass stands at {lost[0]!r}; masses stand at {', '.join(map(str, wanted))}"
-        )
+    if lost := springs.keys() - {*map(str, wanted)}:
+        raise ValueError(f"--seals: no mass stands at {min(lost)!r}")
     result = reduce_measured(
         alpha[order][:, order],
         data.frequencies,

@@ -39,7 +39,7 @@ def small_of(result: Reduction, modal_damping: Sequence[float] = ()) -> SmallMod
 def model_files(
     path: Path,
     result: Reduction,
-    small: SmallModel | None,
+    small: SmallModel,
     speed: float,
     name: str = "",
     *,
@@ -50,43 +50,29 @@ def model_files(
     `forces`: nodes of measured ones.
 
     For `fit` dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
-    Without a rotor (`small` None) it is a file of equations.
 
     Raises
     ------
     ValueError
-        For masses that are not positive, and forces where no mass stands.
+        For forces where no mass stands.
     """
-    from rotorid.tables.models.model_writing import ode_model_bytes
     from rotorid.tables.models.small_model_file import linear_equations, small_model_files
 
     at = ", ".join(map(str, result.nodes))
     made = f"{name} reduced to masses at nodes {at} (formula 50, {counted(result.modes, 'mode')})"
-    if keeps_supports and small is not None:
+    if keeps_supports:
         return small_model_files(path, small, [f"{made}, its supports kept, SI"])
-    if (result.masses.solution <= 0).any():
-        raise ValueError(
-            "a model with a mass that is not positive cannot be written: use other nodes or modes"
-        )
-    motion = result.equations_of_motion if small is None else linear_equations(small, speed, False)
+    if lost := [node for node in forces if node not in result.nodes]:
+        raise ValueError(f"--force: no mass of the model stands at {lost[0]}; masses stand at {at}")
+    motion = linear_equations(small, speed, False)
     masses = [f"{axis}{node}" for axis in "xy" for node in result.nodes]
     places = {x: motion.index(x) for x in masses if x in motion.coordinates}
     critical = {f"d_{x}": 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x, i in places.items()}
-    estimate = {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()}
-    inputs = [f"f_x{node}" for node in forces]
-    if lost := [x for x in inputs if x.removeprefix("f_") not in places]:
-        raise ValueError(
-            f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
-            f"{', '.join(map(str, result.nodes))}"
-        )
-    if small is None:
-        dampers = {x.removeprefix("d_"): value for x, value in estimate.items()}
-        return {path: ode_model_bytes(motion, dampers, comments=[f"{made}, the plane x, SI"], inputs=inputs)}
     equations: dict[str, Any] = {
         "speed_rad_s": speed,
-        "inputs": inputs,
-        "estimate": estimate,
-        "bounds": {x: [0.0, math.inf] for x in estimate},
+        "inputs": [f"f_x{node}" for node in forces],
+        "estimate": {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
+        "bounds": {x: [0.0, math.inf] for x in critical},
     }
     comments = [
         f"{made}, SI",

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from rotorid.reduction import SmallModel
 
 STANDARD_GRAVITY = 9.80665  # m/s²
-_AROUND = tuple(sign * 10 ** (k / 4) for sign in (-1, 1) for k in range(-20, -3))
-"""Relative distances from a critical speed of a small model at which its response is computed."""
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
@@ -100,25 +98,17 @@ class Vibration:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: what is largest, and the peaks, with the speeds between."""
         document = self.response.to_dict(self.sensors)
-        warnings = document.pop("warnings")
-        at_support = self._largest(self.finer.bearing_forces().largest)
-        readings = self._largest(self.finer.readings(self.sensors))
+        warnings, limit, forces = document.pop("warnings"), self.limit(), self._largest_forces()
         errors = {} if self.std is None else {"amplitude_std_m": cell(self._asked(self.std).T)}
-        limit = self.limit()
         return {
             **document,
             **errors,
             "orbits": self._orbits(),
-            "largest": [
-                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed} | std
-                for name, (size, speed), std in zip(
-                    self.labels, readings, self._std_of(readings), strict=True
-                )
-            ],
+            "largest": self._largest_readings(),
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
-                "largest_N": [size for size, _ in at_support],
-                "largest_at_rad_s": [speed for _, speed in at_support],
+                "largest_N": [size for size, *_ in forces],
+                "largest_at_rad_s": [speed for _, speed, _ in forces],
             },
             "peaks": [
                 {"sensor": name, **peak}
@@ -131,15 +121,16 @@ class Vibration:
 
     def sentences(self, chief: Sequence[Peak]) -> list[str]:
         """Whether it runs steadily, whether the margins are as required, what is largest, and the limit."""
-        first, limit = [*self._judgement(chief).splitlines(), self.finer.highest], self.limit()
-        if not limit:
-            return first
-        largest, allowed = (1e6 * limit[key] for key in ("largest_peak_to_peak_m", "allowed_peak_to_peak_m"))
-        return [
-            *first,
-            f"In the operating range readings reach {figures(largest)} µm peak-to-peak; API 617 allows "
-            f"{allowed:.3g} µm peak-to-peak at {rpm_text(limit['speed_rad_s'])}.",
-        ]
+        unstable = listing([window.where() for window in self.response.windows], "and")
+        first = [f"UNSTABLE {unstable}: there is no steady response there."] if unstable else []
+        first += [self._margins(chief), self.finer.highest]
+        if limit := self.limit():
+            largest, allowed = (1e6 * limit[f"{key}_peak_to_peak_m"] for key in ("largest", "allowed"))
+            first.append(
+                f"In the operating range readings reach {figures(largest)} µm peak-to-peak; API 617 allows "
+                f"{allowed:.3g} µm peak-to-peak at {rpm_text(limit['speed_rad_s'])}."
+            )
+        return first
 
     def limit(self) -> dict[str, float]:
         """The largest reading in the operating range beside the limit of API 617; empty without either."""
@@ -152,52 +143,38 @@ class Vibration:
         if not there.any():
             return {}
         largest = 2 * float(np.abs(self.finer.readings(self.sensors)[there]).max())
-        allowed = fem.api617_limit(high)
         return {
             "speed_rad_s": high,
-            "allowed_peak_to_peak_m": allowed,
+            "allowed_peak_to_peak_m": fem.api617_limit(high),
             "largest_peak_to_peak_m": largest,
         }
 
-    def named(self) -> list[tuple[str, Peak]]:
-        """All peaks, each with its sensor."""
-        pairs = zip(self.labels, self.peaks, strict=False)
-        return [(name, peak) for name, peaks in pairs for peak in peaks.peaks]
-
     def largest(self) -> Table:
         """The largest reading of each sensor."""
-        where = self._largest(self.finer.readings(self.sensors))
-        sizes = [None if size is None else 1e6 * size for size, _ in where]
-        key = "amplitude_std_m"
-        stds = [1e6 * std[key] for std in self._std_of(where) if std]
+        rows = self._largest_readings()
+        sizes = [row["amplitude_m"] and 1e6 * row["amplitude_m"] for row in rows]
+        stds = [1e6 * row["amplitude_std_m"] for row in rows if "amplitude_std_m" in row]
+        key = "largest.*.amplitude_m"
         columns = (
             Column("sensor", self.labels),
-            Column("largest reading, µm peak", sizes, figures, "largest.*.amplitude_m", 1e6),
-            *([Column("±", stds, error_figures, f"largest.*.{key}", 1e6)] if stds else []),
-            Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), "largest.*.amplitude_m", 2e6),
-            Column("at rpm", _rpm(where), "{:.1f}".format, "largest.*.speed_rad_s", RPM),
+            Column("largest reading, µm peak", sizes, figures, key, 1e6),
+            *([Column("±", stds, error_figures, "largest.*.amplitude_std_m", 1e6)] if stds else []),
+            Column("µm peak-to-peak", sizes, lambda size: figures(2 * size), key, 2e6),
+            _rpm([row["speed_rad_s"] for row in rows], "largest.*.speed_rad_s"),
         )
         return Table("largest readings", columns)
 
-    def _std_of(self, largest: Sequence[tuple[float | None, float | None]]) -> list[dict[str, float]]:
-        """Deviation of the largest amplitude of each sensor by its key in the document; empty if unknown."""
-        if self.std is None:
-            return [{}] * len(largest)
-        rows = [None if speed is None else self.finer.speeds.searchsorted(speed) for _, speed in largest]
-        return [
-            {} if row is None else {"amplitude_std_m": float(self.std[row, k])} for k, row in enumerate(rows)
-        ]
-
     def forces(self) -> tuple[Table, ...]:
         """The largest force on each support."""
-        supports = self.response.rotor.supports
-        where = self._largest(self.finer.bearing_forces().largest)
+        supports, largest, key = (
+            self.response.rotor.supports,
+            self._largest_forces(),
+            "bearing_forces.largest_",
+        )
         columns = (
             Column("support", [support.name or f"node {support.node}" for support in supports]),
-            Column(
-                "largest force, N peak", [size for size, _ in where], figures, "bearing_forces.largest_N.*"
-            ),
-            Column("at rpm", _rpm(where), "{:.1f}".format, "bearing_forces.largest_at_rad_s.*", RPM),
+            Column("largest force, N peak", [size for size, *_ in largest], figures, f"{key}N.*"),
+            _rpm([speed for _, speed, _ in largest], f"{key}at_rad_s.*"),
         )
         return (Table("forces on the supports", columns),) if supports else ()
 
@@ -219,22 +196,11 @@ class Vibration:
         )
         return Table("readings", columns)
 
-    def readings(self) -> Table:
-        """One row per speed, amplitude and phase of each sensor beside each other."""
-        document = self.response.to_dict(self.sensors)
-        columns = [Column("rpm", RPM * self.response.speeds, "{:.1f}".format, "speeds_rad_s.*", RPM)]
-        for k, name in enumerate(self.labels):
-            sizes = [1e6 * size for size in document["amplitude_m"][k]]
-            columns.append(Column(f"{name}: µm peak", sizes, figures, f"amplitude_m.{k}.*", 1e6))
-            phases = document["phase_deg"][k]
-            columns.append(Column("phase, °", phases, "{:.1f}".format, f"phase_deg.{k}.*"))
-        return Table("amplitude and phase (lead)", tuple(columns))
-
     def pictures(self, view: View, at: int | None) -> dict[str, Callable[[], Figure]]:
-        """What draws amplitude and phase over speed, polar curves, or orbits."""
-        from fem.plots import bode_figure, orbits_figure, polar_figure
+        """What draws amplitude and phase over speed, polar curves, orbits, or the deflected rotor."""
+        from fem.plots import bode_figure, draw_deflected_shape, orbits_figure, polar_figure
+        from rotorid.base.plot_style import on_figure
 
-        one_of(view, "view", get_args(View))
         finer, places = self.finer, self.sensors
         draw: dict[str, tuple[str, Callable[[], Figure]]] = {
             "bode": (
@@ -243,23 +209,16 @@ class Vibration:
             ),
             "polar": ("Readings in the plane.", lambda: polar_figure(finer, places)),
             "orbits": ("Orbits.", lambda: orbits_figure(finer, places, self._speed_of(at))),
-            "shape": ("Deflected shape.", lambda: self.shape_figure(at)),
+            "shape": (
+                "Deflected shape.",
+                lambda: on_figure(lambda ax: draw_deflected_shape(self._deflected(at), 0, ax)),
+            ),
         }
         others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
-        return dict(draw[name] for name in (view, *others))
+        return dict(draw[name] for name in (one_of(view, "view", get_args(View)), *others))
 
-    def shape_figure(self, at: int | None) -> Figure:
-        """The deflected rotor at a speed."""
-        from fem.plots import draw_deflected_shape
-        from rotorid.base.plot_style import on_figure
-
-        shape = self._deflected(at)
-        return on_figure(lambda ax: draw_deflected_shape(shape, 0, ax))
-
-    def shape(self, at: int | None) -> tuple[Table, ...]:
-        """The orbit of each node at a speed; nothing without a steady response."""
-        if not self.finer.steady.any():
-            return ()
+    def shape(self, at: int | None) -> Table:
+        """The orbit of each node at a speed."""
         from rotorid.base.rpm import phase_deg
 
         shape = self._deflected(at)
@@ -270,32 +229,29 @@ class Vibration:
             Column("minor axis", 1e6 * shape.minor[0], figures),
             Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
         )
-        return (Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns),)
+        return Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns)
 
-    def _judgement(self, chief: Sequence[Peak]) -> str:
-        """Whether it runs steadily, whether margins are as required, and what to do where that is unknown."""
-        unstable = listing([window.where() for window in self.response.windows], "and")
-        first = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
-        low, high = self.operating or (0.0, 0.0)
-        speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
+    def _margins(self, chief: Sequence[Peak]) -> str:
+        """Whether margins are as required, and what to do where that is unknown."""
         from rotorid.commands.operating_range import open_question
 
+        low, high = self.operating or (0.0, 0.0)
+        speeds, near = self.finer.speeds, [rpm_text(peak.speed) for peak in chief if peak.enough is False]
         question = open_question(chief, speeds[0], speeds[-1], (low, high)) if self.operating else ""
+        many = counted(len(chief), "critical speed")
         if self.operating is None or not (chief or question):
-            asked = (
-                f"at {counted(self.response.speeds.size, 'speed')} from {range_text(speeds[0], speeds[-1])}, "
-                f"{counted(len(self.sensors), 'reading')}"
+            few = "No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:"
+            few = few if self.response.steady.any() else "No steady response"
+            return (
+                f"{many if chief else few} at {counted(self.response.speeds.size, 'speed')} from "
+                f"{range_text(speeds[0], speeds[-1])}, {counted(len(self.sensors), 'reading')}."
             )
-            few = "" if self.response.steady.any() else "No steady response"
-            few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
-            return f"{first}{counted(len(chief), 'critical speed') if chief else few} {asked}."
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
         if near:
-            many = "s" * (len(near) > 1)
-            return f"{first}NOT far enough {beside}: critical speed{many} {listing(near, 'and')}."
+            return f"NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} {listing(near, 'and')}."
         if question:
-            return f"{first}NOT KNOWN whether all are far enough {beside}: {question}."
-        return f"{first}{counted(len(chief), 'critical speed')} far enough {beside}."
+            return f"NOT KNOWN whether all are far enough {beside}: {question}."
+        return f"{many} far enough {beside}."
 
     @property
     def drawn(self) -> bool:
@@ -315,15 +271,26 @@ class Vibration:
         """Of values at the speeds of `finer` those at the speeds asked for."""
         return finer[self.finer.speeds.searchsorted(self.response.speeds)]
 
-    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
-        """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
+    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None, int]]:
+        """The largest size in each column where a steady response exists, its speed, rad/s, and its row."""
         steady, speeds = self.finer.steady, self.finer.speeds
         if not steady.any():
-            return [(None, None)] * values.shape[1]
+            return [(None, None, 0)] * values.shape[1]
         sizes = abs(values) * steady[:, None]
-        return [
-            (float(size[k]), float(speeds[k])) for size, k in zip(sizes.T, sizes.argmax(axis=0), strict=True)
-        ]
+        return [(float(sizes[row, k]), float(speeds[row]), row) for k, row in enumerate(sizes.argmax(axis=0))]
+
+    def _largest_forces(self) -> list[tuple[float | None, float | None, int]]:
+        return self._largest(self.finer.bearing_forces().largest)
+
+    def _largest_readings(self) -> list[dict[str, Any]]:
+        """The largest amplitude of each sensor, m, its speed, and its deviation where that is known."""
+        rows = []
+        largest = self._largest(self.finer.readings(self.sensors))
+        for k, (name, (size, speed, row)) in enumerate(zip(self.labels, largest, strict=True)):
+            rows.append({"sensor": name, "amplitude_m": size, "speed_rad_s": speed})
+            if self.std is not None and speed is not None:
+                rows[-1]["amplitude_std_m"] = float(self.std[row, k])
+        return rows
 
     def _deflected(self, at: int | None) -> Response:
         """The response of all nodes at a speed."""
@@ -333,21 +300,20 @@ class Vibration:
         return fem.unbalance_response(finer.rotor, finer.unbalance, finer.speeds[self._speed_of(at)])
 
     def _speed_of(self, at: int | None) -> int:
-        steady = self.finer.steady
-        if not steady.any():
+        if at is not None:
+            return at
+        if not self.finer.steady.any():
             raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
-        sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
-        return int((sizes * steady).argmax()) if at is None else at
+        return int((abs(self.finer.readings(self.sensors)).max(axis=1) * self.finer.steady).argmax())
 
     def _orbits(self) -> dict[str, Any]:
         """Ellipses of the sensors' nodes, one list over speed for each sensor."""
         import numpy as np
 
         import fem
-        from fem import as_sensor
 
         result = self.response
-        nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in self.sensors]
+        nodes = [result.rotor.node(fem.as_sensor(place, result.rotor).node) for place in self.sensors]
         index = [result.column(node) for node in nodes]
         ellipses = fem.orbits(result.x[:, index], result.y[:, index])
         names = {1: "forward", -1: "backward", 0: "straight"}
@@ -360,8 +326,8 @@ class Vibration:
         }
 
 
-def _rpm(where: Iterable[tuple[float | None, float | None]]) -> list[float | None]:
-    return [None if speed is None else speed * RPM for _, speed in where]
+def _rpm(speeds: Sequence[float | None], key: str) -> Column:
+    return Column("at rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, key, RPM)
 
 
 def _peak_table(name: str, named: Sequence[tuple[str, Peak]], place: str = "") -> tuple[Table, ...]:
@@ -392,23 +358,21 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
 
     head, _, planes = given.partition("@")
     times = number(head.partition(":")[2] or "1")
-    journals = [support.node for support in rotor.supports if support.kind == "bearing"]
-    if not times > 0 or not journals:
+    journals = np.array([support.kind == "bearing" for support in rotor.supports])
+    if not times > 0 or not journals.any():
         raise ValueError(f"--unbalance {given}: a number above 0 stands behind api:, and bearings are needed")
     static = fem.static_deflection(rotor, speeds[0])
-    forces = np.hypot(static.reaction_x, static.reaction_y) / STANDARD_GRAVITY
-    loads = dict(zip([support.node for support in rotor.supports], forces.tolist(), strict=True))
+    loads = np.hypot(static.reaction_x, static.reaction_y)[journals] / STANDARD_GRAVITY
     if not planes:
-        total = sum(loads[node] for node in journals)
-        return {mid_span(rotor): times * fem.api_unbalance(total, highest)}
+        return {mid_span(rotor): times * fem.api_unbalance(loads.sum(), highest)}
+    places = rotor.positions[[support.node - 1 for support in rotor.supports]][journals]
     mounted: dict[int, complex] = {}
-    for plane in planes.split(","):
-        (name,) = nodes(plane.strip().removeprefix("-"), "--unbalance")
+    for plane in map(str.strip, planes.split(",")):
+        (name,) = nodes(plane.removeprefix("-"), "--unbalance")
         node = rotor.node(name)
-        apart = [abs(rotor.positions[node - 1] - rotor.positions[each - 1]) for each in journals]
-        sign = -1 if plane.strip().startswith("-") else 1
-        load = loads[journals[int(np.argmin(apart))]]
-        mounted[node] = sign * times * fem.api_unbalance(load, highest)
+        load = loads[abs(places - rotor.positions[node - 1]).argmin()]
+        sign = -1 if plane.startswith("-") else 1
+        mounted[node] = sign * times * fem.api_unbalance(float(load), highest)
     return mounted
 
 
@@ -454,8 +418,8 @@ def response(
             raise ValueError(f"--unbalance {unbalance} follows from the journals of a rotor: give a table")
         asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
         unbalance = _api_unbalance(model, unbalance, speeds, highest)
-        each = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
-        standard += f"{listing(each, 'and')}, N = {rpm_text(highest)}."
+        planes = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
+        standard += f"{listing(planes, 'and')}, N = {rpm_text(highest)}."
     elif unbalance == "own":
         asked, unbalance = {"unbalance": unbalance}, getattr(model, "unbalance", {})
     elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
@@ -467,35 +431,22 @@ def response(
             "no unbalance is given: a table with --unbalance, or own of a small model that has it"
         )
     places = _places(model, options.sensors)
-    if isinstance(model, fem.Rotor):
-        coarse, finer, peaks, std = _of_rotor(model, unbalance, speeds, places, operating)
-    else:
-        if options.view == "shape":
-            raise ValueError("--view shape draws a rotor; a small model has nodes alone")
-        by_node = {model.node(node): amount for node, amount in unbalance.items()}
-        coarse, finer, peaks, std = _of_small_model(model, by_node, speeds, places, operating)
-    result = Vibration(
-        response=replace(coarse, windows=finer.windows, warnings=finer.warnings),
-        finer=finer,
-        std=std,
-        sensors=places,
-        peaks=peaks,
-        operating=operating,
-    )
-    at = None if options.at is None else _nearest(finer, options.at)
-    chief, every = critical_peaks(result.labels, peaks), result.named()
-    mounted = _mounted(model, coarse.unbalance)
+    if options.view == "shape" and not isinstance(model, fem.Rotor):
+        raise ValueError("--view shape draws a rotor; a small model has nodes alone")
+    result = _solved(model, unbalance, speeds, places, operating)
+    at = None if options.at is None else _nearest(result.finer, options.at)
+    chief, each = critical_peaks(result.labels, result.peaks), zip(result.labels, result.peaks, strict=False)
+    every = [(name, peak) for name, peaks in each for peak in peaks.peaks]
     return Outcome(
         result=result,
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
         tables=(*_peak_table("peaks", chief), result.largest()),
         more=(
-            mounted,
+            _mounted(model, result.response.unbalance),
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *(result.shape(at) if options.view == "shape" else ()),
+            *([result.shape(at)] if options.view == "shape" and result.finer.steady.any() else []),
         ),
-        behind=(result.readings(),),
         file=result.file(),
         keys=result.to_dict(),
         warnings=result.response.warnings,
@@ -508,88 +459,52 @@ def response(
     )
 
 
-_Answers = tuple["Response", "Response", "Sequence[Peaks]", "FloatArray | None"]
-"""At the speeds asked for; with speeds between them; peaks of each sensor; deviations of the amplitudes."""
-
-
-def _of_rotor(
-    model: Rotor,
+def _solved(
+    model: Rotor | SmallModel,
     unbalance: Unbalance,
     speeds: Sequence[float],
     places: Sequence[SensorLike],
     operating: tuple[float, float] | None,
-) -> _Answers:
+) -> Vibration:
+    """The response, the peaks between the speeds asked for, and what a calibration leaves open."""
     import numpy as np
 
     import fem
-    from fem import as_sensor
     from fem.parameters import band as error_band
 
-    kept = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
-    kept |= dict.fromkeys(support.node for support in model.supports)
-    coarse = fem.unbalance_response(model, unbalance, speeds, nodes=[*kept])
-    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating)
+    if isinstance(model, fem.Rotor):
+        kept = [model.node(fem.as_sensor(place, model).node) for place in places]
+        kept = [*dict.fromkeys([*kept, *(support.node for support in model.supports)])]
+        coarse, criticals = fem.unbalance_response(model, unbalance, speeds, nodes=kept), None
+    else:
+        coarse = model.response(speeds, {model.node(node): amount for node, amount in unbalance.items()})
+        criticals = model.critical_speeds(speeds[0], speeds[-1])
+    finer, peaks = fem.resolve_peaks(coarse, places, operating=operating, criticals=criticals)
+    std, doubts = None, tuple[str, ...]()
+    if isinstance(model, fem.Rotor):
 
-    def amplitudes(other: Rotor) -> FloatArray:
-        new = other is not model
-        again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=[*kept]) if new else finer
-        return np.abs(again.readings(places))
+        def amplitudes(other: Rotor) -> FloatArray:
+            new = other is not model
+            again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=kept) if new else finer
+            return np.abs(again.readings(places))
 
-    std, doubts = error_band(model, "the amplitudes", amplitudes)
-    return coarse, replace(finer, warnings=(*finer.warnings, *doubts)), peaks, std
-
-
-def _of_small_model(
-    model: SmallModel,
-    unbalance: Mapping[int, complex],
-    speeds: Sequence[float],
-    places: Sequence[SensorLike],
-    operating: tuple[float, float] | None,
-) -> _Answers:
-    """The same: its critical speeds say where between the speeds asked for peaks may be."""
-    import numpy as np
-
-    import fem
-
-    coarse = model.response(speeds, unbalance)
-    near = np.multiply.outer(model.critical_speeds(speeds[0], speeds[-1]), 1 + np.array(_AROUND))
-    added = near[(near > speeds[0]) & (near < speeds[-1])]
-    finer, peaks = coarse, []
-    if np.count_nonzero(speeds) > 2:
-        finer = model.response(np.union1d(speeds, added), unbalance)
-        for place in places:
-            found = fem.response_peaks(finer, place, operating=operating).peaks
-            # of an undamped peak the half-power band is rounding
-            each = (replace(one, below=None, above=None) if one.undamped else one for one in found)
-            peaks.append(fem.Peaks(tuple(each), operating))
-        every = [peak for each in peaks for peak in each.peaks]
-        added = np.append(added, [peak.speed for peak in every])
-        # beside undamped peaks the amplitude has no limit and no meaning
-        undamped = np.array([peak.speed for peak in every if peak.undamped])
-        near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
-        finer = model.response(np.union1d(speeds, added[~near]), unbalance)
-        if undamped.size:
-            words = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
-            finer = replace(finer, warnings=(*finer.warnings, words))
-    return coarse, finer, peaks, None
+        std, doubts = error_band(model, "the amplitudes", amplitudes)
+    coarse = replace(coarse, windows=finer.windows, warnings=(*finer.warnings, *doubts))
+    return Vibration(response=coarse, finer=finer, std=std, sensors=places, peaks=peaks, operating=operating)
 
 
 def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    from fem import Rotor
     from rotorid.base.rpm import phase_deg
 
-    each, along = sorted(unbalance.items()), list[Column]()
-    names = [str(node) for node, _ in each]
-    if isinstance(rotor, Rotor):
-        stations = [[name for name, at in rotor.stations.items() if at == node] for node, _ in each]
-        names = [f"{node} {', '.join(known)}".strip() for node, known in zip(names, stations, strict=True)]
-        along = [Column("position, m", [rotor.positions[node - 1] for node, _ in each], "{:.6g}".format)]
+    nodes, stations = sorted(unbalance), getattr(rotor, "stations", {})
+    names = [" ".join([str(node), *(name for name, at in stations.items() if at == node)]) for node in nodes]
     columns = (
         Column("node", names),
-        *along,
-        Column("unbalance, g·mm", [1e6 * abs(u) for _, u in each], "{:.6g}".format),
-        Column("angle, ° with the rotation", [float(phase_deg(u)) for _, u in each], "{:.6g}".format),
+        Column("unbalance, g·mm", [1e6 * abs(unbalance[node]) for node in nodes], "{:.6g}".format),
+        Column(
+            "angle, ° with the rotation", [float(phase_deg(unbalance[n])) for n in nodes], "{:.6g}".format
+        ),
     )
     return Table("what is mounted", columns)
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
 
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
-from rotorid.commands.modes import NO_MODES, bands
-from rotorid.commands.quantities import Band, Names, Speeds, names, number, one_of, one_speed
+from rotorid.commands.modes import NO_MODES, bands, frequencies
+from rotorid.commands.quantities import Band, Names, acceleration, names, one_of
 from rotorid.commands.quantities import speeds as read_speeds
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
@@ -53,9 +52,6 @@ class RunUpOptions:
     slow_roll : SPEED|FILE
         Run-out is the mean at or below this speed, or a runs table of one run; default: fit, what no speed
         changes.
-    speeds : SPEEDS
-        Vectors of every run when it passes these, 900,1500 or 600:3000:300; --output is then their runs
-        table, for `balance`, instead of the modes.
     """
 
     phase: Phase | None = None
@@ -66,10 +62,6 @@ class RunUpOptions:
     acceleration: str | float | None = None
     bands: str | Sequence[Band] | None = None
     slow_roll: str | float | Path = "fit"
-    speeds: Speeds | None = None
-    panels: ClassVar[Mapping[str, str]] = {
-        "Vectors at some speeds, to balance with": "speeds",
-    }
     to: ClassVar[Sequence[str]] = USUAL
 
 
@@ -118,53 +110,46 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
             notes.append("nobody says whether phases lead or lag: lead is assumed (--phase)")
     sweeps = _ordered(data, options)
     around = bands(options.bands, sweeps[0].labels.speed_unit)
-    rate = _rate(options.acceleration)
+    rate = None if options.acceleration is None else acceleration(options.acceleration, "--acceleration")
     sweeps = [_timed(sweep, rate) for sweep in sweeps]
     modes, why = None, ""
     try:
         modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
     except ValueError as error:
         why = str(error)
-    turned = () if modes is None else _turned(sweeps[0], modes)
-    fit = None if modes is None or modes.undetermined or turned else modes
+    turned = _turned(sweeps[0], modes) if modes else ()
+    doubts = (*turned, *modes.undetermined) if modes else (why,)
+    fit = None if doubts else modes
     roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
-    passed = None
-    if options.speeds is not None:
-        passed = _passed(sweeps, options, fit, rate == 0.0)
-    acceleration, time = 0.0 if rate == 0.0 else None, sweeps[0].time
-    if acceleration is None and time is not None and len(time) > 1:
-        acceleration = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
+    mean, time = 0.0 if rate == 0.0 else None, sweeps[0].time
+    if mean is None and time is not None and len(time) > 1:
+        mean = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
     slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.covariances)
-    steady = None if modes is None else modes.steady
-    why = why or next(iter(turned or (() if modes is None else modes.undetermined)), "")
-    warnings = (f"no modes: {why}",) if modes is None else (*turned, *modes.warnings)
+    steady, estimate = (modes.steady, modes.fit.estimate) if modes else (None, None)
+    warnings = (*turned, *modes.warnings) if modes else (f"no modes: {why}",)
     warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
-    estimate = None if modes is None else modes.fit.estimate
     document = {
         "run": sweeps[0].run,
         "phase": sweeps[0].labels.phase,
         "modes": _modes(fit, steady) if fit else [],
-        "slow_roll": _rows(slow),
+        "slow_roll": slow.records if slow else [],
         "slow_roll_from": roll.words,
-        "acceleration_rad_s2": acceleration,
+        "acceleration_rad_s2": mean,
         "chi_square": estimate and estimate.chi_square,
         "degrees_of_freedom": estimate and estimate.dof,
-        "vectors": _rows(passed),
         "warnings": warnings,
     }
-    of_modes = fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES
     return Outcome(
         result=modes,
         sentences=(_sentence(sweeps[0].run, fit),),
         tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweeps[0])] if slow else [])),
-        more=(passed,) if passed else (),
-        file=passed or of_modes,
-        lacking=f"there is no table of modes: {why}" if why and not passed else "",
+        file=fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES,
+        lacking=f"there is no table of modes: {doubts[0]}" if doubts else "",
         title="Run-up",
         keys=dict(plain(document)),
         pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll)},
         warnings=warnings,
-        notes=(f"slow roll {roll.words}", *_course(acceleration), *notes, *(fit.notes if fit else ())),
+        notes=(f"slow roll {roll.words}", *_course(mean), *notes, *(fit.notes if fit else ())),
         provenance=provenance(files, options),
     )
 
@@ -200,33 +185,17 @@ def _ordered(sweeps: Sequence[Readings], options: RunUpOptions) -> list[Readings
     runs = [sweep.run for sweep in sweeps]
     if options.run is None and len(runs) > 1:
         raise ValueError(f"there are {len(runs)} runs: say with --run whose modes to fit, {listing(runs)}")
-    first = runs[0] if options.run is None else options.run
-    if first not in runs:
-        hint = did_you_mean(first, runs)
-        raise ValueError(f"--run: there is no run {first!r}{hint}; there are {listing(runs, 'and')}")
-    chief = sweeps[runs.index(first)]
-    wanted = names(options.sensors) or list(chief.sensors)
+    first = one_of(options.run or runs[0], "--run", runs)
+    ordered = sorted(sweeps, key=lambda sweep: sweep.run != first)
+    wanted = names(options.sensors) or list(ordered[0].sensors)
     for name in wanted:
-        if name not in chief.sensors:
-            hint, known = did_you_mean(name, chief.sensors), listing(chief.sensors, "and")
-            raise ValueError(f"--sensors: run {first!r} has no sensor {name!r}{hint}; it has {known}")
-    ordered = []
-    for sweep in (chief, *(sweep for sweep in sweeps if sweep is not chief)):
-        columns = [sweep.sensors.index(name) for name in wanted if name in sweep.sensors]
-        if columns:
-            ordered.append(sweep.take(np.arange(len(sweep.speeds)), np.array(columns)))
-    return ordered
-
-
-def _rate(given: str | float | None) -> float | None:
-    """Read "-50rpm/s", rad/s²."""
-    if given is None or not isinstance(given, str):
-        return given
-    text = given.strip()
-    size = text.lstrip("+-").removesuffix("/s")
-    if text.lstrip("+-") == size and number(size) != 0:
-        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 50rpm/s, or 0")
-    return (-1.0 if text.startswith("-") else 1.0) * one_speed(size, "--acceleration")
+        one_of(name, f"--sensors: of run {first!r},", ordered[0].sensors)
+    columns = [[sweep.sensors.index(name) for name in wanted if name in sweep.sensors] for sweep in ordered]
+    return [
+        sweep.take(np.arange(len(sweep.speeds)), np.array(chosen))
+        for sweep, chosen in zip(ordered, columns, strict=True)
+        if chosen
+    ]
 
 
 def _timed(sweep: Readings, rate: float | None) -> Readings:
@@ -292,47 +261,13 @@ def _slow_roll(
     return SlowRoll(*slow_vectors(sweep, speed), words)
 
 
-def _passed(
-    sweeps: Sequence[Readings],
-    options: RunUpOptions,
-    fit: FittedModes | None,
-    steady: bool,
-) -> Table:
-    """The runs table of every run at the speeds asked for, the slow roll not taken off."""
-    from contextlib import suppress
-
-    import numpy as np
-
-    from rotorid.identify.modes import fit_sweep, vectors_when_passing
-    from rotorid.tables.runs.vectors_table import runs_columns
-
-    speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))
-    parts = []
-    for k, sweep in enumerate(sweeps):
-        modes = None if k else fit
-        if k:
-            with suppress(ValueError):
-                other = fit_sweep(sweep, steady=steady)
-                modes = None if other.undetermined else other
-        parts.append((sweep, speeds, *vectors_when_passing(sweep, speeds, modes)))
-    columns = (Column(column.name, list(column.values)) for column in runs_columns(parts))
-    return Table("vectors when passing", tuple(columns))
-
-
 def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
     """A row a mode: with the acceleration, and as a steady fit has it."""
-    omega, zeta, error, other = fit.values
-    columns = [
-        Column("mode", range(1, len(omega) + 1)),
-        Column("critical rpm", RPM * omega, "{:.6g}".format),
-        Column("±", RPM * error, error_figures),
-        Column("ζ %", 100 * zeta, "{:.4g}".format),
-        Column("± ", 100 * other, error_figures),
-    ]
+    columns = frequencies(fit, "critical rpm", RPM)
     if steady is not None:
-        columns.append(Column("steady fit: rpm", RPM * steady.values[0], "{:.6g}".format))
-        columns.append(Column("ζ % ", 100 * steady.values[1], "{:.4g}".format))
-    return Table("critical speeds", tuple(columns))
+        held = frequencies(steady, "steady fit: rpm", RPM)
+        columns = (*columns, held[1], replace(held[3], heading="ζ, % "))
+    return Table("critical speeds", columns)
 
 
 def _roll_table(sweep: Readings, vectors: ComplexArray, covariances: FloatArray | None) -> Table:
@@ -359,10 +294,6 @@ def _plain(table: Table, sweep: Readings) -> Table:
     words = {"amplitude": f"slow roll, {labels.vibration_in}".rstrip(", "), "std": "±"}
     words["phase"] = f"phase ({labels.phase}), °"
     return table.only({name: words.get(name.partition("_")[0], name) for name in table.headings})
-
-
-def _rows(table: Table | None) -> list[dict[str, Any]]:
-    return [dict(zip(table.headings, row, strict=True)) for row in table.rows] if table else []
 
 
 def _modes(fit: FittedModes, steady: FittedModes | None) -> list[dict[str, Any]]:

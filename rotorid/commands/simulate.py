@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
 from rotorid.base import result
 from rotorid.base.tables import Column, Table
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rotorid.identify.ode import OdeModel
     from rotorid.tables import HarmonicFile
 
+TABLES = (".csv", ".xlsx")
 BESIDE = 7
 """Columns of the text beside the first; more stand below."""
 _NOISE = {"amplitude_error", "phase_error", "sigma"}
@@ -41,7 +42,6 @@ _WAYS = {
     "frequencies": {"inputs", "amplitude_error", "phase_error"},
     "modes": {"inputs", "round"},
     "times": {"sigma"},
-    "input_record": {"sigma"},
 }
 """What can be simulated, and which other options that has."""
 
@@ -64,10 +64,8 @@ class SimulateOptions:
     round : z:N
         Round z = ω² to so many significant digits first, as lessons 7 and 8 do: z:2; shapes follow from it by
         all equations but the first.
-    times : TIMES
-        A record at FIRST:LAST:STEP or a list, seconds.
-    input_record : RECORD
-        A record at the times of this one and with its inputs.
+    times : TIMES|RECORD
+        A record at FIRST:LAST:STEP or a list, seconds; or at the times of another, with its inputs: u.csv.
     digits : N from 1
         Round real and imaginary parts, natural frequencies or samples to so many significant digits (not
         decimals), after errors.
@@ -86,8 +84,7 @@ class SimulateOptions:
     inputs: str | Mapping[str, complex] | None = None
     modes: bool = False
     round: str | None = None
-    times: Times | None = None
-    input_record: Path | str | None = None
+    times: Times | Path | None = None
     digits: int | None = None
     amplitude_error: float | None = None
     phase_error: float | None = None
@@ -133,16 +130,15 @@ def simulate(
         raise ValueError(f"one of {listing(map(option_name, _WAYS))} is needed: what to simulate")
     refuse(options, {"inputs", "round", *_NOISE} - _WAYS[way], f"does not go with {option_name(way)}")
     noisy = any(getattr(options, name) is not None for name in _NOISE)
-    if not noisy:
-        refuse(options, {"seed"}, "belongs to --amplitude-error, --phase-error and --sigma")
-    if options.digits is not None and not 1 <= options.digits <= 15:
-        raise ValueError(f"--digits takes a number from 1 to 15, not {options.digits}")
-    files = [Path(given) for given in (model, options.input_record) if isinstance(given, Path | str)]
+    if options.digits is not None and options.digits < 1:
+        raise ValueError(f"--digits takes a number from 1, not {options.digits}")
+    sources = (model, options.times if _is_record(options.times) else None)
+    files = [Path(given) for given in sources if isinstance(given, Path | str)]
     solve = _amplitudes if way in ("frequencies", "modes") else _record
-    values, told, about, notes = solve(model, options, noisy)
+    values, simulated, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
-    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in told)
+    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in simulated)
     first, *others = columns
     blocks = [(first, *others[k : k + BESIDE]) for k in range(0, len(others), BESIDE)]
     listed = listing((f"{name} = {value:g}" for name, value in values.items()), "and")
@@ -189,8 +185,7 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     table = as_read(exact, read, errors, options.digits, options.seed or 0)
     where = counted(len(exact), "frequency", "frequencies")
     about = f"natural modes, {where}" if options.modes else f"amplitudes {listing(read, 'and')} at {where}"
-    unused = "the errors that the model states are not drawn: --amplitude-error or --phase-error does"
-    notes = (unused,) if file.errors and not noisy and not options.modes else ()
+    notes: tuple[str, ...] = ()
     if options.modes:
         powers = [f"z**{k}" if k > 1 else "z" * k for k in reversed(range(len(polynomial)))]
         terms = (f"{x:+.6g}*{z}".removesuffix("*") for x, z in zip(polynomial, powers, strict=True))
@@ -221,18 +216,22 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
 
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     values, theta = _values(options.parameters, equations.parameters)
-    if options.input_record is not None:
-        plan = read_record(options.input_record, equations, measured=False)
+    if _is_record(options.times):
+        plan = read_record(Path(str(options.times)), equations, measured=False)
     elif equations.inputs:
-        raise ValueError(f"the model has the input {equations.inputs[0]}: give --input-record, not --times")
+        raise ValueError(f"the model has the input {equations.inputs[0]}: give a record of it, --times FILE")
     else:
-        plan = Record(np.array(times(options.times or "")), name="--times")
+        plan = Record(np.array(times(cast("Times", options.times))), name="--times")
     sigma = sigmas(options.sigma, equations.outputs) if noisy and options.sigma is not None else None
     record = simulated_record(equations, theta, plan, sigma, options.digits, options.seed or 0)
     begun = f"the initial values hold at t = {plan.t[0]:g} s, where the record begins"
     about = f"record of {listing(equations.outputs, 'and')} at {counted(len(plan), 'time')}"
     late = equations.states and plan.t[0] != 0
     return values, record_columns(record), about, (begun,) if late else ()
+
+
+def _is_record(times: Times | Path | None) -> bool:
+    return isinstance(times, Path | str) and Path(times).suffix.lower() in TABLES
 
 
 def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float], FloatArray]:

@@ -27,7 +27,7 @@ KNOWN = (
 )
 """Unknown besides, with these standard deviations about what the files say."""
 _COMMA = r",(?![^\[]*\])"  # but not in brackets
-_EXAMPLE, _RANGE = "bearing[1].kxx=7e7+-20%", "bearing[1].kxx=1e6:1e9"
+_EXAMPLE = "bearing[1].kxx=7e7+-20%"
 
 
 def unknowns(
@@ -35,7 +35,6 @@ def unknowns(
     probes: Sequence[str],
     estimate: str | Sequence[str],
     prior: str | Mapping[str, str] = "",
-    bounds: str | Mapping[str, str] = "",
     *,
     exact: bool,
 ) -> list[Unknown]:
@@ -68,8 +67,7 @@ def unknowns(
             if not numbers_of(rotor, path) & named:
                 value = parameter_value(rotor, path)
                 numbers.setdefault(path, Unknown(path, prior=(value, std), beside=True))
-    _apply(rotor, numbers, prior, "--prior")
-    _apply(rotor, numbers, bounds, "--bounds")
+    _apply_priors(rotor, numbers, prior)
     return list(numbers.values())
 
 
@@ -97,42 +95,27 @@ def _expanded(rotor: Rotor, path: str, probes: Sequence[str]) -> Iterator[str]:
                 yield f"{each.removesuffix('kxx')}{name}{'.scale' if scaled else ''}"
 
 
-def _apply(rotor: Rotor, numbers: dict[str, Unknown], given: str | Mapping[str, str], what: str) -> None:
-    """Priors or bounds of the numbers that a name, a path or a pattern with `*` stands for."""
-    if isinstance(given, str):
-        parts = re.split(_COMMA, given) if given else []
-        given = pairs(parts, what, lambda _, text: text, _EXAMPLE)
-    for pattern, text in given.items():
+def _apply_priors(rotor: Rotor, numbers: dict[str, Unknown], given: str | Mapping[str, str]) -> None:
+    """Priors of the numbers that a name, a path or a pattern with `*` stands for."""
+    parts = re.split(_COMMA, given) if isinstance(given, str) and given else given or []
+    for pattern, text in pairs(parts, "--prior", lambda _, text: text, _EXAMPLE).items():
         literal = re.sub(r"\[(?!\*\])([^\]]*)\]", r"[[]\1]", pattern).replace("[*]", "[[]*]")
         hit = [p for p, u in numbers.items() if pattern in (p, u.name) or fnmatchcase(p, literal)]
-        hit = hit or [p for p, u in numbers.items() if fnmatchcase(p, f"{literal}.scale")]
+        hit = hit or [p for p in numbers if fnmatchcase(p, f"{literal}.scale")]
         if not hit:
-            raise ValueError(f"{what}: nothing that is estimated is called {pattern!r}: {', '.join(numbers)}")
+            raise ValueError(
+                f"--prior: nothing that is estimated is called {pattern!r}: {', '.join(numbers)}"
+            )
         for path in hit:
-            if what == "--prior":
-                prior = _prior(str(text), parameter_value(rotor, path), pattern)
-                numbers[path] = replace(numbers[path], prior=prior)
-            else:
-                numbers[path] = replace(numbers[path], bounds=_bounds(str(text), pattern))
+            prior = _prior(text, parameter_value(rotor, path), pattern)
+            numbers[path] = replace(numbers[path], prior=prior)
 
 
 def _prior(text: str, value: float, pattern: str) -> tuple[float, float]:
     """`20%`, `1e6`, `7e7+-20%` or `7e7±1e6` about a value."""
     centre, sign, spread = re.sub(r"\+-|±", "±", text).rpartition("±")
-    try:
-        middle = number(centre) if sign else value
-        std = number(spread.removesuffix("%")) * (abs(middle) / 100 if spread.endswith("%") else 1.0)
-    except ValueError:
-        std = middle = np.nan
+    middle = number(centre) if sign else value
+    std = number(spread.removesuffix("%")) * (abs(middle) / 100 if spread.endswith("%") else 1.0)
     if not (np.isfinite(middle) and std > 0):
         raise ValueError(f"--prior {pattern}={text}: a standard deviation is needed, such as {_EXAMPLE}")
     return middle, std
-
-
-def _bounds(text: str, pattern: str) -> tuple[float, float]:
-    """`1e6:1e9`."""
-    low, _, high = text.partition(":")
-    ends = number(low), number(high)
-    if not ends[0] < ends[1]:
-        raise ValueError(f"--bounds {pattern}={text}: LOWEST:HIGHEST is needed, such as {_RANGE}")
-    return ends

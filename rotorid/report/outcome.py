@@ -47,8 +47,8 @@ class Outcome(Answered):
         aligned already.
     beyond
         What `more` shows, in words; empty: the names of its tables.
-    behind
-        Tables that only the page shows.
+    short
+        Whether the first table is a short form of the first of `more`, which then stands for it.
     file
         What `--output` writes and `to_frame` gives.
     lacking
@@ -76,7 +76,7 @@ class Outcome(Answered):
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
-    behind: tuple[Table, ...] = ()
+    short: bool = False
     file: Table | Callable[[], Table]
     lacking: str = ""
     files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
@@ -101,6 +101,7 @@ class Outcome(Answered):
                 for each in self.more
             ),
             self.beyond or listing(names, "and"),
+            self.short,
         )
 
     @property
@@ -159,7 +160,7 @@ class Outcome(Answered):
             sentences=self.sentences,
             tables=list(map(block, self.tables)),
             pictures=[(drawn(draw, caption), caption) for caption, draw in self.pictures.items()],
-            more=list(map(block, (*self.more, *self.behind))),
+            more=list(map(block, self.more)),
         )
 
 

@@ -42,8 +42,8 @@ class Case:
 
     @property
     def json_words(self) -> list[str]:
-        """After `rotorid`, with `--json`, without pictures and pages; usage has no document."""
-        if self.group == "usage":
+        """After `rotorid`, with `--json`, without pictures and pages; usage and schemas have no document."""
+        if self.group == "usage" or self.command.startswith("schema "):
             return self.words
         words = [*self.words, "--json"]
         for option in ("--plot", "--report"):

@@ -14,7 +14,7 @@ import fem
 from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
-from rotorid.commands.calibrate import Calibrated
+from rotorid.commands.calibrate import outcome
 from rotorid.regression import nonlinear, search
 
 ERRORS = ReadingErrors(0.02, 0.02)
@@ -223,7 +223,7 @@ def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     found = calibrate(rotor, unknowns, [data])
     assert np.isnan(found.values).all()
     assert np.isnan(found.std).all()
-    told = Calibrated(found=found).to_dict()["parameters"]
+    told = outcome(found, {}).to_dict()["parameters"]
     assert [told[unknown.path]["value"] for unknown in unknowns] == [None, None]
     assert "bearing[1].stiffness" in found.undetermined
     (k, p) = found.fit.estimate.solution
@@ -352,7 +352,7 @@ def test_unbalances_that_the_readings_do_not_tell_apart_have_no_number():
     assert np.isnan(found.unbalance_std[0]).all()
     assert found.dof == 2 * 2 * 3 + 1 - 4 - 1
     assert "do not determine the unbalance of node 3, node 6 and node 9: name fewer" in found.warnings[-1]
-    told = Calibrated(found=found).to_dict()["unbalance"]
+    told = outcome(found, {}).to_dict()["unbalance"]
     assert [each["size"] for each in told] == [None] * 3
 
 
@@ -382,4 +382,4 @@ def test_errors_count_what_numbers_taken_as_exact_may_be_off():
     expected = plain.covariance + np.outer(moved, moved)
     assert wide.covariance == pytest.approx(expected, rel=1e-2, abs=1e-3 * np.abs(expected).max())
     assert (wide.std > 1.1 * plain.std).any()
-    assert "± count what 1 number taken as exact may be off" in Calibrated(found=wide).answer.notes
+    assert "± count what 1 number taken as exact may be off" in outcome(wide, {}).answer.notes

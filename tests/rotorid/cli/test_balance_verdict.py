@@ -45,7 +45,10 @@ def test_masses_need_radii(cli):
     [
         (("--grade", "G3", *GRADE[2:]), "G2.5"),
         (GRADE[:2], "together"),
-        (("--grade", "G2.5", "--rotor-mass", "heavy", "--service-speed", "3000rpm"), "number with its unit"),
+        (
+            ("--grade", "G2.5", "--rotor-mass", "heavy", "--service-speed", "3000rpm"),
+            "expected a number, such as 500kg",
+        ),
     ],
 )
 def test_bad_tolerances(cli, args, words):

@@ -152,9 +152,9 @@ def test_a_unit_at_each_speed(text, expected):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("20Hz,100,60rpm", "give the unit at every speed, or once at the end"),
-        ("20Hz,100", "give the unit at every speed"),
-        ("1rpm:2Hz:1rpm", "a range has one unit"),
+        ("20Hz,100,60rpm", "at the end, or at every one"),
+        ("20Hz,100", "at every one"),
+        ("1rpm:2Hz:1rpm", "at every one"),
         ("1,,2", "not a range"),
         ("rpm", "not a range"),
         ("1:2", "not a range"),

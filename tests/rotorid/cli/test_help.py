@@ -43,7 +43,7 @@ def test_every_option_has_a_panel_and_the_first_two_are_short(name):
         panels.setdefault(one.rich_help_panel, []).append(one.name)
     sizes = [len(names) for names in panels.values()]
     assert sum(sizes[:2]) <= 12, panels
-    assert next(iter(panels)) in FIRST
+    assert not panels or next(iter(panels)) in FIRST
     # panels follow each other in plain help, too, where their titles are not printed
     in_order = [one.rich_help_panel for one in options(COMMANDS[name])]
     assert in_order == sorted(in_order, key=list(panels).index) or in_order[-1] == "Output"

@@ -97,7 +97,7 @@ def test_drilling_takes_away_opposite(run, tmp_path):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        ("35@120 --drill 8mm", "a weight needs its unit, such as 35g@120"),
+        ("35@120 --drill 8mm", "expected a unit of weight"),
         ("35g --drill 8mm", "a weight at an angle in degrees"),
         ("35gg@120 --drill 8mm", "expected a unit of weight"),
         ("-35g@120 --drill 8mm", "No such option"),
@@ -115,7 +115,7 @@ def test_drilling_takes_away_opposite(run, tmp_path):
         ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
         ("35g@120 --holes 4 --first-hole 500", "--first-hole"),
         ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),
-        ("35g@120 --holes 4 --pieces 10", "a weight needs its unit"),
+        ("35g@120 --holes 4 --pieces 10", "expected a unit of weight"),
         ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),
         ("35g@120 --holes 4 --pieces 10g_mm", "converts only with --radius"),
         ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),
@@ -123,7 +123,7 @@ def test_drilling_takes_away_opposite(run, tmp_path):
         ("35g@120 --holes 2 --taken 1:3g,2:3g", "nothing can be mounted"),
         ("35g@120 --drill 8mm --radius 0mm", "expected a value above 0"),
         ("35g@120 --drill 8mm", "--drill needs --radius"),
-        ("35g@120 --drill 8 --radius 100mm", "--drill '8': a number with its unit (m, mm, um, mil, in)"),
+        ("35g@120 --drill 8 --radius 100mm", "--drill '8': expected one of the units m, mm, um, mil or in"),
         ("35g@120 --drill 8mm --radius 100mm", "use a larger drill, or share the weight (--holes)"),
         ("35g@120 --two 2g", "give two weights"),
     ],

@@ -61,7 +61,7 @@ def test_files(cli, tmp_path):
         ),
         (
             ("--rotor-mass", "500", "--speed", "3000rpm", "--radius", "1mm"),
-            "--rotor-mass '500': a number with its",
+            "--rotor-mass '500': expected one of the units",
         ),
         ((*FORCE, "--bearing-load", "1N"), "choose one"),
         ((*FORCE, "--fraction", "0"), "fraction of the load must be"),

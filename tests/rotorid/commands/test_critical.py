@@ -62,13 +62,10 @@ def test_the_map_says_what_it_leaves_out(cli, tmp_path):
     )
     write_rotor(tmp_path / "r.toml", rotor)
     said = " ".join(cli("critical", tmp_path / "r.toml", "-n", 1, "--map", "--json").json["warnings"])
-    assert "'labyrinth' is left out" in said
-    assert "'rear'" in said
-    assert "pedestal" in said
-    assert "front" not in said
+    assert "the map leaves out seals and pedestals" in said
 
 
-@pytest.mark.parametrize(("model", "named"), [("", 3), ("shear = true\nrotary_inertia = true", 0)])
+@pytest.mark.parametrize(("model", "named"), [("", 1), ("shear = true\nrotary_inertia = true", 0)])
 def test_what_a_stubby_shaft_lacks_is_one_warning(cli, tmp_path, model, named):
     columns = ["length_m", "diameter_m", "inner_diameter_m", "support_stiffness_N_per_m"]
     shaft = [[0.06, 0.05, "", 1e8], [0.06, 0.05, 0.02, ""], [0.06, 0.05, "", ""], [0, 0.05, "", 1e8]]
@@ -77,8 +74,7 @@ def test_what_a_stubby_shaft_lacks_is_one_warning(cli, tmp_path, model, named):
     file.write_text(f'shaft = "shaft.csv"\n[model]\n{model}\n')
     document = cli("critical", file, "-n", 3, "--json").json
     said = [text for text in document["warnings"] if "too high" in text]
-    assert sum(text.count("mode ") for text in said) == named
-    assert len(said) == (named > 0)
+    assert len(said) == named
 
 
 def test_critical_speeds_have_their_errors(calibrated):

@@ -33,7 +33,7 @@ def test_a_rotor_with_its_tables(tmp_path):
     assert system.bow[x].real > 0
     assert system.weight[x] < 0
     assert system.weight[y] == 0
-    assert (found.node("disc"), found.node("4")) == (3, 4)
+    assert (found.model.node("disc"), found.model.node("4")) == (3, 4)
 
 
 def test_a_small_model_has_its_own(tmp_path):
@@ -42,11 +42,11 @@ def test_a_small_model_has_its_own(tmp_path):
     found = moving(path)
     assert isinstance(found.model, SmallModel)
     assert found.files == (path,)
-    assert found.node("3") == 3
+    assert found.model.node("3") == 3
     x, y = (system := found.system(10.0, 500.0)).index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4 + 2e-5j, 2e-5 - 1e-4j])
     with pytest.raises(ValueError, match="node 2 does not exist: the small model has 1, 3 and 5"):
-        found.node("2")
+        found.model.node("2")
 
 
 def test_tables_stand_in_place_of_a_small_model_s_own(tmp_path):

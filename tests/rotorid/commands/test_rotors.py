@@ -33,11 +33,11 @@ def test_cells_of_the_other_kind_are_blank_in_files(cli, tmp_path, ending):
     assert table["node"].isna().tolist() == table["mode"].notna().tolist() == [False] * 3 + [True] * 3
 
 
-def test_forces_act_on_masses_from_tables_too(cli, tmp_path):
+def test_masses_from_tables_alone_make_no_model(cli, tmp_path):
     tables = ("--compliance", BOOK / "compliance.csv", "--measured", BOOK / "modes.csv")
     path = tmp_path / "m.toml"
-    assert cli("reduce", *tables, "--force", "12", "--model", path).code == 0
-    assert '"f_x12"' in path.read_text()
+    refused = cli("reduce", *tables, "--model", path)
+    assert (refused.code, "say nothing of bearings" in refused.err, path.exists()) == (2, True, False)
 
 
 def test_forces_stand_at_masses(cli, tmp_path):

@@ -57,7 +57,7 @@ def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
         assert browser.title().strip()
 
         shown = browser.shown()
-        assert len(shown) >= (20 if name.startswith(("balance", "critical")) else 0)
+        assert len(shown) >= (15 if name.startswith(("balance", "critical")) else 0)
         assert [element.key for element in shown if not element.visible] == []
         inside = browser.document()  # what the command printed, and what the sheet adds for itself
         assert {key: inside.get(key) for key in document} == document

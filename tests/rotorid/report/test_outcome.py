@@ -26,11 +26,10 @@ def test_nothing_from_outside_and_ids_once(name):
     assert [tag for tag, *_ in sheet.order].count("script") == 1
 
 
-def test_every_critical_speed_and_shape_is_shown():
+def test_every_critical_speed_is_shown():
     sheet = read_sheet(make("critical table").html)
-    count, nodes = len(sheet.document["mode_shapes"]), len(sheet.document["positions_m"])
-    assert (count, nodes) == (5, 24)
-    assert {f"mode_shapes.{k}.{i}" for k in range(count) for i in range(nodes)} <= sheet.keys
+    count = len(sheet.document["mode_shapes"])
+    assert count == 5
     for key in ("critical_speeds_rad_s", "critical_speeds_rpm"):
         assert {f"{key}.{k}" for k in range(count)} <= sheet.keys
 

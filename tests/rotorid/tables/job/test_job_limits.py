@@ -243,7 +243,7 @@ def test_limits_of_the_command_line(job):
         ("1=5g,1=3g", [], "--max-mass '1=5g,1=3g': 1 stands twice"),
         ("3000g_mm", [], "the weights of the job are in g, to which g_mm converts only with a radius_mm"),
         (None, ["a=3"], "there is no sensor 'a' (did you mean 'A'?); there are 'A' and 'B'"),
-        (None, ["A=3mm_s"], "the readings are in um_pp, to which mm_s does not convert"),
+        (None, ["A=3mm_s"], "a unit that converts to that of the readings, um_pp, not mm_s"),
         (None, ["A=0"], "expected a value above 0"),
     ],
 )
