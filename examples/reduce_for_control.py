@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid import read_rotor, reduction
-from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.files.model import ode_model_bytes
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "rotor23.csv"
 NODES = (7, 12, 18)

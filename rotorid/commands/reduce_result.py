@@ -57,8 +57,8 @@ def model_files(
     ValueError
         For masses that are not positive, and forces where no mass stands.
     """
-    from rotorid.tables.models.model_writing import ode_model_bytes
-    from rotorid.tables.models.small_model_file import linear_equations, small_model_files
+    from rotorid.files.model import ode_model_bytes
+    from rotorid.files.small_model import linear_equations, small_model_files
 
     at = ", ".join(map(str, result.nodes))
     made = f"{name} reduced to masses at nodes {at} (formula 50, {counted(result.modes, 'mode')})"

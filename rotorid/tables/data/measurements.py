@@ -24,7 +24,7 @@ from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
-from rotorid.tables.models.harmonic_file import HarmonicFile
+from rotorid.files.model import HarmonicFile
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors, Experiments

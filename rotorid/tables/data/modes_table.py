@@ -17,7 +17,7 @@ from rotorid.files.columns import Column, Table, read_table
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of, ratio
 from rotorid.tables.data.repeated_readings import FREQUENCIES
-from rotorid.tables.rotor.unbalance_table import node_at
+from rotorid.files.unbalance import node_at
 
 Node = int | str
 """The number of a node; without a rotor also any label."""

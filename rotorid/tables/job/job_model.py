@@ -49,7 +49,7 @@ def read_model(said: Said, folder: Path, labels: Labels, problems: Problems) -> 
                 key = "station" if isinstance(item["node"], str) else "node"
                 item.section.complain(key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
         return Model()
-    from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
+    from rotorid.files.rotor import read_rotor, rotor_files
 
     path = folder / said["rotor"]
     try:

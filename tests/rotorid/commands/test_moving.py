@@ -7,7 +7,7 @@ from fem import JournalBearing, Rotor
 from rotorid.commands.moving import moving
 from rotorid.reduction import SmallModel
 from rotorid.tables import InputError
-from rotorid.tables.models.small_model_file import small_model_bytes
+from rotorid.files.small_model import small_model_bytes
 
 FILM = {"length": 0.02, "diameter": 0.05, "clearance": 5e-5, "viscosity": 0.02}
 ROTOR = Rotor(

@@ -16,7 +16,7 @@ from rotorid.commands import ResponseOptions, response
 from rotorid.reduction import small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_unbalance
-from rotorid.tables.models.small_model_file import small_model_bytes
+from rotorid.files.small_model import small_model_bytes
 
 RPM = np.pi / 30
 OK_SPEEDS = ("--speeds", "100:200:50")

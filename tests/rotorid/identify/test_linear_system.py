@@ -15,7 +15,7 @@ from rotorid.identify.second_order import second_order, state_space
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
-from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.files.model import ode_model_bytes
 
 SPEED = 150.0
 CROSS = ((4e7, 6e6), (-6e6, 5e7))

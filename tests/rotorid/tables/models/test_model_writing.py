@@ -21,7 +21,7 @@ from rotorid.identify.second_order import state_space
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
-from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.files.model import ode_model_bytes
 
 TRUTH = {"d_x7": 1234.5, "d_x12": 321.0, "d_x18": 567.0}
 BEGIN = {"x7": 2000.0, "x12": 500.0, "x18": 400.0}

@@ -7,7 +7,7 @@ import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
 from rotorid.reduction import SmallModel
 from rotorid.tables import InputError, TableWarning
-from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes, small_model_files
+from rotorid.files.small_model import read_small_model, small_model_bytes, small_model_files
 from tests.helpers.cases import each_of
 
 PLAIN = """
