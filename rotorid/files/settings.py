@@ -486,7 +486,7 @@ def listed(inner: Any) -> Any:  # noqa: ANN401  an annotation
 
 def by_name(inner: Any) -> Any:  # noqa: ANN401
     """The type of a table of values by name that may also be a text, such as `3: 10; 5: 20`."""
-    table = Annotated[dict[str, inner], Field(min_length=1)]  # type: ignore[valid-type]
+    table = Annotated[dict[str, inner], Field(min_length=1)]
     return Annotated[table, BeforeValidator(_entries, json_schema_input_type=table | str)]
 
 
