@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from types import GenericAlias
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import create_model
+from pydantic import BeforeValidator, Field, create_model
 
-from fem import KINDS, Coefficient, NodeForce, Pedestal, Support
+from fem import KINDS, NodeForce, Pedestal, Support
 from fem.forces import FORCES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.tables import csv_bytes
@@ -18,7 +19,7 @@ from rotorid.files import forces, units
 from rotorid.files.columns import Column, Table, read_table
 from rotorid.files.forces import Place, Places, in_si, made, read_force
 from rotorid.files.problems import Problems
-from rotorid.files.settings import NotNegative, Number, Settings, Text, key, listed
+from rotorid.files.settings import NotNegative, Number, Settings, Text, key
 from rotorid.files.units import one_of
 
 OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
@@ -37,20 +38,31 @@ COLUMNS = (
 )
 
 
+def _two(value: object) -> object:
+    return tuple(value) if isinstance(value, list) else (value,)
+
+
+OneOrTwo = Annotated[
+    tuple[NotNegative, ...],
+    BeforeValidator(_two, json_schema_input_type=float | list[float]),
+    Field(min_length=1, max_length=2),
+]
+
+
 class _SupportKeys(Place):
     tilting_stiffness: NotNegative = key(
         "moment against a tilt of the shaft", "tilting_stiffness_N_m_per_rad", 0.0
     )
     kind: Literal["bearing", "seal"] = key("which it is, where it is another one", default="bearing")
     pedestal_mass: NotNegative = key("mass of what it stands on", "pedestal_mass_kg", 0.0, units=units.MASS)
-    pedestal_stiffness: listed(NotNegative, max_length=2) = key(  # type: ignore[valid-type]
+    pedestal_stiffness: OneOrTwo = key(
         "its stiffness; one number, or two for x and y",
         "pedestal_stiffness_N_per_m",
         (),
         units=units.STIFFNESS,
         expected="a number, or two: [x, y]",
     )
-    pedestal_damping: listed(NotNegative, max_length=2) = key(  # type: ignore[valid-type]
+    pedestal_damping: OneOrTwo = key(
         "its damping; one number, or two for x and y",
         "pedestal_damping_N_s_per_m",
         (0.0,),
@@ -63,6 +75,13 @@ class _SupportKeys(Place):
     def constants(self) -> dict[str, FloatArray]:
         """The coefficients that are written here."""
         return {name: np.array(value) for name in NAMES if (value := getattr(self, name)) is not None}
+
+    @property
+    def pedestal(self) -> Pedestal | None:
+        """What it stands on."""
+        pairs: list[Any] = [self.pedestal_stiffness, self.pedestal_damping]
+        pairs = [two if len(two) > 1 else two[0] for two in pairs if two]
+        return Pedestal(self.pedestal_mass, *pairs) if self.pedestal_stiffness else None
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A bearing that pushes outwards, and a pedestal of no stiffness."""
@@ -93,30 +112,25 @@ class SealKeys(SupportKeys):  # type: ignore[misc, valid-type]
     kind: Literal["seal"] = key("which it is", default="seal")
 
 
-KEYS = {"bearing": SupportKeys, "seal": SealKeys, **forces.KEYS}
-Attached = create_model(
-    "Attached",
-    __base__=Settings,
-    **{
-        kind.name: (tuple[KEYS[kind.name], ...], key(kind.about, default=()))  # type: ignore[valid-type]
-        for kind in (*KINDS, *FORCES)
-    },
-)
-"""Settings of a file with such tables."""
+KEYS: dict[str, Any] = {"bearing": SupportKeys, "seal": SealKeys, **forces.KEYS}
+_TABLES: dict[str, Any] = {
+    kind.name: (GenericAlias(list, (KEYS[kind.name],)), key(kind.about, default=[]))
+    for kind in (*KINDS, *FORCES)
+}
+Attached = create_model("Attached", __base__=Settings, **_TABLES)
+"""Settings of a file with tables of bearings, seals and forces."""
 
 
 def read_attached(
     file: Settings, at: Places, folder: Path, problems: Problems
 ) -> tuple[list[Support], list[NodeForce]]:
     """Supports and forces of a file, of which tables are named from its folder."""
-    supports, loads = [], []
-    for kind in KEYS:
-        for item in getattr(file, kind):
-            node = at(item)
-            if kind in forces.KEYS:
-                loads.append(read_force(item, kind, node, problems))
-            else:
-                supports.append(_support(item, node, folder, problems))
+    supports = [
+        _support(one, at(one), folder, problems) for kind in KINDS for one in getattr(file, kind.name)
+    ]
+    loads = [
+        read_force(one, kind.name, at(one), problems) for kind in FORCES for one in getattr(file, kind.name)
+    ]
     return [*filter(None, supports)], [*filter(None, loads)]
 
 
@@ -128,42 +142,45 @@ def _support(item: _SupportKeys, node: int, folder: Path, problems: Problems) ->
             return None
         speeds = table.numbers("speed")
         for name in NAMES:
-            if name in table and item.has(name):
-                problems.extend([item.problem(name, f"nothing: {table.source} has this column")])
+            if name in table and name in values:
+                problems.extend([item.problem(name, f"nothing: {table.source} has a column {NAMES[name]}")])
             elif name in table:
                 values[name] = table.numbers(name)
     if not values:
         missing = f"the stiffness of the {item.kind}, or its damping"
-        problems.extend([item.problem("stiffness", missing, value=False)])
+        problems.extend([item.problem("stiffness", missing)])
     for quantity, entries in ENTRIES.items():
         used = [name for name in entries if name in values]
         if used and (quantity in values or len({entries[0], entries[3]} & {*used}) == 1):
             both = listing([NAMES[entries[0]], NAMES[entries[3]]], "and")
             where = used[0] if item.has(used[0]) else "table"
-            expected = f"either {NAMES[quantity]}, or both {both}"
-            problems.extend([item.problem(where, expected)])
+            problems.extend([item.problem(where, f"either {NAMES[quantity]}, or both {both}")])
     if len(problems) > before:
         return None
+    stiffness, damping = (_matrices(quantity, values) for quantity in ENTRIES)
+    return made(
+        problems,
+        item,
+        item.kind,
+        lambda: Support(
+            node,
+            stiffness,
+            damping,
+            item.name,
+            tuple(speeds),
+            item.pedestal,
+            item.kind,
+            item.tilting_stiffness,
+        ),
+    )
 
-    def pedestal() -> Pedestal | None:
-        if not item.pedestal_stiffness:
-            return None
-        pairs = (two if len(two) > 1 else two[0] for two in (item.pedestal_stiffness, item.pedestal_damping))
-        return Pedestal(item.pedestal_mass, *pairs)
 
-    def support() -> Support:
-        parts = (_matrices(quantity, values, len(speeds)) for quantity in ENTRIES)
-        return Support(node, *parts, item.name, tuple(speeds), pedestal(), item.kind, item.tilting_stiffness)
-
-    return made(problems, item, item.kind, support)
-
-
-def _matrices(quantity: str, values: Mapping[str, FloatArray], n: int) -> FloatArray:
-    """Stiffness or damping, (2, 2), where it depends on the direction, behind (n,) where on the speed."""
-    names = ENTRIES[quantity] if {*ENTRIES[quantity]} & values.keys() else (quantity,)
-    shape = (n,) if n else ()
-    columns = [np.broadcast_to(values.get(name, np.array(0.0)), shape) for name in names]
-    return np.stack(columns, axis=-1).reshape(*shape, 2, 2) if len(names) > 1 else columns[0]
+def _matrices(quantity: str, values: Mapping[str, FloatArray]) -> FloatArray:
+    """Stiffness or damping: a number, or over speed (n,), or a matrix (2, 2) behind."""
+    if {*ENTRIES[quantity]}.isdisjoint(values):
+        return np.asarray(values.get(quantity, 0.0))[()]
+    entries = np.broadcast_arrays(*(values.get(name, 0.0) for name in ENTRIES[quantity]))
+    return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
 
 
 def _over_speed(path: Path, kind: str, problems: Problems) -> Table | None:
@@ -200,12 +217,16 @@ def support_tables(
     for number, support in enumerate(supports, start=1):
         section = "bearing" if ordered else support.kind
         values: dict[str, Any] = {"name": support.name, "node": support.node, "kind": support.kind}
+        columns = _columns(support)
         if support.speeds:
             table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv")
-            values["table"], files[table] = table.name, _coefficient_table(support)
+            names, rows = (
+                [NAMES[name] for name in columns],
+                zip(support.speeds, *columns.values(), strict=True),
+            )
+            values["table"], files[table] = table.name, csv_bytes((), ["speed_rad_s", *names], [*rows])
         else:
-            for quantity in ENTRIES:
-                values |= _entries(quantity, getattr(support, quantity))
+            values |= {name: value for name, (value,) in columns.items()}
         values["tilting_stiffness"] = support.tilting_stiffness
         if stand := support.pedestal:
             values |= {
@@ -217,20 +238,11 @@ def support_tables(
     return tables, files
 
 
-def _coefficient_table(support: Support) -> bytes:
-    # an isotropic entry among others is a matrix, too
-    full = {q for q in ENTRIES if any(isinstance(value, tuple) for value in getattr(support, q))}
-    rows = []
-    for k, speed in enumerate(support.speeds):
-        row = {"speed_rad_s": speed}
-        for quantity in ENTRIES:
-            entries = _entries(quantity, getattr(support, quantity)[k], full=quantity in full)
-            row |= {NAMES[name]: value for name, value in entries.items()}
-        rows.append(row)
-    return csv_bytes((), list(rows[0]), [list(row.values()) for row in rows])
-
-
-def _entries(quantity: str, value: Coefficient, *, full: bool = False) -> dict[str, float]:
-    if isinstance(value, tuple):
-        return dict(zip(ENTRIES[quantity], (*value[0], *value[1]), strict=True))
-    return _entries(quantity, ((value, 0.0), (0.0, value))) if full else {quantity: value}
+def _columns(support: Support) -> dict[str, list[float]]:
+    """Its coefficients at its speeds, or one each; those of matrices where any direction differs."""
+    out: dict[str, list[float]] = {}
+    for (quantity, entries), matrices in zip(ENTRIES.items(), support.table, strict=True):
+        xx, xy, yx, yy = matrices.reshape(-1, 4).T.tolist()
+        alike = xx == yy and not any((*xy, *yx))
+        out |= {quantity: xx} if alike else dict(zip(entries, (xx, xy, yx, yy), strict=True))
+    return out

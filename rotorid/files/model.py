@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, PlainValidator
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.files.decimal_numbers import LARGEST
+from rotorid.files.forces import made
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
 from rotorid.files.toml_file import MOST_NAMES, read_toml
@@ -39,11 +38,13 @@ FORCE = "f_"
 """Before the name of a coordinate: the amplitude of the force on it, where the file names no forces."""
 _EXAMPLE = '"(m*p**2 + b*p + c)*X = F"'
 _ESTIMATE = (
-    'names to estimate, estimate = ["c", "b"], or [estimate] with name = starting value (empty where a model in '
-    "time is only to be simulated)"
+    'names to estimate, estimate = ["c", "b"], or [estimate] with name = starting value (empty where a model '
+    "in time is only to be simulated)"
 )
-_FORMS = {"equations": ("start", "varying"), "matrices": ("coordinates", "force", "speed")}
-_FORMS |= {"states": (), "time": ("initial", "outputs", "per_record", "nuisance")}
+_NOT_BESIDE = {
+    "states": ("M", "C", "K", "coordinates", "force"),
+    "equations": ("states", "M", "C", "K", "coordinates", "force", "initial", "outputs", "per_record"),
+}
 # numbers first: the e of 1e5 is no name
 _TOKEN = re.compile(
     r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[A-Za-z\u0370-\u03ff][A-Za-z0-9_\u0370-\u03ff]*"
@@ -56,47 +57,27 @@ def _name(value: str) -> str:
     return value
 
 
-def _finite(value: object) -> bool:
-    return type(value) in (int, float) and abs(value) <= LARGEST  # type: ignore[arg-type]
-
-
 def _expression(value: object) -> object:
-    if _finite(value) or (isinstance(value, str) and value.strip()):
+    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if number or (isinstance(value, str) and value.strip()):
         return value
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
 
 
-def _square(value: object) -> object:
-    rows = value if isinstance(value, list) else []
-    if not rows or not all(isinstance(row, list) and len(row) == len(rows) for row in rows):
-        raise ValueError('a square matrix of numbers and expressions in quotes, such as [["a", 0], [0, 2.5]]')
-    return [[_expression(one) for one in row] for row in rows]
-
-
-def _limits(value: object) -> object:
-    if isinstance(value, list) and len(value) == 2 and all(type(one) in (int, float) for one in value):
-        low, high = (one if _finite(one) else math.copysign(math.inf, one) for one in value)
-        if low < high:
-            return float(low), float(high)
-    raise ValueError("two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
-
-
 def _estimates(value: object) -> object:
-    """Names without starting values are NaN."""
+    """Names without starting values have None."""
     if not isinstance(value, list):
         return value
-    if not value or not all(isinstance(one, str) for one in value) or len({*value}) < len(value):
+    if not value or len({*map(str, value)}) < len(value):
         raise ValueError("a list of different names")
-    return dict.fromkeys(value)
+    return dict.fromkeys(map(str, value))
 
 
 Name = Annotated[str, AfterValidator(_name)]
 Text = Annotated[float | str, PlainValidator(_expression, json_schema_input_type=float | str)]
 Texts = dict[Name, Text]
-Matrix = Annotated[
-    list[list[float | str]], PlainValidator(_square, json_schema_input_type=list[list[float | str]])
-]
-Limits = Annotated[tuple[float, float], PlainValidator(_limits, json_schema_input_type=list[float])]
+Matrix = list[list[Text]]
+Limit = Annotated[float, Field(allow_inf_nan=True)]
 Estimates = Annotated[
     dict[Name, Number | None],
     BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
@@ -114,6 +95,12 @@ class AmplitudeErrorKeys(Settings):
         """No error at all."""
         if not (self.amplitude_percent or self.phase_deg or self.floor):
             yield "", "at least one of amplitude_percent, phase_deg and floor above 0, or no [errors] at all"
+
+    def read(self) -> AmplitudeErrors:
+        """As `identify` takes them."""
+        from rotorid.identify.amplitudes import AmplitudeErrors
+
+        return AmplitudeErrors(self.amplitude_percent / 100, math.radians(self.phase_deg), self.floor)
 
 
 class Nuisance(Settings):
@@ -159,34 +146,26 @@ class ModelFile(Settings):
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
     per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
-    bounds: dict[str, Limits] = key("name = [lowest, highest], `inf` for none", default={})
+    bounds: dict[str, tuple[Limit, Limit]] = key("name = [lowest, highest], `inf` for none", default={})
     prior: dict[str, tuple[Number, Positive]] = key(
-        "name = [value, standard deviation]: what is known of it beside the data",
-        default={},
-        expected="[value, standard deviation above 0], such as [1.0, 0.5]",
+        "name = [value, standard deviation]: what is known of it beside the data", default={}
     )
     start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
     errors: AmplitudeErrorKeys | None = key("of readings of amplitudes, one standard deviation", default=None)
     speed: NotNegative = key("the speed at which matrices of a rotor hold", "speed_rad_s", 0.0)
-    nuisance: Nuisance = key(
-        "what sensors add to every output, estimated anew for every record", default=Nuisance()
+    nuisance: Nuisance | None = key(
+        "what sensors add to every output, estimated anew for every record", default=None
     )
 
     def wrong(self) -> Iterator[tuple[str, str]]:
-        """Two forms in one, keys of another form."""
-        matrices = any(self.has(name) for name in "MCK")
-        forms = [name for name in ("equations", "states") if self.has(name)] + ["matrices"] * matrices
-        if len(forms) > 1:
-            yield forms[0], "one of equations, M, C and K, and [states]"
-        if matrices and len({len(self.M), len(self.K), len(self.C or self.K), len(self.names)}) > 1:
-            yield "M", "matrices M and K, and C if it is there, of one size, with a name for each row"
-        form = (forms or ["states"])[0]
-        for name in _FORMS["time"] if form == "equations" else _FORMS["equations"]:
-            if self.has(name):
-                yield name, "nothing in a model of this form"
-        for name in _FORMS["matrices"] if form == "states" else ():
-            if self.has(name):
-                yield name, "nothing without the matrices M and K"
+        """Two forms in one, matrices of several sizes."""
+        for form, others in _NOT_BESIDE.items():
+            for other in others if self.has(form) else ():
+                if self.has(other):
+                    yield other, f"equations, matrices or states: nothing of this name beside {form}"
+        rows = [row for matrix in (self.M, self.K, self.damping) for row in matrix]
+        if len({len(self.M), len(self.K), len(self.damping), len(self.names), *map(len, rows)}) > 1:
+            yield "M", 'square matrices M, K and perhaps C of one size, such as M = [["a", 0], [0, 2.5]]'
 
     @property
     def names(self) -> list[str]:
@@ -196,7 +175,7 @@ class ModelFile(Settings):
     @property
     def damping(self) -> list[list[float | str]]:
         """C, zero where it is absent."""
-        return self.C or np.zeros((len(self.M),) * 2).tolist()
+        return self.C or [[0.0] * len(self.M) for _ in self.M]
 
 
 @dataclass(frozen=True)
@@ -239,14 +218,15 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     highest]), `[start]` (name = guess), `[prior]` (name = [value, standard deviation]) and `[errors]`
     (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
 
-    Instead of equations there may be matrices `M`, `C`, `K` as `read_ode_model` reads them and `rotorid reduce
-    --model` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its `[estimate]`
-    has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and `[force]` says
-    where they act; without both there is a force amplitude f_x7 on every coordinate x7, and those not in the
-    table are 0. An output that is a number times a displacement or velocity is measured in place of it;
-    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a parameter of
-    initial values alone is left out, with a warning. Explicit time, constant loads and nonlinear terms are
-    refused. An amplitude that `[outputs]` do not show, or that is not measured, is predicted.
+    Instead of equations there may be matrices `M`, `C`, `K` as `read_ode_model` reads them and `rotorid
+    reduce --model` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its
+    `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
+    `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
+    those not in the table are 0. An output that is a number times a displacement or velocity is measured in
+    place of it; other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
+    parameter of initial values alone is left out, with a warning. Explicit time, constant loads and
+    nonlinear terms are refused. An amplitude that `[outputs]` do not show, or that is not measured, is
+    predicted.
 
     Parameters
     ----------
@@ -269,46 +249,46 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """
     path, problems = Path(path), Problems()
     file = _read(path, problems)
-    from rotorid.identify.amplitudes import AmplitudeErrors
     from rotorid.identify.equations import harmonic_model
 
-    estimate, unmeasured, inputs = [*file.estimate], (), file.inputs
-    equations: Sequence[str] = file.equations
-    start = file.start | {name: value for name, value in file.estimate.items() if value is not None}
-    try:
-        if not equations:
-            equations, inputs, unmeasured = _of_amplitudes(file)
-            used = {name for text in equations for name in _words(text)}
-            at_start = {name for text in file.initial.values() for name in _words(str(text))}
-            lost = [name for name in estimate if name not in used and name in at_start]
-            estimate = [name for name in estimate if name not in lost]
-            inputs = [name for name in inputs or () if name in used]
-            if lost:
-                words = (
-                    f"{listing(lost, 'and')}: of initial values only, which amplitudes do not show: left out"
-                )
-                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=2)
-        model = harmonic_model(
-            equations, known=file.known, estimate=estimate, inputs=inputs, varying=file.varying
-        )
-        if unmeasured is not None and not file.equations and model.has_constant_terms:
+    estimate, errors = [*file.estimate], file.errors
+
+    def read() -> tuple[HarmonicModel, Sequence[str]]:
+        if not file.M:
+            if not file.equations:
+                raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
+            varying = file.varying
+            model = harmonic_model(
+                file.equations, known=file.known, estimate=estimate, inputs=file.inputs, varying=varying
+            )
+            return model, ()
+        equations, inputs, unseen = _of_amplitudes(file)
+        used = {name for text in equations for name in _words(text)}
+        at_start = {name for text in file.initial.values() for name in _words(str(text))} - used
+        if lost := [name for name in estimate if name in at_start]:
+            words = f"{listing(lost, 'and')} stand in initial values only, which amplitudes do not show"
+            warnings.warn(f"{path}: {words}: left out", TableWarning, stacklevel=4)
+            estimate[:] = [name for name in estimate if name not in lost]
+        inputs = [name for name in inputs if name in used]
+        model = harmonic_model(equations, known=file.known, estimate=estimate, inputs=inputs)
+        if model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "
                 "amplitudes, leave it out; one that excites must be a measured input"
             )
-    except ValueError as error:
-        problems.add(
-            str(path), None, "equations" if file.equations else None, None, f"a usable model: {error}"
-        )
-        problems.stop()
-        raise
-    bounds, start, prior = (
-        {k: v for k, v in each.items() if k in estimate} for each in (file.bounds, start, file.prior)
+        return model, unseen
+
+    model, unseen = problems.need(made(problems, file, "model of amplitudes", read))
+    start = {name: value for name, value in file.estimate.items() if value is not None} | file.start
+    return HarmonicFile(
+        model,
+        {name: limits for name, limits in file.bounds.items() if name in estimate},
+        {name: value for name, value in start.items() if name in estimate},
+        errors.read() if errors else None,
+        path,
+        tuple({*unseen} & {*model.outputs}),
+        {name: known for name, known in file.prior.items() if name in estimate},
     )
-    errors = file.errors and AmplitudeErrors(
-        file.errors.amplitude_percent / 100.0, math.radians(file.errors.phase_deg), file.errors.floor
-    )
-    return HarmonicFile(model, bounds, start, errors, path, tuple({*unmeasured} & {*model.outputs}), prior)
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -349,150 +329,127 @@ def read_ode_model(path: str | Path) -> OdeModel:
     """
     path, problems = Path(path), Problems()
     file = _read(path, problems)
-    if file.equations:
-        expected = "[states], or M, C and K: equations are of amplitudes, for `rotorid identify`"
-        problems.extend([file.problem("equations", expected, value=False)])
-    if lost := [name for name, value in file.estimate.items() if value is None]:
+    if file.equations or file.varying:
+        expected = "[states], or M and K: equations and varying are of amplitudes, for `rotorid identify`"
+        problems.extend([file.problem("equations", expected)])
+    start = file.estimate | file.start
+    if lost := [name for name, value in start.items() if value is None]:
         expected = f"[estimate] with name = starting value, {lost[0]} = 1.0"
-        problems.extend([file.problem("estimate", expected, value=False)])
+        problems.extend([file.problem("estimate", expected)])
     problems.stop()
     from rotorid.identify.ode import ode_model, with_nuisance
     from rotorid.identify.second_order import second_order
 
-    names, extra = file.names if file.M else file.states, file.nuisance
     outputs = {name: str(text) for name, text in file.outputs.items()}
-    shown, factors = with_nuisance(outputs or {x: x for x in names}, extra.offset, extra.drift, extra.hum)
+    if extra := file.nuisance:
+        outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
+        outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
+    else:
+        factors = []
     given: dict[str, Any] = {
         "initial": file.initial,
-        "outputs": shown if factors else outputs or None,
-        "estimate": file.estimate | dict.fromkeys(factors, 0.0),
+        "outputs": outputs or None,
+        "estimate": start | dict.fromkeys(factors, 0.0),
         "known": file.known,
         "inputs": file.inputs or (),
         "bounds": file.bounds,
         "per_record": [*file.per_record, *factors],
     }
-    try:
-        if file.M:
-            model = second_order(file.M, file.damping, file.K, names=file.names, force=file.force, **given)
-        else:
-            model = ode_model({name: str(text) for name, text in file.states.items()}, **given)
-    except ValueError as error:
-        problems.add(str(path), None, None, None, f"a usable model: {error}")
-        problems.stop()
-        raise
-    return replace(model, prior=file.prior)
+
+    def model() -> OdeModel:
+        if not file.M:
+            return ode_model({name: str(text) for name, text in file.states.items()}, **given)
+        return second_order(file.M, file.damping, file.K, names=file.names, force=file.force, **given)
+
+    return replace(problems.need(made(problems, file, "model", model)), prior=file.prior)
 
 
 def _read(path: Path, problems: Problems) -> ModelFile:
     """What stands in a model file, or of a small model its linear equations; raises its problems."""
     from rotorid.files.small_model import small_equations
 
-    data = problems.need(read_toml(path, problems))
+    source, data = str(path), problems.need(read_toml(path, problems))
     if {"masses_kg", "shaft_stiffness_N_per_m"} & data.keys():
         data = problems.need(small_equations(path, problems))
     for name, value in data.items():
         if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
             expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
-            problems.add(str(path), None, name, None, expected)
+            problems.add(source, None, name, None, expected)
     problems.stop()
-    file = read_settings(ModelFile, data, str(path), problems)
+    file = read_settings(ModelFile, data, source, problems)
     problems.stop()
     file = problems.need(file)
     for table in ("bounds", "prior", "start"):
-        for name, value in getattr(file, table).items():
-            low, high = file.bounds.get(name, (-math.inf, math.inf))
-            guess = file.estimate.get(name)
-            if name not in file.estimate:
-                problems.add(
-                    str(path),
-                    None,
-                    f"{table}.{name}",
-                    None,
-                    f"a name of estimate{did_you_mean(name, file.estimate)}",
-                )
-            elif table == "start" and not low <= value <= high:
-                problems.add(
-                    str(path),
-                    None,
-                    f"start.{name}",
-                    str(value),
-                    f"a guess within its bounds, {low:g} to {high:g}",
-                )
-            elif table == "bounds" and guess is not None and not low <= guess <= high:
-                problems.add(
-                    str(path),
-                    None,
-                    f"bounds.{name}",
-                    str([low, high]),
-                    f"limits that hold the starting value {guess:g}",
-                )
+        for name in getattr(file, table).keys() - file.estimate.keys():
+            hint = did_you_mean(name, file.estimate)
+            problems.add(source, None, f"{table}.{name}", None, f"a name of estimate{hint}")
+    for name, (low, high) in file.bounds.items():
+        value = file.start.get(name, file.estimate.get(name))
+        if not low < high or (value is not None and not low <= value <= high):
+            expected = "[lowest, highest], such as [0, 2e6] or [0, inf], with the starting value between them"
+            problems.add(source, None, f"bounds.{name}", f"{[low, high]}", expected)
     problems.stop()
     return file
 
 
 def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
-    """Equations, exciting amplitudes, and amplitudes that the outputs do not show.
+    """Matrices as equations of amplitudes, what excites, and what outputs do not show.
 
     Raises
     ------
     ValueError
         What has no meaning for amplitudes; whether the equations are linear is seen by `harmonic_model`.
     """
-    if not file.M:
-        raise ValueError("equations, or M, C and K: [states] are for models in time (`fit`, `simulate`)")
-    constants, y = {*file.estimate, *file.known}, file.names
-    matrices = {"M": file.M, "C": file.damping, "K": file.K}
-    entries = [str(one) for matrix in matrices.values() for row in matrix for one in row]
-    texts = [*map(str, file.force.values()), *map(str, file.outputs.values())]
-    if any("t" in _words(text) for text in texts):
-        raise ValueError(
-            "force and outputs depend on the time t, which amplitudes do not know: make what excites a "
-            'measured input, such as inputs = ["u"]'
-        )
-    if lost := sorted({word for text in entries for word in _words(text)} - constants):
-        raise ValueError(f"{lost[0]} in M, C or K is no parameter and not known: amplitudes need constants")
-    if own := {word for text in (*entries, *texts) for word in _words(text)} & {*file.per_record}:
-        raise ValueError(
-            f"per_record: {min(own)} stands in the equations, which have one value of it for all tests"
-        )
-    if strange := file.force.keys() - {*y}:
-        raise ValueError(f"force: {min(strange)} is no name of coordinates; they are {listing(y, 'and')}")
-    inputs = list(file.inputs or ())
-    force = file.force
+    y, inputs, force = file.names, list(file.inputs or ()), file.force
+    constants = {*file.estimate, *file.known} - {*file.per_record}
+    states = {x: (x, "") for x in y} | {f"v_{x}": (x, "/p") for x in y}
+    matrices = {"*p**2": file.M, "*p": file.damping, "": file.K}
+    entries = [one for matrix in matrices.values() for row in matrix for one in row]
+    texts = [*force.values(), *file.outputs.values()]
+    for text, allowed in [
+        *((one, set()) for one in entries),
+        *((text, {*states, *inputs}) for text in texts),
+    ]:
+        if isinstance(text, str):
+            for name in expressions.names(expressions.parse(text)) - constants - allowed:
+                raise ValueError(
+                    f"{name} in {text!r} has no meaning for amplitudes: M, C and K hold parameters and known "
+                    "numbers, the same in all tests; what changes with the time t must be a measured input"
+                )
     if not inputs and not force:
         inputs = [f"{FORCE}{x}" for x in y]
         force = dict(zip(y, inputs, strict=True))
-    states = {x: (x, "") for x in y} | {f"v_{x}": (x, "/p") for x in y}
-    put, more = {}, {}
+    put: dict[str, str] = {}
+    more: dict[str, str] = {}
     for output, text in file.outputs.items():
         state, scale = _scaled(str(text), file)
         base, rate = states.get(state, ("", ""))
         if base and base not in put:
-            put[base] = output if (output, scale, rate) == (base, "1", "") else f"({output}{rate}/({scale}))"
+            plain = (output, scale, rate) == (base, "1", "")
+            put[base] = output if plain else f"({output}{rate}/({scale}))"
         else:
             more[output] = str(text)
-    unseen = [x for x in y if file.outputs and x not in put]
-    taken = [*constants, *inputs, *file.outputs, *([x for x in y if x not in put] if file.outputs else y)]
-    if twice := [name for name in taken if taken.count(name) > 1 or name == "p"]:
+    unseen, strange = [x for x in y if x not in put], force.keys() - {*y}
+    names = [*constants, *inputs, *file.outputs, *unseen]
+    wrong = [name for name in names if name == "p" or names.count(name) > 1] + [*strange]
+    if wrong:
         raise ValueError(
-            f"{twice[0]}: an amplitude needs a name of its own, and p is d/dt; this means two things"
+            f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )
-    put = {x: put.get(x, x) for x in y} | {f"v_{x}": f"(p*{put.get(x, x)})" for x in y}
+    put = {x: put.get(x, x) for x in y}
+    put |= {f"v_{x}": f"(p*{text})" for x, text in put.items()}
     equations = []
     for i, name in enumerate(y):
         terms = []
         for j, other in enumerate(y):
-            parts = [
-                f"({matrices[key][i][j]}){power}"
-                for key, power in (("M", "*p**2"), ("C", "*p"), ("K", ""))
-                if matrices[key][i][j] != 0
-            ]
+            parts = [f"({m[i][j]}){power}" for power, m in matrices.items() if m[i][j] != 0]
             terms += [f"({' + '.join(parts)})*{other}"] if parts else []
         if not terms:
             raise ValueError(f"the row of {name} in M, C and K is empty: leave this coordinate out")
         equations.append(f"{' + '.join(terms)} = {force.get(name, 0)}")
     equations += [f"{output} = {text}" for output, text in more.items()]
-    return [_TOKEN.sub(lambda found: put.get(found[0], found[0]), text) for text in equations], inputs, unseen
+    equations = [_TOKEN.sub(lambda found: put.get(found[0], found[0]), text) for text in equations]
+    return equations, inputs, unseen if file.outputs else []
 
 
 def _words(text: str) -> set[str]:
@@ -504,8 +461,7 @@ def _scaled(text: str, file: ModelFile) -> tuple[str, str]:
     import sympy
 
     known = {sympy.Symbol(name): sympy.Rational(repr(value)) for name, value in file.known.items()}
-    expression = sympy.expand(expressions.parse(text).subs(known))
-    scale, symbol = expression.as_coeff_Mul()
+    scale, symbol = sympy.expand(expressions.parse(text).subs(known)).as_coeff_Mul()
     if symbol.is_Symbol and scale.is_Rational:
         return symbol.name, f"{scale.p}/{scale.q}" if scale.q != 1 else str(scale.p)
     return "", ""
@@ -519,8 +475,7 @@ def equations_of(
 ) -> dict[str, Any]:
     """M y'' + C y' + K y = f as a model file has it, with dampers to the ground that are to be estimated.
 
-    Coordinates with neither mass nor damping are eliminated: with them behind the others, K becomes
-    K₁₁ − K₁₂ K₂₂⁻¹ K₂₁.
+    Coordinates with neither mass nor damping, behind the others, are eliminated: K = K₁₁ − K₁₂ K₂₂⁻¹ K₂₁.
 
     Parameters
     ----------
@@ -538,77 +493,34 @@ def equations_of(
     Raises
     ------
     ValueError
-        Matrices that are not finite, coordinates that nothing holds, names that do not exist or stand twice.
+        Matrices that are not finite, coordinates that nothing holds, names that do not exist.
     """
     M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
     if not np.isfinite(matrices).all():
         raise ValueError("M, C or K holds numbers that are not finite: such a model cannot be written")
-    resting = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [x not in dampers for x in motion.coordinates]
-    on, off = np.flatnonzero(~resting), np.flatnonzero(resting)
+    free = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [name not in dampers for name in motion.coordinates]
+    on, off = np.flatnonzero(~free), np.flatnonzero(free)
     if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
-        raise ValueError(
-            "coordinates with neither mass nor damping can move without force: give them stiffness"
-        )
+        raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
     K = K[np.ix_(on, on)] - K[np.ix_(on, off)] @ np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
-    names = [motion.coordinates[i] for i in on]
-    damping: list[list[Any]] = C[np.ix_(on, on)].tolist()
-    for name in dampers:
-        i = _one_of(names, name, "damper")
-        damping[i][i] = f"{damping[i][i]!r} + d_{name}" if damping[i][i] else f"d_{name}"
-    for kind, chosen, allowed in (
-        ("input", inputs, [f"{FORCE}{name}" for name in names]),
-        ("output", outputs or (), [*names, *(f"v_{name}" for name in names)]),
-    ):
-        for name in chosen:
-            _one_of(allowed, name, kind)
-        if len({*chosen}) < len(chosen):
-            raise ValueError(f"an {kind} is named twice: {', '.join(chosen)}")
-    data = {
+    names, damping = [motion.coordinates[i] for i in on], C[np.ix_(on, on)].astype(object)
+    allowed = {f"{kind}{name}" for name in names for kind in ("", "v_", FORCE)}
+    for name in (*dampers, *inputs, *(outputs or ())):
+        if name not in allowed:
+            raise ValueError(f"no {name!r} in this model: it has {listing(names, 'and')}")
+    for i, name in enumerate(names):
+        if name in dampers:
+            damping[i, i] = f"{damping[i, i]!r} + d_{name}" if damping[i, i] else f"d_{name}"
+    data: dict[str, Any] = {
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],
         "coordinates": names,
         "M": M[np.ix_(on, on)].tolist(),
-        "C": damping,
+        "C": damping.tolist(),
         "K": K.tolist(),
         "force": {name.removeprefix(FORCE): name for name in inputs},
         "outputs": {name: name for name in outputs or ()},
-    }
-    return {name: part for name, part in data.items() if part} | {
-        "estimate": {f"d_{name}": float(value) for name, value in dampers.items()},
         "bounds": {f"d_{name}": [0.0, math.inf] for name in dampers},
     }
-
-
-def ode_model_bytes(
-    motion: Motion,
-    dampers: Mapping[str, float],
-    *,
-    comments: Sequence[str] = (),
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] | None = None,
-) -> bytes:
-    """The file of `equations_of`, with comment lines at the top; all digits of the matrices are kept.
-
-    Raises
-    ------
-    ValueError
-        As `equations_of`.
-    """
-    import tomli_w
-
-    data = {"schema_version": SCHEMA_VERSION, **equations_of(motion, dampers, inputs, outputs)}
-    lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
-    parts = {name: part for name, part in data.items() if not isinstance(part, dict)}
-    for name, part in parts.items():
-        if name in "MCK":
-            lines += [f"{name} = [", *(f"  {str(row).replace(chr(39), chr(34))}," for row in part), "]"]
-        else:
-            lines.append(f"{name} = {str(part).replace(chr(39), chr(34))}")
-    tables = tomli_w.dumps({name: part for name, part in data.items() if name not in parts})
-    return ("\n".join(lines) + f"\n\n{tables}").encode()
-
-
-def _one_of(names: Sequence[str], name: str, kind: str) -> int:
-    if name not in names:
-        raise ValueError(f"no {kind} {name!r} in this model: they are named like {names[0]}")
-    return names.index(name)
+    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
+    return {name: part for name, part in data.items() if part} | {"estimate": estimate}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,21 +23,23 @@ from fem import (
     Support,
     too_short,
 )
+from fem.forces import kind_of
 from fem.parameters import expand
 from rotorid.base.registry import names
 from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached
-from rotorid.files.columns import Column, Table, read_table
-from rotorid.files.forces import Place, Places, made, node_number
+from rotorid.files.columns import Column, read_table
+from rotorid.files.forces import Place, Places, made
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, read_settings
 from rotorid.files.toml_file import read_toml
 from rotorid.files.units import one_of
 
 
-def _column(stem: str, of: Mapping[str, units.Unit], usual: str, *, required: bool = False) -> Column:
-    return Column(stem, one_of({**of}), (f"{stem}_{usual}",), required=required, blank=stem != "length")
+def _column(stem: str, of: dict[str, units.Unit], *usual: str, required: bool = False) -> Column:
+    names = tuple(f"{stem}_{unit}" for unit in usual)
+    return Column(stem, one_of(of), names, required=required, blank=stem != "length")
 
 
 ATTACHED = (
@@ -54,8 +56,8 @@ OF_ELEMENTS = (
     _column("material_damping", units.TIME, "s"),
 )
 COLUMNS = (
-    _column("length", units.LENGTH, "m", required=True),
-    _column("diameter", units.LENGTH, "m", required=True),
+    _column("length", units.LENGTH, "m", "mm", required=True),
+    _column("diameter", units.LENGTH, "m", "mm", required=True),
     _column("inner_diameter", units.LENGTH, "m"),
     Column("element", required=False, blank=True),
     *ATTACHED,
@@ -73,7 +75,7 @@ USUAL = {
     "friction": (0.0, 1.5, "of the normal force", {"percent": 0.01}),
 }
 """What quantities are in machines: from, to, in which unit; other units by their size in that one."""
-_SOFT = 10.0  # m/s² · s²: a rotor that sags by more swings below 0.2 Hz
+_SAG = 10.0  # m: a rotor that sags by more swings below 0.2 Hz
 
 
 class Material(Settings):
@@ -140,19 +142,15 @@ class DiscKeys(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Neither of both, or some of both."""
-        inertia = [name for name in ("mass", "polar_inertia", "diametral_inertia") if self.has(name)]
         geometry = [
             name for name in ("width", "outer_diameter", "inner_diameter", "density") if self.has(name)
         ]
-        if inertia and geometry:
-            other = self.written(geometry[0])
-            yield inertia[0], f"either mass and moments of inertia or a geometry, which {other} gives"
-        elif not geometry and self.mass is None:
-            yield "mass", "the mass of the disc (or its geometry: width_m, outer_diameter_m)"
-        elif geometry:
-            for name in ("width", "outer_diameter"):
-                if not self.has(name):
-                    yield name, "the disc's width and outer diameter"
+        if bool(geometry) == self.has("mass"):
+            yield "mass", "either the mass of the disc or its geometry: width_m, outer_diameter_m"
+        elif geometry and (self.polar_inertia or self.diametral_inertia):
+            yield "polar_inertia", "nothing beside the geometry, which gives it"
+        elif geometry and (self.width is None or self.outer_diameter is None):
+            yield "width", "the disc's width and outer diameter"
 
 
 class Parameter(Settings):
@@ -182,8 +180,8 @@ class CalibrationKeys(Settings):
     lack_of_fit: NotNegative = key(
         "what the model leaves of a coefficient, one relative standard deviation", default=0.0
     )
-    parameter: tuple[Parameter, ...] = key("what was fitted", default=())
-    data: tuple[DataFile, ...] = key("a file that it was made from, which must not count twice", default=())
+    parameter: list[Parameter] = key("what was fitted", default=[])
+    data: list[DataFile] = key("a file that it was made from, which must not count twice", default=[])
 
 
 class RotorFile(Attached):  # type: ignore[misc, valid-type]
@@ -198,8 +196,8 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
         "effects that count, true or false; an inertia that is thereby ignored gives a warning",
         default=Effects(),
     )
-    disc: tuple[DiscKeys, ...] = key("a disc, as many as there are", default=())
-    station: tuple[Station, ...] = key("a name for a node", default=())
+    disc: list[DiscKeys] = key("a disc, as many as there are", default=[])
+    station: list[Station] = key("a name for a node", default=[])
     calibration: CalibrationKeys | None = key("what a fit to readings found, with its errors", default=None)
 
 
@@ -235,11 +233,9 @@ def read_rotor(path: str | Path) -> Rotor:
             problems.add(str(path), None, "shaft", None, expected)
             problems.stop()
         file = read_settings(RotorFile, data, str(path), problems)
+        problems.stop()
     material = file.material if file else Material()
-    parts = None
-    if file or not len(problems):
-        parts = _shaft(path.parent / file.shaft if file else path, material, problems)
-    parts = problems.need(parts)
+    parts = problems.need(_shaft(path.parent / file.shaft if file else path, material, problems))
     if file:
         nodes = range(1, len(parts["length"]) + 2)
         at = Places(nodes, _stations(file, nodes, problems), problems)
@@ -262,8 +258,10 @@ def read_rotor(path: str | Path) -> Rotor:
         raise
     _warn_of_units(str(path), rotor)
     if file and file.calibration:
-        object.__setattr__(rotor, "calibration", _calibration(file.calibration, rotor, problems))
+        keys = file.calibration
+        found = made(problems, keys, "calibration", lambda: _calibration(keys, rotor))
         problems.stop()
+        return replace(rotor, calibration=found)
     return rotor
 
 
@@ -281,8 +279,8 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    items = [one for kind in names(KINDS) if isinstance(data.get(kind), list) for one in data[kind]]
-    tables = [data.get("shaft"), *(one.get("table") for one in items if isinstance(one, dict))]
+    parts = [data, *(one for kind in names(KINDS) if isinstance(data.get(kind), list) for one in data[kind])]
+    tables = [one.get(key) for one in parts if isinstance(one, dict) for key in ("shaft", "table")]
     named = dict.fromkeys(name.strip() for name in tables if isinstance(name, str) and name.strip())
     return (path, *(path.parent / name for name in named))
 
@@ -301,7 +299,7 @@ def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any]
     elements = length != 0
     last = np.arange(len(length)) == len(length) - 1
     table.must_be("length", (length > 0) | (last & ~elements), _LENGTH)
-    short = too_short(np.where(elements, length, 0.0)) & elements
+    short = too_short(np.where(elements, length, 0.0)) & (length > 0)
     table.must_be(
         "length", ~short, f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
     )
@@ -310,23 +308,14 @@ def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any]
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     of_elements = {column.stem: values(column.stem, getattr(material, column.stem)) for column in OF_ELEMENTS}
-    ratio, outer = of_elements["poisson_ratio"], ~(inner >= diameter) | ~(diameter > 0)
-    for stem, fits, expected in (
-        ("diameter", diameter > 0, "a diameter above 0"),
-        ("inner_diameter", inner >= 0, "a diameter of 0 or more"),
-        ("inner_diameter", outer, "less than the outer diameter"),
-        ("youngs_modulus", of_elements["youngs_modulus"] > 0, "a number above 0"),
-        ("density", of_elements["density"] >= 0, "a number of 0 (no mass) or more"),
-        ("poisson_ratio", (ratio > -1) & (ratio <= 0.5), "a number above -1, up to 0.5"),
-        ("material_damping", of_elements["material_damping"] >= 0, "a time of 0 or more"),
-    ):
-        table.must_be(stem, fits | ~elements, expected)
-    for column in ATTACHED:
-        outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * (
-            "support" in column.stem
-        )
-        fits = ~(values(column.stem) < 0)
-        table.must_be(column.stem, fits, f"0 (nothing attached) or more{outwards}")
+    ratio = of_elements["poisson_ratio"]
+    for stem in ("diameter", "youngs_modulus"):
+        table.must_be(stem, (table.numbers(stem) > 0) | ~elements, "a number above 0")
+    table.must_be("inner_diameter", ~(inner >= diameter) | ~elements, "less than the outer diameter")
+    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
+    for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in ATTACHED)):
+        outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
+        table.must_be(stem, ~(values(stem) < 0), f"a number of 0 or more{outwards}")
     if len(problems) > before:
         return None
     rows = np.array([values(column.stem) for column in ATTACHED]).T.tolist()
@@ -362,60 +351,46 @@ def _disc(item: DiscKeys, node: int, material: Material, problems: Problems) -> 
     return made(problems, item, "disc", lambda: Disc.from_geometry(node, *sizes, density, item.name))
 
 
-def _calibration(file: CalibrationKeys, rotor: Rotor, problems: Problems) -> Calibration | None:
-    n, before = len(file.parameter), len(problems)
+def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
+    """ValueError for what is none of this rotor."""
+    n = len(file.parameter)
     for one in file.parameter:
-        try:
-            if expand(rotor, one.name) != (one.name,):
-                problems.extend([one.problem("name", "a single parameter, without [*]")])
-        except ValueError as error:
-            problems.extend([one.problem("name", f"a parameter of this rotor; {error}")])
+        if expand(rotor, one.name) != (one.name,):
+            raise ValueError(f"{one.name} is not a single parameter: name one, without [*]")
         if len(one.correlation) not in (0, n):
-            expected = f"{counted(n, 'number')}, one for each parameter"
-            problems.extend([one.problem("correlation", expected)])
-    if len(problems) > before:
-        return None
+            raise ValueError(f"{one.name}: correlation needs {counted(n, 'number')}, one for each parameter")
     std = np.array([one.std for one in file.parameter])
     R = [one.correlation or row for one, row in zip(file.parameter, np.eye(n), strict=True)]
-    return made(
-        problems,
-        file,
-        "calibration",
-        lambda: Calibration(
-            tuple(one.name for one in file.parameter),
-            np.array([one.value for one in file.parameter]),
-            np.reshape(R, (n, n)) * np.outer(std, std),
-            file.lack_of_fit,
-            file.needs_trial_run,
-            {one.file: one.sha256 for one in file.data},
-        ),
+    return Calibration(
+        tuple(one.name for one in file.parameter),
+        np.array([one.value for one in file.parameter]),
+        np.reshape(R, (n, n)) * np.outer(std, std),
+        file.lack_of_fit,
+        file.needs_trial_run,
+        {one.file: one.sha256 for one in file.data},
     )
 
 
 def _warn_of_units(source: str, rotor: Rotor) -> None:
     """Sizes in a wrong unit give a rotor that can be computed all the same."""
-    items = [(f"{type(one).__name__} at node {one.node}", one) for one in rotor.forces]
+    found = []
+    items = [(f"{kind_of(one).replace('_', ' ')} at node {one.node}", one) for one in rotor.forces]
     for what, item in [("", rotor), *items]:
         for name, (low, high, unit, others) in USUAL.items():
             values = np.atleast_1d(getattr(item, name, 0.0))
             odd = np.flatnonzero((values > 0) & ((values < low) | (values > high)))
-            if not odd.size:
-                continue
-            value = float(values[odd[0]])
-            meant = next(
-                (other for other, size in others.items() if low <= value * size <= high), "another unit"
-            )
-            place = what or f"element {odd[0] + 1}"
-            more = f" (and {counted(odd.size - 1, 'more')})" if odd.size > 1 else ""
-            words = f"{place}{more}: {name} {value:.6g} {unit}; is this in {meant}?"
-            warnings.warn(f"{source}, {words}", TableWarning, stacklevel=3)
+            for i in odd[:1].tolist():
+                value, place = float(values[i]), what or f"element {i + 1}"
+                meant = [other for other, size in others.items() if low <= value * size <= high]
+                more = f" (and {counted(odd.size - 1, 'more')})" if odd.size > 1 else ""
+                found.append((f"{place}{more}: {name} {value:.6g} {unit}", meant))
     bearings = [one for one in rotor.supports if one.kind == "bearing"]
     weight = 9.81 * rotor.total_mass / max(1, len(bearings))
     for one in bearings:
-        stiffness = float(np.linalg.norm(one.table[0], axis=(1, 2)).max()) / math.sqrt(2)
-        if 0 < stiffness < weight / _SOFT:
-            words = (
-                f"bearing at node {one.node}: {stiffness:.4g} N/m lets it sag by {weight / stiffness:.3g} m"
-            )
-            warnings.warn(f"{source}, {words}; is this in N/mm or N/µm?", TableWarning, stacklevel=3)
-            return
+        stiffness = float(np.abs(one.table[0]).max())
+        if 0 < stiffness < weight / _SAG:
+            place = f"bearing at node {one.node}: {stiffness:.4g} N/m, which its share of the weight"
+            found.append((f"{place} bends by {weight / stiffness:.3g} m", ["N/mm"]))
+    for words, meant in found:
+        question = f"is this in {meant[0] if meant else 'another unit'}?"
+        warnings.warn(f"{source}, {words}; {question}", TableWarning, stacklevel=3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -16,28 +15,34 @@ from pydantic import PlainValidator
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
-from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached, support_tables
-from rotorid.files.forces import Place, Places, force_tables
+from rotorid.files.forces import Place, Places, force_tables, made
 from rotorid.files.problems import Problems, TableWarning
-from rotorid.files.settings import NotNegative, Turn, Whole, key, read_settings
+from rotorid.files.settings import NotNegative, Turn, key, read_settings
 from rotorid.files.toml_file import read_toml
+from rotorid.files.toml_writing import toml_bytes
 from rotorid.reduction import SmallModel
 
 _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
 def _numbers(value: object) -> FloatArray:
-    try:
+    with suppress(TypeError, ValueError):
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.array(math.nan)
-    if array.ndim and array.size and np.isfinite(array).all():
-        return array
-    raise ValueError("finite numbers: a list, or a matrix as a list of rows")
+        if array.size and np.isfinite(array).all() and array.ndim:
+            return array
+    raise ValueError("a list of finite numbers, one for each node, or a square matrix of them")
 
 
+def _nodes(value: object) -> tuple[int, ...]:
+    nodes = _numbers(value)
+    if (nodes % 1).any() or (nodes < 1).any() or len(np.unique(nodes)) < nodes.size:
+        raise ValueError("different whole numbers from 1 up")
+    return tuple(map(int, nodes.ravel()))
+
+
+Nodes = Annotated[tuple[int, ...], PlainValidator(_nodes, json_schema_input_type=list[int])]
 List = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[float])]
 Matrix = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[list[float]])]
 
@@ -59,8 +64,8 @@ class BowKeys(Place):
 class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
     """A small model; arrays in the order of `SmallModel`."""
 
-    nodes: list[Whole] = key(
-        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]", min_length=1
+    nodes: Nodes = key(
+        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]"
     )
     masses: List = key(
         "mass at each node; 0 where only a force acts", "masses_kg", expected="a mass for each node"
@@ -126,18 +131,18 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
         unbalance[at(one)] = unbalance.get(at(one), 0j) + complex(polar(one.unbalance, one.angle))
     bow = {at(one): complex(polar(one.bow, one.angle)) for one in file.bow}
     if len(bow) < len(file.bow):
-        problems.extend([file.bow[-1].problem("node", "each node in one [[bow]]", value=False)])
+        problems.extend([file.bow[-1].problem("node", "each node in one [[bow]]")])
     problems.stop()
-    arrays = {name: getattr(file, name) for name in ARRAYS} | {"nodes": tuple(file.nodes)}
+    arrays = {name: getattr(file, name) for name in ARRAYS}
     if arrays["weight"] is None:
         arrays["weight"] = GRAVITY * arrays["masses"]
-    try:
-        model = SmallModel(**arrays, supports=supports, forces=forces, unbalance=unbalance, bow=bow)
-    except ValueError as error:
-        name, _, expected = str(error).partition(": ")
-        problems.extend([file.problem(name, expected, value=False)])
-        problems.stop()
-        raise
+    model = made(
+        problems,
+        file,
+        "small model",
+        lambda: SmallModel(**arrays, supports=supports, forces=forces, unbalance=unbalance, bow=bow),
+    )
+    model = problems.need(model)
     held = float(model.stiffness.sum())
     if abs(held) > _HELD * np.abs(model.stiffness).max() and (supports or forces):
         warnings.warn(
@@ -182,24 +187,10 @@ def small_equations(path: Path, problems: Problems) -> dict[str, Any] | None:
     except (ValueError, TypeError) as error:
         problems.add(str(path), None, "equations", None, str(error))
         return None
-    for key, value in more.items():
-        added = isinstance(value, dict) and key != "outputs"
-        equations[key] = {**equations.get(key, {}), **value} if added else value
+    for name, value in more.items():
+        added = isinstance(value, dict) and name != "outputs"
+        equations[name] = {**equations.get(name, {}), **value} if added else value
     return equations
-
-
-def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
-    """The file that `read_small_model` reads; numbers keep all their digits.
-
-    Raises
-    ------
-    ValueError
-        For a support whose coefficients depend on speed: they stand in a file of their own.
-    """
-    files = small_model_files(Path("small.toml"), model, comments)
-    if len(files) > 1:
-        raise ValueError("coefficients of a support depend on speed: they stand in a file of their own")
-    return files[Path("small.toml")]
 
 
 def small_model_files(
@@ -209,24 +200,20 @@ def small_model_files(
 
     `equations` is the table of that name.
     """
-    import tomli_w
-
-    lines = [*(f"# {comment}" for comment in comments), f"schema_version = {SCHEMA_VERSION}"]
-    for name, key in ARRAYS.items():
-        array = np.array(getattr(model, name))
-        if array.ndim == 1:
-            lines.append(f"{key} = {array.tolist()}")
-        elif array.any() or name == "stiffness":
-            lines += [f"{key} = [", *(f"  {row}," for row in array.tolist()), "]"]
+    arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
     tables, files = support_tables(model.supports, path, ordered=True)
-    tables |= force_tables(model.forces)
-    for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m")):
-        tables[name] = [
-            {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
-            for node, value in getattr(model, name).items()
-        ]
-    for name, sections in tables.items():
-        lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
-    if equations:
-        lines.append(f"\n{tomli_w.dumps({'equations': equations}).strip()}")
-    return {**files, path: ("\n".join(lines) + "\n").encode("utf-8")}
+    data: dict[str, Any] = {
+        **{key: array.tolist() for key, array in arrays.items() if array.any()},
+        **tables,
+        **force_tables(model.forces),
+        **{
+            name: [
+                {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
+                for node, value in getattr(model, name).items()
+            ]
+            for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m"))
+        },
+        "equations": equations,
+    }
+    written = toml_bytes({name: part for name, part in data.items() if part}, comments)
+    return {**files, path: written}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fem import Rotor
-from rotorid.base.arrays import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
@@ -35,10 +35,9 @@ def node_at(table: Table, stem: str, index: int, rotor: Rotor | SmallModel) -> i
 
     if not (name := table.texts(stem)[index]):
         return None
-    whole = isinstance(rotor, Rotor)
-    nodes, stations = (range(1, rotor.n_nodes + 1), rotor.stations) if whole else (rotor.nodes, {})
+    nodes: Collection[int] = range(1, rotor.n_nodes + 1) if isinstance(rotor, Rotor) else rotor.nodes
     try:
-        return node_number(name, nodes, stations)
+        return node_number(name, nodes, getattr(rotor, "stations", {}))
     except ValueError as error:
         table.complain(index, stem, str(error))
         return None
@@ -122,7 +121,7 @@ def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
 
 
 def _vectors(
-    table: Table, where: str | None, size: np.ndarray, rotor: Rotor | SmallModel
+    table: Table, where: str | None, size: FloatArray, rotor: Rotor | SmallModel
 ) -> tuple[Sequence[int], ComplexArray]:
     """Nodes of the rows, and sizes with their angles; problems are noted."""
     angle = table.numbers("angle")

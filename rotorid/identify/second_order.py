@@ -120,7 +120,9 @@ def second_order(  # noqa: PLR0913
         # forces of the rates of what has a mass stand on the right, those of the others here
         entries, what = (c, "damping") if j in light else (m, "mass")
         if i not in light or j in light:
-            row, column = (places.index(x if at in light else f"v_{x}") for at, x in ((i, dofs[i]), (j, dofs[j])))
+            row, column = (
+                places.index(x if at in light else f"v_{x}") for at, x in ((i, dofs[i]), (j, dofs[j]))
+            )
             where = f"{what} matrix, row {i + 1}"
             inertia[row, column] = read_expression(entries[i][j], where, estimate, plain.known)
     model = replace(plain, inertia=tuple(inertia))

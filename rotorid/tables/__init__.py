@@ -13,11 +13,20 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.model import HarmonicFile as HarmonicFile
+    from rotorid.files.model import read_harmonic_model as read_harmonic_model
+    from rotorid.files.model import read_ode_model as read_ode_model
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
+    from rotorid.files.rotor import read_rotor as read_rotor
+    from rotorid.files.rotor import rotor_files as rotor_files
+    from rotorid.files.rotor_writing import write_rotor as write_rotor
     from rotorid.files.runs import read_trials as read_trials
+    from rotorid.files.small_model import read_small_model as read_small_model
     from rotorid.files.table_writing import write_table as write_table
+    from rotorid.files.unbalance import read_bow as read_bow
+    from rotorid.files.unbalance import read_unbalance as read_unbalance
     from rotorid.tables.data.measurements import read_measurements as read_measurements
     from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
@@ -26,15 +35,6 @@ if TYPE_CHECKING:
     from rotorid.tables.job.job_file import Job as Job
     from rotorid.tables.job.job_file import job_from_files as job_from_files
     from rotorid.tables.job.job_file import read_job as read_job
-    from rotorid.files.model import HarmonicFile as HarmonicFile
-    from rotorid.files.model import read_harmonic_model as read_harmonic_model
-    from rotorid.files.model import read_ode_model as read_ode_model
-    from rotorid.files.small_model import read_small_model as read_small_model
-    from rotorid.files.unbalance import read_bow as read_bow
-    from rotorid.files.rotor import read_rotor as read_rotor
-    from rotorid.files.rotor import rotor_files as rotor_files
-    from rotorid.files.rotor_writing import write_rotor as write_rotor
-    from rotorid.files.unbalance import read_unbalance as read_unbalance
     from rotorid.tables.runs.influence_table import influence_frame as influence_frame
     from rotorid.tables.runs.influence_table import read_influence as read_influence
     from rotorid.tables.runs.influence_table import write_influence as write_influence

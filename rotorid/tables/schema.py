@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
+from rotorid.files.rotor import RotorFile
 from rotorid.files.settings import Settings, settings_schema
 from rotorid.files.settings_keys import Key, file_schema
-from rotorid.tables.job.job_keys import JOB
 from rotorid.files.small_model import SmallModelFile
-from rotorid.files.rotor import RotorFile
+from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.study_file import STUDY
 from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
 

@@ -14,10 +14,10 @@ from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.files import units, value_kinds
 from rotorid.files.problems import InputError, Problems
+from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings_keys import Key, Kind, Said, take
 from rotorid.files.toml_file import Section, read_toml
 from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
-from rotorid.files.rotor import read_rotor, rotor_files
 
 if TYPE_CHECKING:
     from fem import Rotor
