@@ -42,10 +42,11 @@ def _two(value: object) -> object:
     return tuple(value) if isinstance(value, list) else (value,)
 
 
+_Two = Field(min_length=1, max_length=2)
 OneOrTwo = Annotated[
     tuple[NotNegative, ...],
-    BeforeValidator(_two, json_schema_input_type=float | list[float]),
-    Field(min_length=1, max_length=2),
+    BeforeValidator(_two, json_schema_input_type=float | Annotated[list[float], _Two]),
+    _Two,
 ]
 
 

@@ -54,7 +54,11 @@ _FIELDS: dict[str, tuple[str, Mapping[str, units.Unit] | None, str]] = {
         "of the spring that centres it; default: none",
     ),
     "stiffness": ("stiffness_N_per_m", units.STIFFNESS, "stiffness at the centre, or of the contact"),
-    "damping": ("damping_N_s_per_m", units.DAMPING, "damping, likewise; internal damping turns with the shaft"),
+    "damping": (
+        "damping_N_s_per_m",
+        units.DAMPING,
+        "damping, likewise; internal damping turns with the shaft",
+    ),
     "fluid_mass": ("fluid_mass_kg", units.MASS, "inertia of the fluid that turns in it; default: none"),
     "swirl_ratio": ("swirl_ratio", None, "mean speed τ₀ of the fluid by the shaft's, about 0.5 or less"),
     "stiffness_exponent": ("stiffness_exponent", None, "n, default 2"),
@@ -114,7 +118,7 @@ def node_number(value: int | str, nodes: Collection[int], stations: Mapping[str,
         return number
     if isinstance(nodes, range):
         hint = did_you_mean(str(value), stations)
-        raise ValueError(f"a node, a number from 1 to {nodes.stop - 1}, or the name of a station{hint}")
+        raise ValueError(f"a node from 1 to {nodes.stop - 1} or a station{hint}")
     raise ValueError(f"one of the nodes {listing(map(str, nodes))}")
 
 

@@ -64,6 +64,12 @@ def _expression(value: object) -> object:
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
 
 
+def _two(value: object) -> object:
+    if isinstance(value, list) and len(value) == 2 and not any(isinstance(one, (bool, str)) for one in value):
+        return tuple(value)
+    raise ValueError("two numbers: [lowest, highest], or [value, standard deviation above 0]")
+
+
 def _estimates(value: object) -> object:
     """Names without starting values have None."""
     if not isinstance(value, list):
@@ -78,6 +84,8 @@ Text = Annotated[float | str, PlainValidator(_expression, json_schema_input_type
 Texts = dict[Name, Text]
 Matrix = list[list[Text]]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
+Std = Annotated[Number, Field(ge=1e-30)]
+Two = BeforeValidator(_two, json_schema_input_type=list[float])
 Estimates = Annotated[
     dict[Name, Number | None],
     BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
@@ -146,8 +154,10 @@ class ModelFile(Settings):
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
     per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
-    bounds: dict[str, tuple[Limit, Limit]] = key("name = [lowest, highest], `inf` for none", default={})
-    prior: dict[str, tuple[Number, Positive]] = key(
+    bounds: dict[str, Annotated[tuple[Limit, Limit], Two]] = key(
+        "name = [lowest, highest], `inf` for none", default={}
+    )
+    prior: dict[str, Annotated[tuple[Number, Std], Two]] = key(
         "name = [value, standard deviation]: what is known of it beside the data", default={}
     )
     start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
@@ -165,7 +175,8 @@ class ModelFile(Settings):
                     yield other, f"equations, matrices or states: nothing of this name beside {form}"
         rows = [row for matrix in (self.M, self.K, self.damping) for row in matrix]
         if len({len(self.M), len(self.K), len(self.damping), len(self.names), *map(len, rows)}) > 1:
-            yield "M", 'square matrices M, K and perhaps C of one size, such as M = [["a", 0], [0, 2.5]]'
+            example = 'M = [["a", 0], [0, 2.5]]'
+            yield "M", f"square matrices M, K and perhaps C of one size, with a name for each row: {example}"
 
     @property
     def names(self) -> list[str]:
@@ -266,7 +277,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         used = {name for text in equations for name in _words(text)}
         at_start = {name for text in file.initial.values() for name in _words(str(text))} - used
         if lost := [name for name in estimate if name in at_start]:
-            words = f"{listing(lost, 'and')} stand in initial values only, which amplitudes do not show"
+            stands = f"{listing(lost, 'and')} {'stands' if len(lost) == 1 else 'stand'}"
+            words = f"{stands} in initial values only, which amplitudes do not show"
             warnings.warn(f"{path}: {words}: left out", TableWarning, stacklevel=4)
             estimate[:] = [name for name in estimate if name not in lost]
         inputs = [name for name in inputs if name in used]

@@ -6,9 +6,10 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from fem import (
     KINDS,
@@ -83,11 +84,9 @@ class Material(Settings):
 
     youngs_modulus: Positive = key("Young's modulus", "youngs_modulus_Pa", STEEL_MODULUS, units=units.MODULUS)
     density: NotNegative = key("density", "density_kg_per_m3", STEEL_DENSITY, units=units.DENSITY)
-    poisson_ratio: Number = key(
+    poisson_ratio: Annotated[Number, Field(gt=-1, le=0.5)] = key(
         "Poisson's ratio; where it is given, shear is counted unless `[model] shear = false`",
         default=STEEL_POISSON,
-        gt=-1,
-        le=0.5,
     )
     material_damping: NotNegative = key(
         "loss per stress rate: the stress is E (ε + τ dε/dt)", "material_damping_s", 0.0

@@ -95,7 +95,7 @@ BAD_UNBALANCE = [
     ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 1, 400]], "an angle from -360 to 360 degrees"),
     ([["plane", "mass_g", "angle_deg"], ["4", 1, 0]], "either a column unbalance_<unit>, or both"),
     ([["plane", "mass_g", "radius_mm", "unbalance_g_mm", "angle_deg"], ["4", 1, 1, 1, 0]], "either a column"),
-    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node: a node or a station"),
+    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node, not both: a node or a station"),
     ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "plane or node, not both"),
     ([["plane", "unbalance_gmm", "angle_deg"], ["4", 1, 0]], "unbalance_gmm"),
 ]  # fmt: skip

@@ -22,7 +22,7 @@ def test_a_bow_table(tmp_path):
     [
         (TABLE[:3], "three nodes or more"),
         ([*TABLE, ["3", 1, 0]], "no other row"),
-        ([*TABLE[:3], ["9", 1, 0]], "a node, a number from 1 to 5"),
+        ([*TABLE[:3], ["9", 1, 0]], "a node from 1 to 5"),
         ([*TABLE[:3], ["5", -1, 0]], "not below 0"),
         ([*TABLE[:3], ["5", 1, 400]], "-360 to 360"),
     ],

@@ -201,7 +201,7 @@ def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
     )
     path = saved(tmp_path, "m.toml", text)
     assert "v0" in read_ode_model(path).parameters
-    with pytest.warns(TableWarning, match=r"v0 stand in initial values only, .* left out"):
+    with pytest.warns(TableWarning, match=r"v0 stands in initial values only, .* left out"):
         file = read_harmonic_model(path)
     assert file.model.parameters == ("m", "d", "k")
 

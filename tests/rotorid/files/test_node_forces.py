@@ -101,7 +101,7 @@ def test_bad_forces(file, kind, lines, key, words):
 @each_of("node", ["0", "5", '"NDE"', "1.5"])
 def test_a_node_that_is_none(file, node):
     with pytest.raises(
-        InputError, match=r"key internal_damping\[1\]\.node: .* a node(, a number from 1 to 4|: its number)"
+        InputError, match=r"key internal_damping\[1\]\.node: .* a node( from 1 to 4|: its number)"
     ):
         file(table("internal_damping", "damping_N_s_per_m = 1", node=node))
 

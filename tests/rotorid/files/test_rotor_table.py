@@ -240,7 +240,7 @@ BAD_FILES = [
     ("mass_kg = 4", "mass_kg = -4", "disc[1].mass_kg", "-4", "0 or more"),
     ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
     ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
-    ("node = 4", "node = 5", "bearing[1].node", "5", "a node, a number from 1 to 4"),
+    ("node = 4", "node = 5", "bearing[1].node", "5", "a node from 1 to 4 or a station"),
     ("node = 4", "node = 0", "bearing[1].node", "0", "a node: its number from 1"),
     ("node = 4", "", "bearing[1].node", None, "a node: its number from 1"),
     (
