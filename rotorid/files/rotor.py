@@ -385,7 +385,7 @@ def _warn_of_units(source: str, rotor: Rotor) -> None:
                 found.append((f"{place}{more}: {name} {value:.6g} {unit}", meant))
     bearings = [one for one in rotor.supports if one.kind == "bearing"]
     weight = 9.81 * rotor.total_mass / max(1, len(bearings))
-    for one in bearings:
+    for one in bearings if not found else ():  # nor is the mass then known
         stiffness = float(np.abs(one.table[0]).max())
         if 0 < stiffness < weight / _SAG:
             place = f"bearing at node {one.node}: {stiffness:.4g} N/m, which its share of the weight"

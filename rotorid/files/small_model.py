@@ -203,7 +203,7 @@ def small_model_files(
     arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
     tables, files = support_tables(model.supports, path, ordered=True)
     data: dict[str, Any] = {
-        **{key: array.tolist() for key, array in arrays.items() if array.any()},
+        **{key: array.tolist() for key, array in arrays.items() if array.any() or "shaft" in key},
         **tables,
         **force_tables(model.forces),
         **{
