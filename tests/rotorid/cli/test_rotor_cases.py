@@ -114,11 +114,6 @@ def test_peaks_are_those_of_the_model(cli, tmp_path):
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=2.1e5\n", "210000 Pa; is this in MPa?"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=210\n", "210 Pa; is this in GPa?"),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=7.8\n", "7.8 kg/m³; is this in g/cm³?"),
-        (
-            PLAIN[1:],
-            "[[disc]]\nnode=2\nmass_kg=490\n[[bearing]]\nnode=1\nstiffness_N_per_m=10\n",
-            "bearing at node 1: 10 N/m, which its share of the weight bends by 490 m; is this in N/mm?",
-        ),
         ([[250000, 40]] * 2, "[[bearing]]\nnode=1\nstiffness_N_per_m=1\n", "length 250 m; is this in"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=7e10\ndensity_kg_per_m3=2700\n", ""),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=0\n[[disc]]\nnode=2\nmass_kg=1\n", ""),
