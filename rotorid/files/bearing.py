@@ -41,11 +41,11 @@ COLUMNS = (
 def _two(value: object) -> object:
     if isinstance(value, list) and len(value) != 2:
         raise ValueError("a number, or two: [x, y]")
-    return tuple(value) if isinstance(value, list) else (value,)
+    return tuple(value) if isinstance(value, list) else (value, value)
 
 
 _Written = float | Annotated[list[float], Field(min_length=2, max_length=2)]
-OneOrTwo = Annotated[tuple[NotNegative, ...], BeforeValidator(_two, json_schema_input_type=_Written)]
+OneOrTwo = Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_two, json_schema_input_type=_Written)]
 
 
 class _SupportKeys(Place):
@@ -54,16 +54,16 @@ class _SupportKeys(Place):
     )
     kind: Literal["bearing", "seal"] = key("which it is, where it is another one", default="bearing")
     pedestal_mass: NotNegative = key("mass of what it stands on", "pedestal_mass_kg", 0.0, units=units.MASS)
-    pedestal_stiffness: OneOrTwo = key(
+    pedestal_stiffness: OneOrTwo | None = key(
         "its stiffness; one number, or two for x and y",
         "pedestal_stiffness_N_per_m",
-        (),
+        None,
         units=units.STIFFNESS,
     )
     pedestal_damping: OneOrTwo = key(
         "its damping; one number, or two for x and y",
         "pedestal_damping_N_s_per_m",
-        (0.0,),
+        (0.0, 0.0),
         units=units.DAMPING,
     )
     table: Text | None = key("a table of these coefficients over speed", default=None)
@@ -76,16 +76,16 @@ class _SupportKeys(Place):
     @property
     def pedestal(self) -> Pedestal | None:
         """What it stands on."""
-        pairs: list[Any] = [self.pedestal_stiffness, self.pedestal_damping]
-        pairs = [two if len(two) > 1 else two[0] for two in pairs if two]
-        return Pedestal(self.pedestal_mass, *pairs) if self.pedestal_stiffness else None
+        if self.pedestal_stiffness is None:
+            return None
+        return Pedestal(self.pedestal_mass, self.pedestal_stiffness, self.pedestal_damping)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A bearing that pushes outwards, and a pedestal of no stiffness."""
         for name, value in self.constants.items():
             if self.kind == "bearing" and name in _DIAGONAL and value < 0:
                 yield name, OUTWARDS
-        if not self.pedestal_stiffness and (self.pedestal_mass or any(self.pedestal_damping)):
+        if self.pedestal_stiffness is None and (self.pedestal_mass or any(self.pedestal_damping)):
             yield "pedestal_stiffness", "the stiffness of the pedestal"
 
 

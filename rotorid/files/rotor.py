@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
-    KINDS,
     SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
@@ -26,7 +25,6 @@ from fem import (
 )
 from fem.forces import kind_of
 from fem.parameters import expand
-from rotorid.base.registry import names
 from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached
@@ -107,10 +105,11 @@ class Station(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A name that means something else."""
-        if self.name.isdecimal():
-            yield "name", "a name, not a number, which would read as a node"
-        if {":", ","} & {*self.name}:
-            yield "name", "a name without ':' and ',', which separate names on the command line"
+        if self.name.isdecimal() or {":", ","} & {*self.name}:
+            yield (
+                "name",
+                "a name, not a number, without ':' and ',', which separate names on the command line",
+            )
 
 
 class DiscKeys(Place):
@@ -277,10 +276,16 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    parts = [data, *(one for kind in names(KINDS) if isinstance(data.get(kind), list) for one in data[kind])]
-    tables = [one.get(key) for one in parts if isinstance(one, dict) for key in ("shaft", "table")]
-    named = dict.fromkeys(name.strip() for name in tables if isinstance(name, str) and name.strip())
+    named = dict.fromkeys(name.strip() for name in _tables(data) if name.strip())
     return (path, *(path.parent / name for name in named))
+
+
+def _tables(data: object) -> Iterator[str]:
+    """Names of tables anywhere in a file."""
+    if isinstance(data, dict):
+        yield from (data[key] for key in ("shaft", "table") if isinstance(data.get(key), str))
+    for one in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _tables(one)
 
 
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
@@ -294,7 +299,8 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     length, diameter, inner = table.numbers("length"), table.numbers("diameter"), values("inner_diameter")
     elements = length != 0
     last = np.arange(len(length)) == len(length) - 1
-    table.must_be("length", (length > 0) | (last & ~elements), _LENGTH)
+    expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
+    table.must_be("length", (length > 0) | (last & ~elements), expected)
     short = too_short(np.where(elements, length, 0.0)) & (length > 0)
     table.must_be(
         "length", ~short, f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
@@ -325,16 +331,11 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     }
 
 
-_LENGTH = "a length above 0 (0 only in the last row, which attaches to the right end)"
-
-
 def _disc(item: DiscKeys, node: int, material: Material) -> Disc:
-    if item.width is None or item.outer_diameter is None:
-        sizes = item.mass or 0.0, item.polar_inertia or 0.0, item.diametral_inertia or 0.0
-        return Disc(node, *sizes, item.name)
-    density = material.density if item.density is None else item.density
-    sizes = item.width, item.outer_diameter, item.inner_diameter or 0.0
-    return Disc.from_geometry(node, *sizes, density, item.name)
+    values = item.model_dump(exclude_none=True) | {"node": node}
+    if "mass" in values:
+        return Disc(**values)
+    return Disc.from_geometry(**{"density": material.density} | values)
 
 
 def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import FloatArray
@@ -35,14 +35,6 @@ def _numbers(value: object) -> FloatArray:
     raise ValueError("a list of finite numbers, one for each node, or a square matrix of them")
 
 
-def _nodes(value: object) -> tuple[int, ...]:
-    nodes = _numbers(value)
-    if (nodes % 1).any() or (nodes < 1).any() or len(np.unique(nodes)) < nodes.size:
-        raise ValueError("different whole numbers from 1 up")
-    return tuple(map(int, nodes.ravel()))
-
-
-Nodes = Annotated[tuple[int, ...], PlainValidator(_nodes, json_schema_input_type=list[int])]
 List = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[float])]
 Matrix = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[list[float]])]
 
@@ -64,8 +56,8 @@ class BowKeys(Place):
 class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
     """A small model; arrays in the order of `SmallModel`."""
 
-    nodes: Nodes = key(
-        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]"
+    nodes: tuple[Annotated[int, Field(ge=1)], ...] = key(
+        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]", min_length=1
     )
     masses: List = key(
         "mass at each node; 0 where only a force acts", "masses_kg", expected="a mass for each node"
