@@ -163,7 +163,7 @@ class ModelFile(Settings):
                 if self.has(other):
                     yield other, f"equations, matrices or states: nothing of this name beside {form}"
         for table in ("bounds", "prior", "start"):
-            for name in getattr(self, table).keys() - self.estimate.keys():
+            for name in sorted(getattr(self, table).keys() - self.estimate.keys()):
                 yield table, f"names of estimate; {name} is none{did_you_mean(name, self.estimate)}"
         for name, (low, high) in self.bounds.items():
             value = self.start.get(name, self.estimate.get(name))
@@ -258,50 +258,38 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         Where a parameter of a model in time has no influence on amplitudes.
     """
     path = Path(path)
-    file = _read(path)
     from rotorid.identify.amplitudes import AmplitudeErrors
     from rotorid.identify.equations import harmonic_model
 
-    estimate, errors = [*file.estimate], file.errors
-
-    def read(file: ModelFile) -> tuple[HarmonicModel, Sequence[str]]:
+    def read(file: ModelFile) -> HarmonicFile:
         equations, inputs, unseen = file.equations, file.inputs, list[str]()
+        estimate, errors = file.estimate, None
         if file.M:
             equations, inputs, unseen = _of_amplitudes(file)
             used = {name for text in equations for name in _words(text)}
-            if lost := [name for name in estimate if name not in used]:
-                words = (
-                    f"{listing(lost, 'and')}: in no equation of amplitudes, such as initial values: left out"
-                )
-                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=6)
-                estimate[:] = [name for name in estimate if name in used]
+            estimate = {name: value for name, value in estimate.items() if name in used}
+            if lost := listing(sorted(file.estimate.keys() - used), "and"):
+                words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
+                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
         if not equations:
             raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
         model = harmonic_model(
-            equations, known=file.known, estimate=estimate, inputs=inputs, varying=file.varying
+            equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
         )
         if file.M and model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "
                 "amplitudes, leave it out; one that excites must be a measured input"
             )
-        return model, unseen
+        if given := file.errors:
+            phase = math.radians(given.phase_deg)
+            errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
+        start = {name: value for name, value in estimate.items() if value is not None} | file.start
+        tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
+        bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
+        return HarmonicFile(model, bounds, guess, errors, path, tuple({*unseen} & {*model.outputs}), prior)
 
-    model, unseen = whole(file, "model of amplitudes", read)
-
-    def stated(errors: AmplitudeErrorKeys) -> AmplitudeErrors:
-        return AmplitudeErrors(errors.amplitude_percent / 100, math.radians(errors.phase_deg), errors.floor)
-
-    start = {name: value for name, value in file.estimate.items() if value is not None} | file.start
-    return HarmonicFile(
-        model,
-        {name: limits for name, limits in file.bounds.items() if name in estimate},
-        {name: value for name, value in start.items() if name in estimate},
-        whole(errors, "error", stated) if errors else None,
-        path,
-        tuple({*unseen} & {*model.outputs}),
-        {name: known for name, known in file.prior.items() if name in estimate},
-    )
+    return whole(_read(path), "model of amplitudes", read)
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -340,40 +328,34 @@ def read_ode_model(path: str | Path) -> OdeModel:
     InputError
         With the problems of the file, each with its key.
     """
-    file, problems = _read(Path(path)), Problems()
-    if file.equations or file.varying:
-        expected = "[states], or M and K: equations and varying are of amplitudes, for `rotorid identify`"
-        problems.extend([file.problem("equations", expected)])
-    start = file.estimate | file.start
-    if lost := [name for name, value in start.items() if value is None]:
-        expected = f"[estimate] with name = starting value, {lost[0]} = 1.0"
-        problems.extend([file.problem("estimate", expected)])
-    problems.stop()
     from rotorid.identify.ode import ode_model, with_nuisance
     from rotorid.identify.second_order import second_order
 
-    outputs = {name: str(text) for name, text in file.outputs.items()}
-    if extra := file.nuisance:
-        outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
-        outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
-    else:
-        factors = []
-    given: dict[str, Any] = {
-        "initial": file.initial,
-        "outputs": outputs or None,
-        "estimate": start | dict.fromkeys(factors, 0.0),
-        "known": file.known,
-        "inputs": file.inputs or (),
-        "bounds": file.bounds,
-        "per_record": [*file.per_record, *factors],
-    }
-
-    def model(file: ModelFile) -> OdeModel:
+    def read(file: ModelFile) -> OdeModel:
+        if file.equations or file.varying:
+            raise ValueError("[states], or M and K; equations are of amplitudes, for `rotorid identify`")
+        start = file.estimate | file.start
+        if lost := [name for name, value in start.items() if value is None]:
+            raise ValueError(f"no starting value of {lost[0]}: [estimate] has name = starting value in time")
+        outputs, factors = {name: str(text) for name, text in file.outputs.items()}, list[str]()
+        if extra := file.nuisance:
+            outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
+            outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
+        given: dict[str, Any] = {
+            "initial": file.initial,
+            "outputs": outputs or None,
+            "estimate": start | dict.fromkeys(factors, 0.0),
+            "known": file.known,
+            "inputs": file.inputs or (),
+            "bounds": file.bounds,
+            "per_record": [*file.per_record, *factors],
+        }
         if not file.M:
             return ode_model({name: str(text) for name, text in file.states.items()}, **given)
         return second_order(file.M, file.damping, file.K, names=file.names, force=file.force, **given)
 
-    return replace(whole(file, "model", model), prior=file.prior)
+    file = _read(Path(path))
+    return replace(whole(file, "model", read), prior=file.prior)
 
 
 def _read(path: Path) -> ModelFile:
@@ -413,7 +395,7 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
         *((text, {*states, *inputs}) for text in texts),
     ]:
         if isinstance(text, str):
-            for name in expressions.names(expressions.parse(text)) - constants - allowed:
+            for name in sorted(expressions.names(expressions.parse(text)) - constants - allowed):
                 raise ValueError(
                     f"{name} in {text!r} has no meaning for amplitudes: M, C and K hold parameters and known "
                     "numbers, the same in all tests; what changes with the time t must be a measured input"
@@ -433,7 +415,7 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
             more[output] = str(text)
     unseen, strange = [x for x in y if x not in put], force.keys() - {*y}
     names = [*constants, *inputs, *file.outputs, *unseen]
-    wrong = [name for name in names if name == "p" or names.count(name) > 1] + [*strange]
+    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(strange)
     if wrong:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"

@@ -231,7 +231,7 @@ def test_a_model_file(model_file):
             ["key bounds", "with its starting value between"],
         ),
         ('b"]\n', 'b"]\n[start]\ncc = 2\n', ["key start", "cc is none"]),
-        ('b"]\n', 'b"]\n[errors]\n', ["key errors", "at least one"]),
+        ('b"]\n', 'b"]\n[errors]\n', ["state at least one error"]),
         ('b"]\n', 'b"]\n[errors]\nphase_deg = -1\n', ["key errors.phase_deg"]),
         ("equations = [", "equations = [3, ", ["key equations", "a text in quotes"]),
     ],
