@@ -108,8 +108,8 @@ class BalanceOptions:
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
         from rotorid.commands.app import check_targets
+        from rotorid.files.job_excel import template_bytes
         from rotorid.files.table_writing import write_bytes
-        from rotorid.tables.job.workbook_template import template_bytes
 
         if self.template is None:
             if not job:

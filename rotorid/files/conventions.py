@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from rotorid.base.words import Angles as Angles
 from rotorid.base.words import Phase as Phase
 from rotorid.base.words import Rotation as Rotation
 from rotorid.base.words import View as View
-from rotorid.files.settings_keys import Said
+
+if TYPE_CHECKING:
+    from rotorid.files.job_models import Columns
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 ANGLES: tuple[Angles, ...] = get_args(Angles)
@@ -69,7 +71,7 @@ class Conventions:
     labels: Labels = field(default_factory=Labels)
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
-    columns: Said | None = None
+    columns: Columns | None = None
     speed: tuple[str, float] | None = None
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -37,9 +37,11 @@ from rotorid.files.headings import (
 )
 from rotorid.files.input_file import STANDARD_INPUT
 from rotorid.files.problems import Problems
-from rotorid.files.settings_keys import Said
 from rotorid.files.text_file import cells_of_line, decode, parse_text, read_bytes
 from rotorid.files.units import UnitError, spelt
+
+if TYPE_CHECKING:
+    from rotorid.files.job_models import Columns
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
@@ -180,7 +182,7 @@ def read_runs_grids(
     return known if len(known) == len(grids) else None
 
 
-def stated_phase(source: Source, columns: Said | None = None) -> Phase | None:
+def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
     named, words = _names_of(columns), set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
@@ -216,7 +218,7 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
 def _read_one(source: Source, conventions: Conventions, problems: Problems, *, first: bool) -> Grid | None:
     named = _names_of(conventions.columns)
     grid = open_table(source, named, problems, first=first)
-    if grid is None or not _are_there(named, grid, conventions):
+    if grid is None or not _are_there(conventions.columns, grid, problems):
         return None
     try:
         return _as_runs_table(grid, named, conventions)
@@ -225,24 +227,21 @@ def _read_one(source: Source, conventions: Conventions, problems: Problems, *, f
         return None
 
 
-def _names_of(columns: Said | None) -> dict[str, str]:
+def _names_of(columns: Columns | None) -> dict[str, str]:
     """Names of a runs table by the names that the job says its file has."""
-    stated = {} if columns is None else columns
-    return dict(
-        (v, k) if isinstance(v, str) else (v.value, v.key) for k, v in stated.items() if v is not None
-    )
+    stated = {} if columns is None else columns.in_file()
+    return {name: columns.written(field) for name, field in stated.items() if columns is not None}
 
 
-def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -> bool:
+def _are_there(columns: Columns | None, grid: Grid, problems: Problems) -> bool:
     """Whether the file has the columns that the job names; else a problem of the job."""
-    if conventions.columns is None:
-        return True
-    section, there = conventions.columns.section, [name for name in grid.header if name]
-    for name, key in named.items():
-        if name not in there and key not in there and key not in section.refused:
+    there, before = [name for name in grid.header if name], len(problems)
+    for name, field in columns.in_file().items() if columns else ():
+        if columns and name not in there and columns.written(field) not in there:
             known = f"its columns are {listing(there, 'and')}"
-            section.complain(key, f"a column of {grid.source}{did_you_mean(name, there)}; {known}")
-    return not section.refused
+            expected = f"a column of {grid.source}{did_you_mean(name, there)}; {known}"
+            problems.extend([columns.problem(field, expected)])
+    return len(problems) == before
 
 
 def _as_runs_table(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:

@@ -249,8 +249,11 @@ def _which_mm_s(table: Table) -> tuple[str, ...]:
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
     """Amplitudes that look like angles beside phases that look like amplitudes, unless the job names both."""
     stated = conventions.columns
-    named = {} if stated is None else {key for key, value in stated.items() if value is not None}
-    if "amplitude" in named or table.unit("phase").name != "deg" or len(table) < 4:
+    if (
+        (stated is not None and stated.has("amplitude"))
+        or table.unit("phase").name != "deg"
+        or len(table) < 4
+    ):
         return
     amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
     phase, written = np.degrees(table.numbers("phase")), table.steps("phase")

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -36,7 +38,7 @@ from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files.decimal_numbers import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.problems import Problem, Problems
-from rotorid.files.units import Unit, UnitError, UnitReader
+from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Where = Mapping[str, tuple[str, int, str]]
@@ -63,21 +65,6 @@ _WORDS = {
     "too_long": "at most {max_length:,}, not {actual_length:,}",
 }
 """What is expected, by the beginning of the type of pydantic's error."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number (or several) with the key that holds it and its unit, see `of`."""
-
-    key: str
-    value: Any
-    unit: Unit
-    wrong: str = ""
-
-    @property
-    def si(self) -> float:
-        """In SI."""
-        return self.unit.to_si(self.value)
 
 
 class of:
@@ -194,8 +181,8 @@ class _Table:
             at = at.rpartition(".")[0]
         source, row, column = self.where.get(at, (self.source, None, dotted or None))
         shown = str(value).lower() if isinstance(value, bool) else str(value)
-        hidden = value is None or isinstance(value, (dict, list, tuple))
-        return Problem(source, row, column, None if hidden else shown, expected)
+        shown = "a table" if isinstance(value, dict) else shown
+        return Problem(source, row, column, None if value is None else shown, expected)
 
     def key(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
@@ -374,10 +361,8 @@ def _problems(
             known = {} if table.model is None else table.model.keys()
             trail.append((table, table.written.get(str(step), str(step)), known.get(str(step), Key())))
             step = trail[-1][1]
-        try:
+        with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
             node = node[step]
-        except (LookupError, TypeError):
-            break
     wrong = error.get("ctx", {}).get("error")
     if isinstance(wrong, _DoNotFit):
         table = wrong.table
@@ -438,7 +423,7 @@ def _parts(value: object) -> object:
     return tuple(value) if isinstance(value, list) else (value,)
 
 
-def _entries(value: object) -> object:
+def entries(value: object) -> object:
     """A table, or a text such as `3: 10; 5: 20`."""
     if not isinstance(value, str):
         return value
@@ -477,17 +462,18 @@ Label = Annotated[
 Date = Annotated[datetime.date, BeforeValidator(_day, json_schema_input_type=datetime.date)]
 
 
-def listed(inner: Any) -> Any:  # noqa: ANN401  an annotation
-    """The type of a list that may also be one value, or a text of values with semicolons."""
+def listed(inner: Any, check: Callable[[Any], Any] = tuple) -> Any:  # noqa: ANN401  an annotation
+    """The type of a list, checked, that may also be one value, or a text of values with semicolons."""
     several = Field(min_length=1)
     written = inner | Annotated[list[inner], several] | str
-    return Annotated[tuple[inner, ...], BeforeValidator(_parts, json_schema_input_type=written), several]
+    parts = BeforeValidator(_parts, json_schema_input_type=written)
+    return Annotated[tuple[inner, ...], parts, several, AfterValidator(check)]
 
 
 def by_name(inner: Any) -> Any:  # noqa: ANN401
     """The type of a table of values by name that may also be a text, such as `3: 10; 5: 20`."""
     table = Annotated[dict[str, inner], Field(min_length=1)]
-    return Annotated[table, BeforeValidator(_entries, json_schema_input_type=table | str)]
+    return Annotated[table, BeforeValidator(entries, json_schema_input_type=table | str)]
 
 
 def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files.toml_file import Section
+from rotorid.files.units import Quantity as Quantity
 from rotorid.files.units import Unit, UnitError, UnitReader
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -43,19 +44,6 @@ class Kind:
     example: str = ""
     cell: Literal["number", "name", "words", "flag", "date"] = "number"
     header: str = "{}"
-
-
-class Quantity(NamedTuple):
-    """A number (or several) with the key that holds it and its unit."""
-
-    key: str
-    value: Any
-    unit: Unit
-
-    @property
-    def si(self) -> float:
-        """In SI."""
-        return self.unit.to_si(self.value)
 
 
 @dataclass(frozen=True)

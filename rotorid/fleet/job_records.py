@@ -9,10 +9,10 @@ import numpy as np
 
 from balancing import Influence, Labels, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.files.job import Job
 from rotorid.files.units import vibration
 from rotorid.fleet.machine_type import MachineRecord
 from rotorid.tables.fleet.fleet_tables import Columns, JobRows
-from rotorid.tables.job.job_data import Job
 
 QUANTITIES = {"length": "displacement", "velocity": "velocity", "acceleration": "acceleration"}
 """Of a reading, by the kind of its unit."""

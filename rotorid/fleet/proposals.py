@@ -28,7 +28,7 @@ def proposed(job: Job, influence: Influence, runs: Trials | None = None) -> Corr
         [plane for plane in influence.planes if plane not in job.left_out],
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,
-        remove=sorted(job.remove),
+        remove=job.removed,
     )
 
 

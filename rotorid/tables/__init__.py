@@ -13,6 +13,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.job import Job as Job
+    from rotorid.files.job import job_from_files as job_from_files
+    from rotorid.files.job import read_job as read_job
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
@@ -23,9 +26,6 @@ if TYPE_CHECKING:
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
     from rotorid.tables.data.modes_table import read_modes as read_modes
     from rotorid.tables.data.records import read_record as read_record
-    from rotorid.tables.job.job_file import Job as Job
-    from rotorid.tables.job.job_file import job_from_files as job_from_files
-    from rotorid.tables.job.job_file import read_job as read_job
     from rotorid.tables.models.harmonic_file import HarmonicFile as HarmonicFile
     from rotorid.tables.models.harmonic_file import read_harmonic_model as read_harmonic_model
     from rotorid.tables.models.ode_file import read_ode_model as read_ode_model
@@ -45,9 +45,9 @@ _HOME = {
     "read_compliance": "data.modes_table",
     "read_modes": "data.modes_table",
     "read_record": "data.records",
-    "Job": "job.job_file",
-    "job_from_files": "job.job_file",
-    "read_job": "job.job_file",
+    "Job": ".files.job",
+    "job_from_files": ".files.job",
+    "read_job": ".files.job",
     "HarmonicFile": "models.harmonic_file",
     "read_harmonic_model": "models.harmonic_file",
     "read_ode_model": "models.ode_file",

@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
+from rotorid.files.job_models import JobSettings
+from rotorid.files.settings import Settings, settings_schema
 from rotorid.files.settings_keys import Key, file_schema
-from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.models.small_model_file import SMALL_MODEL
 from rotorid.tables.rotor.rotor_file import ROTOR
 from rotorid.tables.study_file import STUDY
 from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
 
-FILES: dict[str, tuple[str, Sequence[Key]]] = {
-    "job": ("Job file of rotorid", JOB),
+FILES: dict[str, tuple[str, Sequence[Key] | type[Settings]]] = {
+    "job": ("Job file of rotorid", JobSettings),
     "rotor": ("Rotor file of rotorid", ROTOR),
     "small": ("Small model for motion of rotorid", SMALL_MODEL),
     "study": ("Study file of rotorid", STUDY),
@@ -37,4 +38,4 @@ def schema(kind: str) -> dict[str, Any]:
         For another kind.
     """
     title, keys = FILES[one_of(kind, "schema", list(FILES))]
-    return file_schema(keys, title)
+    return settings_schema(keys, title) if isinstance(keys, type) else file_schema(keys, title)

@@ -87,17 +87,16 @@ def _balance(job: str, version: int, kind: str) -> Balance:
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run."""
+    from rotorid.files.job import Overrides, job_of
+    from rotorid.files.job_excel import open_job
     from rotorid.files.problems import Problems
-    from rotorid.tables.job.job_data import Overrides
-    from rotorid.tables.job.job_from_excel import open_job
-    from rotorid.tables.job.job_reading import job_of
 
     problems = Problems()
     written = open_job(path, problems)
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
-    return job_of(path, written.top(problems), written.tables, Overrides(), problems)
+    return job_of(written, Overrides(), problems)
 
 
 def told(outcome: Outcome) -> dict[str, Any]:

@@ -15,11 +15,11 @@ from rotorid.files import weights as weights_table
 from rotorid.files.columns import REMARKS, column_of
 from rotorid.files.decimal_numbers import decimal_comma, has_decimal_comma
 from rotorid.files.grid import Grid, clean, show
+from rotorid.files.job_excel import TEXT_COLUMNS
+from rotorid.files.job_models import READINGS
 from rotorid.files.layout import text_from_header
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.text_file import SEP_LINE, decode_as, parse_text
-from rotorid.tables.job.job_keys import READINGS
-from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""

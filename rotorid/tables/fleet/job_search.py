@@ -17,10 +17,10 @@ from typing import Any
 
 from rotorid.files.excel_workbook import is_workbook
 from rotorid.files.input_file import file_content
+from rotorid.files.job_excel import SETTINGS
+from rotorid.files.job_models import TABLES
 from rotorid.files.problems import InputError, Problem, Problems
 from rotorid.files.toml_file import read_toml
-from rotorid.tables.job.job_from_excel import SETTINGS
-from rotorid.tables.job.job_keys import TABLES
 
 _OF_A_JOB = {*TABLES, "key_phasor", "speed_weights"}
 """Keys that only jobs have."""

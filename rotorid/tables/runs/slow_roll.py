@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,10 @@ from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import Conventions
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
-from rotorid.files.settings_keys import Said
 from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
+
+if TYPE_CHECKING:
+    from rotorid.files.job_models import Vector
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
@@ -67,7 +69,7 @@ class SlowRoll:
 
 
 def make_slow_roll(
-    said: Source | Mapping[str, Said], trials: Trials, conventions: Conventions, problems: Problems
+    said: Source | Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
 ) -> SlowRoll | None:
     """Slow-roll vectors for the sensors of a job, or None and problems.
 
@@ -85,7 +87,7 @@ def make_slow_roll(
     """
     before = len(problems)
     if isinstance(said, Mapping):
-        found: _Found | None = _from_vectors(said, trials, conventions)
+        found: _Found | None = _from_vectors(said, trials, conventions, problems)
     else:
         found = _from_file(said, trials, conventions, problems)
     if found is None or len(problems) > before:
@@ -112,22 +114,24 @@ class _Found(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-def _from_vectors(said: Mapping[str, Said], trials: Trials, conventions: Conventions) -> _Found:
+def _from_vectors(
+    said: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
+) -> _Found:
     """Vectors of the job file, for all speeds."""
     own = units.vibration(trials.labels.vibration_unit)
     vectors = np.zeros(len(trials.sensors), dtype=complex)
     for name, vector in said.items():
-        amplitude, phase = vector["amplitude"], vector["phase_deg"]
+        amplitude, phase = vector.amplitude, vector.phase
         if name not in trials.sensors:
             expected = (
                 f"a sensor of the runs table, not {name!r}{did_you_mean(name, trials.sensors)}; "
                 f"its sensors are {listing(trials.sensors, 'and')}"
             )
-            vector.section.refuse(expected)
-        elif amplitude is not None and phase is not None:
+            problems.extend([vector.problem("", expected)])
+        else:
             unit = amplitude.unit if amplitude.unit.name else own
             if unit.kind != own.kind:
-                vector.section.complain(amplitude.key, _other_unit(own.name))
+                problems.extend([vector.problem("amplitude", _other_unit(own.name))])
                 continue
             size, angle = np.array([unit.to_si(amplitude.value)]), np.array([np.radians(phase)])
             vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]
