@@ -324,11 +324,15 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
             tables[key], records = grid, (*records, *read)
             overrides = replace(overrides, phase=phase)
-    refused = len(problems)
-    readings = _readings(settings, tables, overrides, problems)
-    settings, rotor, model_files = _in_model(settings, written.folder, problems)
-    if readings is None or refused:
+    refused = len(problems) > 0
+    if not refused:
+        _need_rotation(settings, overrides.angles or settings.angles, problems)
+    elif "columns" in written.settings:  # by which the tables would be read
         problems.stop()
+    readings = _readings(settings, tables, overrides, problems)
+    if refused:
+        problems.stop()
+    settings, rotor, model_files = _in_model(settings, written.folder, problems)
     readings = problems.need(readings)
     trials, planes = _planes(settings, readings, rotor, problems)
     sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
@@ -390,6 +394,16 @@ def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Sou
     if files:
         tables["runs"] = files
     return tables, tuple(files)
+
+
+def _need_rotation(settings: JobSettings, angles: str | None, problems: Problems) -> None:
+    """Complain about directions without the rotation that they are seen against."""
+    seen = f"the {settings.view}" if settings.view else ""
+    if angles in ROTATIONS:
+        seen = f"the same end as the angles, which count {angles}"
+    if seen and settings.rotation is None:
+        expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from {seen}"
+        problems.extend([settings.problem("rotation", expected)])
 
 
 class _Readings(NamedTuple):
@@ -456,7 +470,7 @@ def conventions_of(
     """What the numbers of the tables mean: as the caller says, or the job, or the stored coefficients."""
     stored, rotation = stored or {}, settings.rotation
     phase, angles = overrides.phase or settings.phase, overrides.angles or settings.angles
-    clock = angles in ROTATIONS
+    clock = angles in ROTATIONS and rotation is not None
     if angles is not None:
         angles = None if rotation is None and angles not in ANGLES else resolve_angles(angles, rotation)
     labels = Labels(
@@ -567,6 +581,9 @@ def _planes(
             plane = planes.get(name, Plane())
             if plane.trial_radius is not None and plane.radius is not None:
                 factors[k] = plane.trial_radius / plane.radius
+            elif plane.trial_radius is not None:
+                expected = "the correction radius too, radius_mm, to which the trial weights are converted"
+                problems.extend([plane.problem("trial_radius", expected)])
     return replace(trials, weights=trials.weights * factors), planes
 
 
@@ -593,7 +610,9 @@ def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Prob
         hint = did_you_mean(name, known)
         expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
         if key == "planes" and not hint:
-            expected += f"; there is no trial weight in plane {name}: is a row of the weights table missing?"
+            expected += (
+                f"; there is no trial weight in plane {name!r}: is a row of the weights table missing?"
+            )
         problems.extend([replace(part.problem("", expected), value=name)])
 
 

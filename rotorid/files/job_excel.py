@@ -74,11 +74,12 @@ class WrittenJob:
     def read(self, problems: Problems) -> JobSettings:
         """All settings; a file that is named in place of a sheet is a problem."""
         source = "" if self.path is None else str(self.path)
-        settings = read_settings(JobSettings, self.settings, source, problems, self.where) or JobSettings()
+        read = read_settings(JobSettings, self.settings, source, problems, self.where)
+        settings = problems.need(read)
         if not self.tables and "runs" not in self.settings:
             problems.extend([settings.problem("runs", 'the runs table, runs = "runs.csv"')])
         for key in TABLES if self.tables and self.path else ():
-            if key in self.settings and (key in self.tables or key in TABLES[:2]):
+            if settings.has(key) and (key in self.tables or key in TABLES[:2]):
                 expected = f"the table in the sheet {key!r} of this workbook, not a file"
                 problems.extend([settings.problem(key, expected)])
         return settings

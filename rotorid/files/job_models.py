@@ -266,11 +266,6 @@ class Plane(_Placed):
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Radii and keys of holes that do not fit together."""
         yield from super().wrong()
-        if self.trial_radius is not None and self.radius is None:
-            yield (
-                "trial_radius",
-                "the correction radius too, radius_mm, to which the trial weights are converted",
-            )
         if self.holes is not None and self.holes_at is not None:
             yield "holes", "either holes, equally spaced, or holes_deg, their angles, not both"
             return
@@ -469,7 +464,7 @@ class JobSettings(Settings):
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
         default=None,
     )
-    angles: Angles | Rotation | None = key(
+    angles: Literal[Angles, Rotation] | None = key(
         "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
         "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
         default=None,
@@ -495,13 +490,3 @@ class JobSettings(Settings):
     machine_type: Label = key("its type, for the same", default="")
     date: Date | None = key("when it was balanced, for the same", default=None, example="2026-03-17")
     sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
-
-    def wrong(self) -> Iterator[tuple[str, str]]:
-        """Directions without the rotation that they are seen against."""
-        seen = ""
-        if self.angles in ("clockwise", "counter-clockwise"):
-            seen = f"the same end as the angles, which count {self.angles}"
-        elif self.view is not None:
-            seen = f"the {self.view}"
-        if seen and self.rotation is None:
-            yield "rotation", f"'clockwise' or 'counter-clockwise', how the rotor turns, seen from {seen}"

@@ -161,7 +161,7 @@ def key(
     )
 
 
-@dataclass
+@dataclass(eq=False)
 class _Table:
     """A table as it is written: its dotted name, keys and values, and each key by its usual name.
 
@@ -174,6 +174,10 @@ class _Table:
     data: dict[str, Any] = field(default_factory=dict)
     model: type[Settings] | None = None
     written: dict[str, str] = field(default_factory=dict)
+
+    def __eq__(self, other: object) -> bool:
+        """Where settings stand makes no difference."""
+        return isinstance(other, _Table)
 
     def problem(self, key: str, expected: str, value: object = None) -> Problem:
         dotted = at = f"{self.name}.{key}".strip(".")
@@ -357,12 +361,13 @@ def _problems(
     """The keys that are wrong, each with the table that holds it, and the problems in our words."""
     trail: list[tuple[_Table, str, Key]] = []
     for step in error["loc"]:
-        if (table := tables.get(id(node))) is not None:
+        table = tables.get(id(node), _Table())
+        name = table.written.get(str(step), step)
+        if name in table.data or (error["type"] == "missing" and table.model):
             known = {} if table.model is None else table.model.keys()
-            trail.append((table, table.written.get(str(step), str(step)), known.get(str(step), Key())))
-            step = trail[-1][1]
+            trail.append((table, str(name), known.get(str(step), Key())))
         with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
-            node = node[step]
+            node = node[name]
     wrong = error.get("ctx", {}).get("error")
     if isinstance(wrong, _DoNotFit):
         table = wrong.table

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from rotorid.tables import study_file
-from rotorid.tables.job import job_keys
+from rotorid.files import job_models
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 from rotorid.tables.waveforms import waveform_keys

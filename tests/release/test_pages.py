@@ -11,7 +11,7 @@ from golden.tolerances import TOLERANCES
 import rotorid
 from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, problems, toml_file
 from rotorid.identify import expressions
-from rotorid.tables.job.job_keys import MOST_HOLES
+from rotorid.files.job_models import MOST_HOLES
 from rotorid.tables.waveforms import array_files
 from rotorid.worksheet import app, server
 

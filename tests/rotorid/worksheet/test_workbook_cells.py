@@ -11,7 +11,7 @@ from workbook_jobs import as_workbook
 
 from rotorid.cli import app
 from rotorid.tables import read_job
-from rotorid.tables.job.workbook_template import template_bytes
+from rotorid.files.job_excel import template_bytes
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
 pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")

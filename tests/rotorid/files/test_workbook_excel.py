@@ -16,7 +16,7 @@ from workbook_jobs import differences, filled, rows
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.job.workbook_template import template_bytes
+from rotorid.files.job_excel import template_bytes
 
 BK = sample_data() / "bk_two_plane"
 FORM = ("runs", "weights", "planes", "sensors", "settings")

@@ -18,9 +18,8 @@ from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, as_workbook,
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import job_from_files, read_job, write_influence
-from rotorid.tables.job.job_from_excel import NAMED
-from rotorid.tables.job.job_keys import ERRORS, JOB
-from rotorid.tables.job.workbook_template import template_bytes
+from rotorid.files.job_excel import NAMED, template_bytes
+from rotorid.files.job_models import Errors, JobSettings
 
 DATA = sample_data()
 
@@ -92,7 +91,7 @@ def test_names_with_points_quotes_and_signs(tmp_path):
         (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
     text = "".join(f"[slow_roll.{json.dumps(n)}]\namplitude = 0.1\nphase_deg = 3\n" for n in names.values())
     _, back = there_and_back(write_job(tmp_path, text), tmp_path / "sheet.xlsx")
-    assert back.planes == ("#1.0", "#2.0")
+    assert tuple(back.planes) == ("#1.0", "#2.0")
     assert back.trials.sensors == ('3.5" probe', "#2 it's")
 
 
@@ -138,9 +137,9 @@ def with_values(path):
 
 def test_the_columns_of_the_form_are_keys():
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
-    for sheet, (first, keys) in NAMED.items():
+    for sheet, (first, model) in NAMED.items():
         names = [cell.value for cell in book[sheet][1] if cell.value not in (first, "note")]
         assert names
-        assert all(any(key.accepts(name) for key in keys) for name in names)
-    known = {key.name for key in JOB} | {f"errors.{key.name}" for key in ERRORS}
+        assert all(model.usual(name) in model.keys() for name in names)
+    known = {*JobSettings.keys(), *(f"errors.{name}" for name in Errors.keys())}
     assert {cell.value for cell in book["settings"]["A"][1:]} <= known

@@ -9,7 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 from balancing import Labels
 from rotorid.commands.option_quantities import limited
 from rotorid.tables import job_from_files, read_job
-from rotorid.tables.job.job_limits import _arc
+from rotorid.files.job import _arc
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]
@@ -61,7 +61,7 @@ def sensor(lines):
 
 def test_limits_and_weights_of_a_job_file(job):
     read = job()
-    assert read.planes == read.trials.planes == ("1", "2")
+    assert tuple(read.planes) == read.trials.planes == ("1", "2")
     assert (read.left_out, read.used, read.radii) == (("2",), ("1",), {"1": 0.15})
     np.testing.assert_array_equal(read.limits.max_weight, [0.02, np.inf])
     um_pp = 0.5e-6
