@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from rotorid.files.conventions import (
 )
 from rotorid.files.decimal_numbers import parse_number
 from rotorid.files.job_excel import WrittenJob, open_job
-from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor, Sheet
+from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import InputError, Problem, Problems
 from rotorid.files.runs import make_trials
@@ -139,7 +139,7 @@ class Job:
     machine, machine_type, date
         What was balanced, of which type, and when; empty and None where the job does not say.
     sheet
-        What it says for the balancing sheet.
+        What it says for the balancing sheet: `[sheet]`.
     """
 
     trials: Trials
@@ -161,7 +161,7 @@ class Job:
     machine: str = ""
     machine_type: str = ""
     date: datetime.date | None = None
-    sheet: Sheet = field(default_factory=Sheet)
+    sheet: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -373,7 +373,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             machine=settings.machine,
             machine_type=settings.machine_type,
             date=settings.date,
-            sheet=settings.sheet,
+            sheet=dict(settings.sheet),
         )
     )
 
@@ -610,9 +610,7 @@ def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Prob
         hint = did_you_mean(name, known)
         expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
         if key == "planes" and not hint:
-            expected += (
-                f"; there is no trial weight in plane {name!r}: is a row of the weights table missing?"
-            )
+            expected += f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
         problems.extend([replace(part.problem("", expected), value=name)])
 
 

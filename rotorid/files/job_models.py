@@ -281,7 +281,7 @@ class Plane(_Placed):
         if self.hole_names is not None and len(set(self.hole_names)) != count:
             yield (
                 "hole_names",
-                f"a different name for each of the {count} holes, not {len(self.hole_names)} names",
+                f"a different name for each of the {count} holes",
             )
             return
         yield from self._wrong_weights(names, sizes)

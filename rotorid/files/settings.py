@@ -364,7 +364,7 @@ def _problems(
         table = tables.get(id(node), _Table())
         name = table.written.get(str(step), step)
         if name in table.data or (error["type"] == "missing" and table.model):
-            known = {} if table.model is None else table.model.keys()
+            known = {str(step): trail[-1][2]} if table.model is None else table.model.keys()
             trail.append((table, str(name), known.get(str(step), Key())))
         with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
             node = node[name]

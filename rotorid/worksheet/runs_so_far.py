@@ -213,7 +213,10 @@ def _channels(
         if trials is None:
             return None
         trials = replace(trials, labels=conventions.on(trials.labels))
-        roll = None if slow is None else make_slow_roll(slow, trials, conventions, Problems())
+        its = slow
+        if isinstance(slow, Mapping):
+            its = {sensor: vector for sensor, vector in slow.items() if sensor in trials.sensors}
+        roll = None if its is None else make_slow_roll(its, trials, conventions, Problems())
         return trials if roll is None else subtract_slow_roll(trials, roll)
 
     whole = read(grid)

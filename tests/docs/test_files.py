@@ -8,13 +8,13 @@ from cases import each_of
 from keys_in_files import with_tables
 
 import rotorid
+from rotorid.files import job_excel as jobbook
+from rotorid.files import job_models as jobkeys
 from rotorid.files import runs, weights
 from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import FUNCTIONS
 from rotorid.samples import sample_data
 from rotorid.tables.data import modes_table as modes
-from rotorid.files import job_excel as jobbook
-from rotorid.files import job_models as jobkeys
 from rotorid.tables.rotor import bearing
 from rotorid.tables.rotor import bow_table as bow
 from rotorid.tables.rotor import rotor_table as rotor

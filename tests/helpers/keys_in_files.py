@@ -3,21 +3,22 @@
 import re
 from pathlib import Path
 
-from rotorid.tables import study_file
 from rotorid.files import job_models
+from rotorid.tables import study_file
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
 from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 from rotorid.tables.waveforms import waveform_keys
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
-    "key": job_keys.JOB,
-    "key of [errors]": job_keys.ERRORS,
-    "key of [key_phasor]": job_keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
-    "key of [columns]": job_keys.COLUMNS,
-    "key of [planes.NAME]": job_keys.PLANE,
-    "key of [sensors.NAME]": job_keys.SENSOR,
+    "key": job_models.JobSettings,
+    "key of [errors]": job_models.Errors,
+    "key of [key_phasor]": job_models.KeyPhasor,
+    "key of [slow_roll.SENSOR]": job_models.Vector,
+    "key of [columns]": job_models.Columns,
+    "key of [planes.NAME]": job_models.Plane,
+    "key of [sensors.NAME]": job_models.Sensor,
+    "key of [sheet]": job_models.Sheet,
     "key of a model file for harmonic tests": harmonic_file.HARMONIC,
     "key of a model file with states": ode_file.TIME_STATES,
     "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),
@@ -50,11 +51,28 @@ TABLES = {
 def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
+    if isinstance(keys, type):
+        return [*lines, *(field_line(keys, usual, key) for usual, key in keys.keys().items())]
     for key in keys:
         names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
         words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
         lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
     return lines
+
+
+def field_line(model, usual, key):
+    """The line of a field of a model: its choices or its example come from the schema."""
+    field = next(one for name, one in model.model_fields.items() if usual in (one.alias, name))
+    inner = repr(field.annotation)
+    head = "{}"
+    if "rotorid.files." in inner and "Quantity" not in inner:
+        head = "[{}.NAME]" if "dict[" in inner else "[[{}]]" if "list[" in inner else "[{}]"
+    head = "{}" if usual in ("slow_roll",) else head
+    names = ", ".join(f"`{head.format(name)}`" for name in key.names)
+    schema = model.model_json_schema(ref_template="{model}")["properties"].get(usual, {})
+    choices = [word for one in (schema, *schema.get("anyOf", ())) for word in one.get("enum", ())]
+    words = [f'"{word}"' for word in choices] or [str(one) for one in field.examples or ()]
+    return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words)} |"
 
 
 def with_tables(text):

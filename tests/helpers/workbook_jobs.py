@@ -16,8 +16,8 @@ import openpyxl
 from tables_data import RUNS
 
 from rotorid.files.grid import Shown
-from rotorid.files.job_models import TABLES
 from rotorid.files.job_excel import template_bytes
+from rotorid.files.job_models import TABLES
 
 SAMPLES = (
     "turbo_job/job",

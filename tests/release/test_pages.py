@@ -10,8 +10,8 @@ from golden.tolerances import TOLERANCES
 
 import rotorid
 from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, problems, toml_file
-from rotorid.identify import expressions
 from rotorid.files.job_models import MOST_HOLES
+from rotorid.identify import expressions
 from rotorid.tables.waveforms import array_files
 from rotorid.worksheet import app, server
 

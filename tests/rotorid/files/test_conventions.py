@@ -107,8 +107,8 @@ def test_what_cannot_be_understood(job, text, key, value, words):
 
 BAD_MARKS = [
     ("[key_phasor]\n", "key_phasor.angle_deg", None, "the direction of the key phasor"),
-    ("[key_phasor]\nangle_deg = 361\n", "key_phasor.angle_deg", "361", "a number from -360 to 360"),
-    ('[key_phasor]\nangle_deg = "x"\n', "key_phasor.angle_deg", "x", "a number, without quotes"),
+    ("[key_phasor]\nangle_deg = 361\n", "key_phasor.angle_deg", "361", "a number up to 360"),
+    ('[key_phasor]\nangle_deg = "x"\n', "key_phasor.angle_deg", "x", "a number"),
     ("[key_phasor]\nangle_deg = 3\nspeed = 2\n", "key_phasor.speed", "2", "a known key"),
 ]
 

@@ -9,8 +9,8 @@ import pytest
 from cases import each_of
 from jsonschema import Draft202012Validator
 
-from rotorid.samples import sample_data
 from rotorid.files.job_models import JobSettings, Plane
+from rotorid.samples import sample_data
 from rotorid.tables.schema import FILES, schema
 
 FILES_OF = {
@@ -58,7 +58,8 @@ def test_what_no_rotor_file_may_say_does_not_keep_to_it(text):
 def test_it_is_json_with_every_key_in_every_unit():
     found = json.loads(json.dumps(schema("job")))
     assert found["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert set(found["properties"]) == {"schema_version", *(name for key in JobSettings.keys().values() for name in key.variants)}
+    every = [name for key in JobSettings.keys().values() for name in key.variants]
+    assert set(found["properties"]) == {"schema_version", *every}
     planes = found["$defs"]["Plane"]
     assert set(planes["properties"]) == {name for key in Plane.keys().values() for name in key.variants}
     assert {"max_mass_lb", "max_unbalance_oz_in", "radius_in", "step_kg_m"} <= set(planes["properties"])

@@ -14,9 +14,9 @@ from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, wri
 from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
+from rotorid.files.job_excel import template_bytes
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.files.job_excel import template_bytes
 
 BK = sample_data() / "bk_two_plane"
 FORM = ("runs", "weights", "planes", "sensors", "settings")
@@ -136,12 +136,6 @@ def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, v
     found = complaints(read_job, write_book(tmp_path / "job.xlsx", changed))
     problem = the_only(found, "job.xlsx", row, column, shown, words)
     assert f"sheet {sheet!r}" in problem.file
-
-
-def test_a_number_with_comma_and_three_digits_beside_others(tmp_path):
-    planes = [["plane", "max_mass_g"], ["1", "1,250"], ["2", "7,5"]]
-    job = read_job(write_book(tmp_path / "job.xlsx", {**BOOK, "planes": planes}))
-    np.testing.assert_allclose(job.limits.max_weight, [1.25e-3, 7.5e-3], rtol=1e-12)
 
 
 def with_stored_values(path, values):

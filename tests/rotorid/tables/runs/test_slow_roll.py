@@ -188,9 +188,9 @@ BAD = [
         "one key of them",
     ),
     ("phase_deg = 35\n", "", "slow_roll.A.phase_deg", None, "the phase at slow speed"),
-    ("phase_deg = 35", "phase_deg = 400", "slow_roll.A.phase_deg", "400", "from -360 to 360"),
-    (VECTORS, "[slow_roll]\n", "slow_roll", None, "a table of vectors, [slow_roll.SENSOR]"),
-    (VECTORS, "slow_roll = 3\n", "slow_roll", "3", "a table of vectors, [slow_roll.SENSOR]"),
+    ("phase_deg = 35", "phase_deg = 400", "slow_roll.A.phase_deg", "400", "a number up to 360"),
+    (VECTORS, "[slow_roll]\n", "slow_roll", "a table", "a list with at least 1: vectors, [slow_roll.SENSOR]"),
+    (VECTORS, "slow_roll = 3\n", "slow_roll", "3", "a table, [slow_roll]: vectors, [slow_roll.SENSOR]"),
     (
         VECTORS,
         'slow_roll = "a\\tslow.csv"\n',
@@ -198,7 +198,7 @@ BAD = [
         "a\tslow.csv",
         "without control characters",
     ),
-    (VECTORS, 'slow_roll = " "\n', "slow_roll", " ", "a table of vectors, [slow_roll.SENSOR]"),
+    (VECTORS, 'slow_roll = " "\n', "slow_roll", " ", "a text in quotes: vectors, [slow_roll.SENSOR]"),
 ]
 
 
