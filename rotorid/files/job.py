@@ -373,7 +373,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             machine=settings.machine,
             machine_type=settings.machine_type,
             date=settings.date,
-            sheet=dict(settings.sheet),
+            sheet=settings.sheet.model_dump(),
         )
     )
 
