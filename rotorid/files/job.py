@@ -31,7 +31,7 @@ from rotorid.files.conventions import (
 )
 from rotorid.files.decimal_numbers import parse_number
 from rotorid.files.job_excel import WrittenJob, open_job
-from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor
+from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor, named_tables
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import InputError, Problem, Problems
 from rotorid.files.runs import make_trials
@@ -380,12 +380,8 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
     """What tables there are, by `TABLES`, and the files with one run each."""
-    named = {key: getattr(settings, key) for key in TABLES if key != "runs"}
-    if named["check_weights"] == WEIGHTS:
-        del named["check_weights"]
-    tables: dict[str, Source] = {
-        k: written.folder / name for k, name in named.items() if isinstance(name, str)
-    }
+    named = named_tables({key: getattr(settings, key) for key in TABLES})
+    tables: dict[str, Source] = {key: written.folder / name for key, name in named.items()}
     runs = tuple(written.folder / name for name in settings.runs or ())
     if runs:
         tables["runs"] = runs if len(runs) > 1 else runs[0]
@@ -403,7 +399,7 @@ def _need_rotation(settings: JobSettings, angles: str | None, problems: Problems
         seen = f"the same end as the angles, which count {angles}"
     if seen and settings.rotation is None:
         expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from {seen}"
-        problems.extend([settings.problem("rotation", expected)])
+        settings.complain(problems, "rotation", expected)
 
 
 class _Readings(NamedTuple):
@@ -423,13 +419,13 @@ def _readings(
     given = {*tables, *(key for key in (*TABLES, "rotor", "machine_type") if settings.has(key))}
     if "check_weights" in given and "check" not in given:
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
-        problems.extend([settings.problem("check_weights", expected)])
+        settings.complain(problems, "check_weights", expected)
     if not given & {"weights", "influence", "rotor", "machine_type"}:
         expected = (
             "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
             "whose coefficients come with balance --type"
         )
-        problems.extend([settings.problem("weights", expected)])
+        settings.complain(problems, "weights", expected)
     if "runs" not in tables:
         return None
     before = len(problems)
@@ -524,7 +520,7 @@ def _in_model(
             key = "station" if part.station else "node"
             if part.has(key):
                 expected = f'the rotor model of this {key} too, rotor = "rotor.toml"'
-                problems.extend([part.problem(key, expected)])
+                part.complain(problems, key, expected)
         return settings, None, ()
     from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
@@ -539,9 +535,9 @@ def _in_model(
         if part.station is not None and part.station not in stations:
             known, hint = listing(map(repr, stations), "and") or "none", did_you_mean(part.station, stations)
             expected = f"a station of the rotor model{hint}; its stations are {known}"
-            problems.extend([part.problem("station", expected)])
+            part.complain(problems, "station", expected)
         if part.node is not None and part.node > rotor.n_nodes:
-            problems.extend([part.problem("node", f"a node of the rotor model, from 1 to {rotor.n_nodes}")])
+            part.complain(problems, "node", f"a node of the rotor model, from 1 to {rotor.n_nodes}")
     placed = {
         kind: {
             name: part.model_copy(update={"node": stations.get(part.station or "", part.node)})
@@ -583,7 +579,7 @@ def _planes(
                 factors[k] = plane.trial_radius / plane.radius
             elif plane.trial_radius is not None:
                 expected = "the correction radius too, radius_mm, to which the trial weights are converted"
-                problems.extend([plane.problem("trial_radius", expected)])
+                plane.complain(problems, "trial_radius", expected)
     return replace(trials, weights=trials.weights * factors), planes
 
 
@@ -634,7 +630,7 @@ def _limits(
         if plane.max_weight is not None:
             size = in_job_units(plane.max_weight, labels.weight_unit, plane.radius)
             if size is None:
-                problems.extend([plane.problem("max_weight", other_kind("max", labels.weight_unit))])
+                plane.complain(problems, "max_weight", other_kind("max", labels.weight_unit))
             else:
                 most[k] = size[0]
     arcs = tuple(
@@ -679,10 +675,10 @@ def _at_speeds(
         if near is None:
             known = show_speeds(trials.speeds, unit)
             expected = f"speeds of the runs table, not {word}: there are {known}"
-            problems.extend([part.problem(key, expected)])
+            part.complain(problems, key, expected)
         elif near in seen:
             expected = f"each speed once; {seen[near]} and {word} count as one"
-            problems.extend([part.problem(key, expected)])
+            part.complain(problems, key, expected)
         else:
             seen[near] = word
             out[near] = number
@@ -704,7 +700,7 @@ def _holes(plane: Plane, k: int, labels: Labels, limits: Limits | None, problems
         made = () if quantity is None else in_job_units(quantity, labels.weight_unit, plane.radius)
         if made is None:
             expected = other_kind(plane.written(field_), labels.weight_unit)
-            problems.extend([plane.problem(field_, expected)])
+            plane.complain(problems, field_, expected)
             return None
         sizes[field_] = made
     turn = 180.0 if plane.remove else 0.0
@@ -713,7 +709,7 @@ def _holes(plane: Plane, k: int, labels: Labels, limits: Limits | None, problems
     kept = [name for name, angle in angles.items() if taken[name] > 0 or not _inside(angle, arcs)]
     key = "holes" if plane.holes is not None else "holes_at"
     if not any(taken[name] == 0 for name in kept):
-        problems.extend([plane.problem(key, "at least one free hole outside the angles of forbidden_deg")])
+        plane.complain(problems, key, "at least one free hole outside the angles of forbidden_deg")
         return None
     try:
         return from_list(
@@ -727,7 +723,7 @@ def _holes(plane: Plane, k: int, labels: Labels, limits: Limits | None, problems
             max_weight=largest,
         )
     except ValueError as error:
-        problems.extend([plane.problem(key, f"holes in which something can be mounted: {error}")])
+        plane.complain(problems, key, f"holes in which something can be mounted: {error}")
         return None
 
 

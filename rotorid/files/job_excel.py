@@ -12,25 +12,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from balancing import Influence
 from rotorid.base.suggestions import did_you_mean
+from rotorid.base.tables import LONGEST_TITLE
 from rotorid.base.text import listing
 from rotorid.files.columns import REMARKS, Source, sheet_source
 from rotorid.files.decimal_numbers import parse_number
 from rotorid.files.excel_pages import Line, Page, book_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
-from rotorid.files.grid import BadCell, Cell, Grid, Row, Shown, is_comment, make_grid, show
+from rotorid.files.grid import BadCell, Cell, Grid, Row, Shown, make_grid, show
 from rotorid.files.job_models import READINGS, TABLES, JobSettings, Plane, Sensor
 from rotorid.files.layout import rows_from_header
 from rotorid.files.problems import Problems
 from rotorid.files.settings import Settings, read_settings
 from rotorid.files.text_file import read_bytes
 from rotorid.files.toml_file import read_toml
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAMED: dict[str, tuple[str, type[Settings]]] = {"planes": ("plane", Plane), "sensors": ("sensor", Sensor)}
 """Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""
@@ -42,7 +40,6 @@ OPTIONAL = "note (a blank value: not stated)"
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_NOT_READ = "computed from the other sheets; not read back"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +74,11 @@ class WrittenJob:
         read = read_settings(JobSettings, self.settings, source, problems, self.where)
         settings = problems.need(read)
         if not self.tables and "runs" not in self.settings:
-            problems.extend([settings.problem("runs", 'the runs table, runs = "runs.csv"')])
+            settings.complain(problems, "runs", 'the runs table, runs = "runs.csv"')
         for key in TABLES if self.tables and self.path else ():
             if settings.has(key) and (key in self.tables or key in TABLES[:2]):
                 expected = f"the table in the sheet {key!r} of this workbook, not a file"
-                problems.extend([settings.problem(key, expected)])
+                settings.complain(problems, key, expected)
         return settings
 
 
@@ -128,10 +125,6 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         source, rows = sheet_source(path, titles[name]), sheets[titles[name]]
         if name in (*READINGS, "weights", "check_weights"):
             rows = rows_from_header(rows, {}, weights=name not in READINGS)
-        if name == "runs" and _is_a_form(rows):
-            expected = "readings below the header, one row per run, speed and sensor: none are filled in yet"
-            problems.add(source, None, None, None, expected)
-            problems.stop()
         may_be_empty = name in ("weights", "check_weights", *SETTINGS)
         grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)
         if grid is not None and name in TABLES:
@@ -148,15 +141,6 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
 
 def _holds_cells(rows: Sequence[Row]) -> bool:
     return any(show(cell) for _, cells in rows for cell in cells)
-
-
-def _is_a_form(rows: Sequence[Row]) -> bool:
-    """Whether nothing is filled in below the header of the sheet runs."""
-    filled = [cells for _, cells in rows if any(show(cell) for cell in cells)]
-    while filled and is_comment(filled[0], in_sheet=True, below_header=False):
-        filled = filled[1:]
-    below = [cells for cells in filled[1:] if not is_comment(cells, in_sheet=True, below_header=True)]
-    return not below and bool(filled) and "run" in map(show, filled[0])
 
 
 def _is_remark(name: str) -> bool:
@@ -233,19 +217,13 @@ def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str,
 
 def _read_named(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
     """Rows of one plane or sensor each; a blank cell leaves the setting out."""
-    key, model = NAMED[sheet]
+    key = NAMED[sheet][0]
     if key not in grid.header:
         expected = f"a column {key}; the columns are {listing(filter(None, grid.header), 'and')}"
         problems.add(grid.source, grid.header_row, key, None, expected)
         return
     at = grid.header.index(key)
     columns = {i: name for i, name in enumerate(grid.header) if i != at and not _is_remark(name)}
-    for name in columns.values() if not grid.rows else ():  # whose cells would be read
-        keys = model.keys()
-        if model.usual(name) not in keys:
-            known = (key, *(one for its in keys.values() for one in its.names))
-            expected = f"a known column{did_you_mean(name, known)}; known are {listing(known, 'and')}"
-            problems.add(grid.source, grid.header_row, name, name, expected)
     for row, cells in grid.rows:
         item, expected = show(cells[at]), ""
         name = f"{sheet}.{item}"
@@ -320,23 +298,8 @@ def template_bytes() -> bytes:
     return Path(__file__).with_name("template.xlsx").read_bytes()
 
 
-class Framed(Protocol):
-    """A result that is a table."""
-
-    def to_frame(self) -> pd.DataFrame:
-        """Its table."""
-
-
 class Results(Protocol):
     """What `rotorid balance` has found."""
-
-    @property
-    def result(self) -> Framed:
-        """The corrections."""
-
-    @property
-    def mounted(self) -> Framed | None:
-        """What goes into which hole, where that was asked for."""
 
     @property
     def influence(self) -> Influence:
@@ -346,9 +309,7 @@ class Results(Protocol):
         """The document of `--json`, without its provenance."""
 
 
-def job_workbook_bytes(
-    files: Sequence[Path], results: Results, provenance: Mapping[str, Any] | None = None
-) -> bytes:
+def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapping[str, Any]) -> bytes:
     """A workbook with the results of a job, for reading; its sheets of results are not read back.
 
     Parameters
@@ -366,6 +327,8 @@ def job_workbook_bytes(
     InputError
         If the workbook of the job cannot be read any more.
     """
+    from rotorid.tables.runs.influence_table import influence_frame, labels_of
+
     own = None
     if len(files) == 1 and is_workbook(files[0]):
         import openpyxl
@@ -378,64 +341,36 @@ def job_workbook_bytes(
         for title in own.sheetnames:
             if title.strip().casefold().startswith(RESULTS):
                 del own[title]
-    pages = [Page(title, lines) for title, lines in result_sheets(results, provenance).items()]
+    sheets: dict[str, list[Line]] = {}
+    document = results.to_dict()
+    summary = list(_sorted({**document, "provenance": provenance}, (), sheets))
+    coefficients, labels = influence_frame(results.influence), labels_of(results.influence)
+    cells = coefficients.astype(object).where(coefficients.notna(), None).itertuples(index=False)
+    stated = [(f"# phase = {labels.phase}",), (f"# angles = {labels.angles}",)]
+    sheets["influence"] = [*stated, tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
+    notes = [(f"# warning: {text}",) for text in document.get("warnings", ())]
+    lines = {"": [*notes, *sheets.pop("corrections")], "summary": [("result", "value"), *summary], **sheets}
+    head = ("# computed from the other sheets; not read back",)
+    pages = [Page(f"{RESULTS} {name}".strip()[:LONGEST_TITLE], [head, *rows]) for name, rows in lines.items()]
     return book_bytes(pages, RESULTS, own)
 
 
-def result_sheets(results: Results, provenance: Mapping[str, Any] | None) -> dict[str, list[Line]]:
-    """Sheets of results, by name, with what `provenance` says of their making."""
-    from rotorid.tables.runs.influence_comments import PHASE_MEANING
-    from rotorid.tables.runs.influence_table import influence_frame, labels_of
-
-    document = results.to_dict()
-    notes = [f"# warning: {text}" for text in document.get("warnings", ())]
-    notes += [f"# {text}" for text in document.get("assumptions", ())]
-    labels = labels_of(results.influence)
-    conventions = [f"# phase = {labels.phase}", f"# angles = {labels.angles}", f"# {PHASE_MEANING}"]
-    sheets = {"": [*((note,) for note in notes), *_frame(results.result.to_frame())]}
-    rows = [*_summary(document, ()), *(() if provenance is None else _summary(provenance, ("provenance",)))]
-    sheets["summary"] = [("result", "value"), *rows]
-    for name, keys in {
-        "residuals": ("residuals",),
-        "other readings": ("other_readings",),
-        "add to mounted": ("add_to_mounted",),
-        "mounted residuals": ("mounting", "residuals"),
-        "check": ("check", "readings"),
-        "verdict": ("verdict", "rows"),
-    }.items():
-        found: Any = document
-        for key in keys:
-            found = (found or {}).get(key)
-        if found:
-            # lists in them, such as covariances, are left to `--json`
-            columns = [key for key, value in found[0].items() if not isinstance(value, (list, Mapping))]
-            sheets[name] = [tuple(columns), *(tuple(_cell(row[key]) for key in columns) for row in found)]
-    if results.mounted is not None:
-        sheets["holes"] = _frame(results.mounted.to_frame())
-    sheets["influence"] = [*((line,) for line in conventions), *_frame(influence_frame(results.influence))]
-    return {f"{RESULTS} {name}".strip(): [(f"# {_NOT_READ}",), *lines] for name, lines in sheets.items()}
-
-
-def _frame(frame: pd.DataFrame) -> list[Line]:
-    plain = frame.astype(object).where(frame.notna(), None)
-    header: Line = tuple(str(name) for name in frame.columns)
-    return [header, *(tuple(_cell(value) for value in row) for row in plain.itertuples(index=False))]
-
-
-def _summary(document: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[Line]:
-    """Single values of a document by their dotted names, and lists of words."""
+def _sorted(
+    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[Line]]
+) -> Iterator[Line]:
+    """Single values of a document by their dotted names, and lists of words; of tables `sheets` are made."""
     for key, value in document.items():
         name = (*above, key)
         if isinstance(value, Mapping):
-            yield from _summary(value, name)
-        elif value is None:
-            continue
-        elif not isinstance(value, list):
-            yield ".".join(name), _cell(value)
-        elif all(isinstance(entry, str) for entry in value):
-            yield from ((".".join(name), entry) for entry in value)
-        elif above[:1] == ("provenance",):
-            yield from ((".".join(name), ", ".join(map(str, entry.values()))) for entry in value)
+            yield from _sorted(value, name, sheets)
+        elif not isinstance(value, list) or any(not isinstance(one, Mapping) for one in value):
+            values = value if isinstance(value, list) else [value]
+            yield from ((".".join(name), _cell(one)) for one in values if one is not None)
+        elif value:
+            # lists in it, such as covariances, are left to `--json`
+            heads = [head for head, one in value[0].items() if not isinstance(one, (list, Mapping))]
+            rows = [tuple(_cell(row.get(head)) for head in heads) for row in value]
+            sheets[" ".join(name).replace("_", " ")] = [tuple(heads), *rows]
 
 
 def _cell(value: Any) -> Cell:  # noqa: ANN401  what a table or a document holds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
@@ -96,24 +97,14 @@ def covers_circle(pairs: Iterable[tuple[float, float]]) -> bool:
 
 
 def _ascending(degrees: tuple[float, ...]) -> tuple[float, ...]:
-    """Listed angles of holes: within one turn, different and ascending."""
-    if len(degrees) > MOST_HOLES or any(abs(angle) > 360.0 for angle in degrees):
-        raise ValueError(f"angles from -360 to 360 degrees, at most {MOST_HOLES} holes")
-    order = sorted(range(len(degrees)), key=lambda k: degrees[k] % 360.0)
-    for k, following in zip(order, [*order[1:], order[0]], strict=True):
-        gap = (degrees[following] - degrees[k]) % 360.0
-        if following != k and min(gap, 360.0 - gap) < SAME_DEG:
-            a, b = sorted((k, following))
-            raise ValueError(
-                f"each hole once; numbers {a + 1} ({degrees[a]:g}) and {b + 1} ({degrees[b]:g}) are one"
-            )
-    for k in range(1, len(degrees)):
-        if degrees[k] < degrees[k - 1]:
-            raise ValueError(
-                f"angles in ascending order, because holes are numbered in the order of the list; number "
-                f"{k + 1} ({degrees[k]:g}) follows {degrees[k - 1]:g} (a list may begin below zero: "
-                "[-30, 0, 30]; hole_names gives holes other names)"
-            )
+    """Listed angles of holes: different, ascending (holes are numbered in this order), within one turn."""
+    steps = [after - before for before, after in pairwise(degrees)]
+    last = 360.0 - (degrees[-1] - degrees[0]) if steps else 360.0
+    if len(degrees) > MOST_HOLES or abs(degrees[0]) > 360.0 or min((*steps, last)) < SAME_DEG:
+        raise ValueError(
+            f"different angles in ascending order within one turn, at most {MOST_HOLES}; a list may begin "
+            "below zero, [-30, 0, 30], and hole_names gives holes other names"
+        )
     return degrees
 
 

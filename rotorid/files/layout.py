@@ -240,7 +240,7 @@ def _are_there(columns: Columns | None, grid: Grid, problems: Problems) -> bool:
         if columns and name not in there and columns.written(field) not in there:
             known = f"its columns are {listing(there, 'and')}"
             expected = f"a column of {grid.source}{did_you_mean(name, there)}; {known}"
-            problems.extend([columns.problem(field, expected)])
+            columns.complain(problems, field, expected)
     return len(problems) == before
 
 

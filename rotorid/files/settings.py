@@ -234,6 +234,10 @@ class Settings(BaseModel):
         key = self.written(field)
         return self._table.problem(key, expected, self._table.data.get(key))
 
+    def complain(self, problems: Problems, field: str, expected: str) -> None:
+        """Note a problem with a field."""
+        problems.extend([self.problem(field, expected)])
+
     def written(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
         return self._table.key(field) or field
@@ -244,7 +248,7 @@ class Settings(BaseModel):
 
     @classmethod
     @cache
-    def keys(cls) -> dict[str, Key]:
+    def known_keys(cls) -> dict[str, Key]:
         """What is said about its fields, by the names of their keys."""
         out = {}
         for name, one in cls.model_fields.items():
@@ -256,7 +260,7 @@ class Settings(BaseModel):
     @cache
     def usual(cls, written: str) -> str:
         """The usual name of a key; of one that is not known the name itself."""
-        for usual, key in cls.keys().items():
+        for usual, key in cls.known_keys().items():
             if written in key.variants or (callable(key.units) and written.startswith(f"{usual}_")):
                 return usual
         return written
@@ -270,7 +274,7 @@ class Settings(BaseModel):
         table.model, values = cls, dict[str, Any]()
         for name, value in data.items():
             usual = cls.usual(name)
-            key = cls.keys().get(usual)
+            key = cls.known_keys().get(usual)
             read = value if key is None else key.read(name, value)
             if usual in values and isinstance(read, Quantity):
                 read = replace(read, wrong=f"one key of them; {table.written[usual]} says it already")
@@ -301,7 +305,7 @@ class Settings(BaseModel):
         schema = handler.resolve_ref_schema(handler(core))
         plain, required = schema.pop("properties", {}), schema.pop("required", [])
         schema["properties"] = properties = dict[str, Any]()
-        for usual, key in cls.keys().items():
+        for usual, key in cls.known_keys().items():
             names = list(key.variants)
             properties |= dict.fromkeys(names, plain[usual])
             if callable(key.units):
@@ -364,7 +368,7 @@ def _problems(
         table = tables.get(id(node), _Table())
         name = table.written.get(str(step), step)
         if name in table.data or (error["type"] == "missing" and table.model):
-            known = {str(step): trail[-1][2]} if table.model is None else table.model.keys()
+            known = {str(step): trail[-1][2]} if table.model is None else table.model.known_keys()
             trail.append((table, str(name), known.get(str(step), Key())))
         with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
             node = node[name]
@@ -389,7 +393,7 @@ def _problems(
 def _expected(error: ErrorDetails, table: _Table, name: str, key: Key) -> str:
     kind = error["type"]
     if kind == "extra_forbidden" and table.model is not None:
-        known = [one for key in table.model.keys().values() for one in key.names]
+        known = [one for key in table.model.known_keys().values() for one in key.names]
         return f"a known key{did_you_mean(name, known)}; known are {listing(known, 'and') or 'none yet'}"
     if kind == "value_error":
         words = str(error["ctx"]["error"])

@@ -52,7 +52,7 @@ def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
     if isinstance(keys, type):
-        return [*lines, *(field_line(keys, usual, key) for usual, key in keys.keys().items())]
+        return [*lines, *(field_line(keys, usual, key) for usual, key in keys.known_keys().items())]
     for key in keys:
         names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
         words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]

@@ -127,11 +127,11 @@ def _from_vectors(
                 f"a sensor of the runs table, not {name!r}{did_you_mean(name, trials.sensors)}; "
                 f"its sensors are {listing(trials.sensors, 'and')}"
             )
-            problems.extend([vector.problem("", expected)])
+            vector.complain(problems, "", expected)
         else:
             unit = amplitude.unit if amplitude.unit.name else own
             if unit.kind != own.kind:
-                problems.extend([vector.problem("amplitude", _other_unit(own.name))])
+                vector.complain(problems, "amplitude", _other_unit(own.name))
                 continue
             size, angle = np.array([unit.to_si(amplitude.value)]), np.array([np.radians(phase)])
             vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]

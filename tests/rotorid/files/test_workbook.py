@@ -140,8 +140,8 @@ def test_the_columns_of_the_form_are_keys():
     for sheet, (first, model) in NAMED.items():
         names = [cell.value for cell in book[sheet][1] if cell.value not in (first, "note")]
         assert names
-        known = model.keys()
+        known = model.known_keys()
         assert {model.usual(name) for name in names} <= set(known)
-    of_errors = Errors.keys()
-    known = {*JobSettings.keys(), *(f"errors.{name}" for name in of_errors)}
+    of_errors = Errors.known_keys()
+    known = {*JobSettings.known_keys(), *(f"errors.{name}" for name in of_errors)}
     assert {cell.value for cell in book["settings"]["A"][1:]} <= known

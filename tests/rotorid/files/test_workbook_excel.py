@@ -51,13 +51,6 @@ def solved(job):
     return correct(estimate_influence(job.trials)).weights
 
 
-def test_an_empty_form_explains_itself(tmp_path):
-    path = filled(tmp_path / "job.xlsx")
-    problem = the_only(complaints(read_job, path), "job.xlsx", None, None, None, "none are filled in yet")
-    assert "sheet 'runs'" in problem.file
-    assert "one row per run, speed and sensor" in problem.expected
-
-
 def test_the_form_has_headers_explanations_and_choices():
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
     assert tuple(book.sheetnames) == (*FORM, "notes")
