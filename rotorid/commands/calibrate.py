@@ -146,7 +146,7 @@ class Calibrated(Answered):
         ValueError
             For numbers that the data do not determine.
         """
-        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+        from rotorid.files.rotor_writing import rotor_file_bytes
 
         if why := self.found.undetermined:
             raise ValueError(f"{path}: no rotor file can be written, {why}")

@@ -57,8 +57,9 @@ def model_files(
     ValueError
         For masses that are not positive, and forces where no mass stands.
     """
-    from rotorid.tables.models.model_writing import ode_model_bytes
-    from rotorid.tables.models.small_model_file import linear_equations, small_model_files
+    from rotorid.files.model import equations_of
+    from rotorid.files.small_model import linear_equations, small_model_files
+    from rotorid.files.toml_writing import toml_bytes
 
     at = ", ".join(map(str, result.nodes))
     made = f"{name} reduced to masses at nodes {at} (formula 50, {counted(result.modes, 'mode')})"
@@ -81,7 +82,7 @@ def model_files(
         )
     if small is None:
         dampers = {x.removeprefix("d_"): value for x, value in estimate.items()}
-        return {path: ode_model_bytes(motion, dampers, comments=[f"{made}, the plane x, SI"], inputs=inputs)}
+        return {path: toml_bytes(equations_of(motion, dampers, inputs), [f"{made}, the plane x, SI"])}
     equations: dict[str, Any] = {
         "speed_rad_s": speed,
         "inputs": inputs,

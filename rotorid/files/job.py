@@ -522,7 +522,7 @@ def _in_model(
                 expected = f'the rotor model of this {key} too, rotor = "rotor.toml"'
                 part.complain(problems, key, expected)
         return settings, None, ()
-    from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
+    from rotorid.files.rotor import read_rotor, rotor_files
 
     path = folder / settings.rotor
     try:

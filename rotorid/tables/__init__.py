@@ -16,25 +16,25 @@ if TYPE_CHECKING:
     from rotorid.files.job import Job as Job
     from rotorid.files.job import job_from_files as job_from_files
     from rotorid.files.job import read_job as read_job
+    from rotorid.files.model import HarmonicFile as HarmonicFile
+    from rotorid.files.model import read_harmonic_model as read_harmonic_model
+    from rotorid.files.model import read_ode_model as read_ode_model
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
+    from rotorid.files.rotor import read_rotor as read_rotor
+    from rotorid.files.rotor import rotor_files as rotor_files
+    from rotorid.files.rotor_writing import write_rotor as write_rotor
     from rotorid.files.runs import read_trials as read_trials
+    from rotorid.files.small_model import read_small_model as read_small_model
     from rotorid.files.table_writing import write_table as write_table
+    from rotorid.files.unbalance import read_bow as read_bow
+    from rotorid.files.unbalance import read_unbalance as read_unbalance
     from rotorid.tables.data.measurements import read_measurements as read_measurements
     from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
     from rotorid.tables.data.modes_table import read_compliance as read_compliance
     from rotorid.tables.data.modes_table import read_modes as read_modes
     from rotorid.tables.data.records import read_record as read_record
-    from rotorid.tables.models.harmonic_file import HarmonicFile as HarmonicFile
-    from rotorid.tables.models.harmonic_file import read_harmonic_model as read_harmonic_model
-    from rotorid.tables.models.ode_file import read_ode_model as read_ode_model
-    from rotorid.tables.models.small_model_file import read_small_model as read_small_model
-    from rotorid.tables.rotor.bow_table import read_bow as read_bow
-    from rotorid.tables.rotor.rotor_file import read_rotor as read_rotor
-    from rotorid.tables.rotor.rotor_file import rotor_files as rotor_files
-    from rotorid.tables.rotor.rotor_writing import write_rotor as write_rotor
-    from rotorid.tables.rotor.unbalance_table import read_unbalance as read_unbalance
     from rotorid.tables.runs.influence_table import influence_frame as influence_frame
     from rotorid.tables.runs.influence_table import read_influence as read_influence
     from rotorid.tables.runs.influence_table import write_influence as write_influence
@@ -48,19 +48,19 @@ _HOME = {
     "Job": ".files.job",
     "job_from_files": ".files.job",
     "read_job": ".files.job",
-    "HarmonicFile": "models.harmonic_file",
-    "read_harmonic_model": "models.harmonic_file",
-    "read_ode_model": "models.ode_file",
-    "read_small_model": "models.small_model_file",
+    "HarmonicFile": ".files.model",
+    "read_harmonic_model": ".files.model",
+    "read_ode_model": ".files.model",
+    "read_small_model": ".files.small_model",
     "InputError": ".files.problems",
     "Problem": ".files.problems",
     "TableWarning": ".files.problems",
     "write_table": ".files.table_writing",
-    "read_bow": "rotor.bow_table",
-    "read_rotor": "rotor.rotor_file",
-    "rotor_files": "rotor.rotor_file",
-    "write_rotor": "rotor.rotor_writing",
-    "read_unbalance": "rotor.unbalance_table",
+    "read_bow": ".files.unbalance",
+    "read_rotor": ".files.rotor",
+    "rotor_files": ".files.rotor",
+    "write_rotor": ".files.rotor_writing",
+    "read_unbalance": ".files.unbalance",
     "influence_frame": "runs.influence_table",
     "read_influence": "runs.influence_table",
     "write_influence": "runs.influence_table",

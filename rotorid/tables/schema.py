@@ -7,17 +7,17 @@ from typing import Any
 
 from rotorid.base.suggestions import one_of
 from rotorid.files.job_models import JobSettings
+from rotorid.files.rotor import RotorFile
 from rotorid.files.settings import Settings, settings_schema
 from rotorid.files.settings_keys import Key, file_schema
-from rotorid.tables.models.small_model_file import SMALL_MODEL
-from rotorid.tables.rotor.rotor_file import ROTOR
+from rotorid.files.small_model import SmallModelFile
 from rotorid.tables.study_file import STUDY
 from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
 
 FILES: dict[str, tuple[str, Sequence[Key] | type[Settings]]] = {
     "job": ("Job file of rotorid", JobSettings),
-    "rotor": ("Rotor file of rotorid", ROTOR),
-    "small": ("Small model for motion of rotorid", SMALL_MODEL),
+    "rotor": ("Rotor file of rotorid", RotorFile),
+    "small": ("Small model for motion of rotorid", SmallModelFile),
     "study": ("Study file of rotorid", STUDY),
     "waveforms": ("Waveforms file of rotorid", WAVEFORMS),
 }

@@ -14,17 +14,19 @@ from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.files import units, value_kinds
 from rotorid.files.problems import InputError, Problems
+from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings_keys import Key, Kind, Said, take
 from rotorid.files.toml_file import Section, read_toml
 from rotorid.files.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, named, number, whole
-from rotorid.tables.rotor.bearing import NODE
-from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
 if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray, FloatArray
 
 MOST_SAMPLES, MOST_CORRECTIONS = 10**9, 20
+NODE = Kind(
+    lambda section, key: section.take(key), {"type": ["integer", "string"], "minimum": 1}, "a node or station"
+)
 _KIND = value_kinds.choice(("balance", "calibrate"))
 _CORRECTIONS = whole("corrections", 0, MOST_CORRECTIONS)
 _PERCENT = number(0.0, 100.0)

@@ -1,12 +1,12 @@
 """Tables of keys in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
 
 import re
+import typing
 from pathlib import Path
 
-from rotorid.files import job_models
+from rotorid.files import bearing, forces, job_models, model, rotor, small_model
+from rotorid.files.settings import Settings
 from rotorid.tables import study_file
-from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
-from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 from rotorid.tables.waveforms import waveform_keys
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
@@ -19,23 +19,21 @@ TABLES = {
     "key of [planes.NAME]": job_models.Plane,
     "key of [sensors.NAME]": job_models.Sensor,
     "key of [sheet]": job_models.Sheet,
-    "key of a model file for harmonic tests": harmonic_file.HARMONIC,
-    "key of a model file with states": ode_file.TIME_STATES,
-    "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),
-    "key of [nuisance]": ode_file.NUISANCE,
-    "key of [errors] of a model file": shared_keys.ERRORS,
-    "key of a rotor file": rotor_file.ROTOR,
-    "key of [material]": rotor_file.MATERIAL,
-    "key of [model]": rotor_file.MODEL,
-    "key of [[station]]": rotor_file.STATION,
-    "key of [[disc]]": rotor_file.DISC,
-    "key of [[bearing]]": bearing.KEYS_OF["bearing"],
-    "key of [calibration]": calibration_keys.CALIBRATION,
-    "key of [[calibration.parameter]]": calibration_keys.PARAMETER,
-    "key of [[calibration.data]]": calibration_keys.DATA,
-    "key of a small model": small_model_file.SMALL_MODEL,
-    "key of [[unbalance]]": small_model_file.UNBALANCE,
-    "key of [[bow]]": small_model_file.BOW,
+    "key of a model file": model.ModelFile,
+    "key of [nuisance]": model.Nuisance,
+    "key of [errors] of a model file": model.AmplitudeErrorKeys,
+    "key of a rotor file": rotor.RotorFile,
+    "key of [material]": rotor.Material,
+    "key of [model]": rotor.Effects,
+    "key of [[station]]": rotor.Station,
+    "key of [[disc]]": rotor.DiscKeys,
+    "key of [[bearing]]": bearing.SupportKeys,
+    "key of [calibration]": rotor.CalibrationKeys,
+    "key of [[calibration.parameter]]": rotor.Parameter,
+    "key of [[calibration.data]]": rotor.DataFile,
+    "key of a small model": small_model.SmallModelFile,
+    "key of [[unbalance]]": small_model.UnbalanceKeys,
+    "key of [[bow]]": small_model.BowKeys,
     "key of a waveforms file": waveform_keys.WAVEFORMS,
     "key of [channels.NAME]": waveform_keys.CHANNEL,
     "key of a study file": study_file.STUDY,
@@ -44,7 +42,7 @@ TABLES = {
     "key of [unbalance.STATION]": study_file.UNBALANCE,
     "key of [readings]": study_file.READINGS,
     "key of [calibrate]": study_file.CALIBRATE,
-    **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
+    **{f"key of [[{kind}]]": keys for kind, keys in forces.KEYS.items()},
 }
 
 
@@ -52,7 +50,7 @@ def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
     if isinstance(keys, type):
-        return [*lines, *(field_line(keys, usual, key) for usual, key in keys.known_keys().items())]
+        return lines + [_line(keys, name, field) for name, field in keys.model_fields.items()]
     for key in keys:
         names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
         words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
@@ -60,18 +58,19 @@ def key_lines(keys, what="key"):
     return lines
 
 
-def field_line(model, usual, key):
-    """The line of a field of a model: its choices or its example come from the schema."""
-    field = next(one for name, one in model.model_fields.items() if usual in (one.alias, name))
-    inner = repr(field.annotation)
-    head = "{}"
-    if "rotorid.files." in inner and "Quantity" not in inner:
-        head = "[{}.NAME]" if "dict[" in inner else "[[{}]]" if "list[" in inner else "[{}]"
-    head = "{}" if usual in ("slow_roll",) else head
-    names = ", ".join(f"`{head.format(name)}`" for name in key.names)
-    schema = model.model_json_schema(ref_template="{model}")["properties"].get(usual, {})
-    choices = [word for one in (schema, *schema.get("anyOf", ())) for word in one.get("enum", ())]
-    words = [f'"{word}"' for word in choices] or [str(one) for one in field.examples or ()]
+def _line(settings, name, field):
+    """A field of typed settings."""
+    inner = [one for one in (field.annotation, *typing.get_args(field.annotation)) if isinstance(one, type)]
+    table = any(issubclass(one, Settings) for one in inner)
+    choices = settings.model_json_schema()["properties"].get(field.alias or name, {})
+    several = typing.get_origin(field.annotation) is list
+    key = settings.known_keys()[field.alias or name]
+    header = "[[{}]]" if table and several else "[{}]" if table or dict in inner else "{}"
+    if typing.get_origin(field.annotation) is dict and not field.metadata:  # else it may be a text, too
+        header = "[{}.NAME]" if table else "[{}]"
+    names = ", ".join(f"`{header.format(one)}`" for one in key.names)
+    enums = [one.get("enum", ()) for one in (choices, *choices.get("anyOf", ()))]
+    words = [f'"{word}"' for words in enums for word in words] or field.examples or []
     return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words)} |"
 
 

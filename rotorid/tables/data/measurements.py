@@ -20,11 +20,11 @@ from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN
+from rotorid.files.model import HarmonicFile
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.data.modes_table import read_modes
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
-from rotorid.tables.models.harmonic_file import HarmonicFile
 
 if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors, Experiments

@@ -15,9 +15,9 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
 from rotorid.files.problems import Problems
+from rotorid.files.unbalance import node_at
 from rotorid.files.units import Unit, one_of, ratio
 from rotorid.tables.data.repeated_readings import FREQUENCIES
-from rotorid.tables.rotor.unbalance_table import node_at
 
 Node = int | str
 """The number of a node; without a rotor also any label."""

@@ -79,10 +79,10 @@ def test_sizes_that_no_instrument_shows(tmp_path, files, value):
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
-        ("length_m", 1000, "row 2, column length_m: 1000 means 1000 m; is this in mm?"),
-        ("diameter_m", 110, "column diameter_m: 110 means 110 m; is this in mm?"),
-        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in GPa?"),
-        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in g/cm³?"),
+        ("length_m", 1000, "element 1: length 1000 m; is this in mm?"),
+        ("diameter_m", 110, "element 1: outer_diameter 110 m; is this in mm?"),
+        ("youngs_modulus_Pa", 210, "element 1: youngs_modulus 210 Pa; is this in GPa?"),
+        ("density_kg_per_m3", 7.8, "element 1: density 7.8 kg/m³; is this in g/cm³?"),
     ],
 )
 def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):

@@ -48,7 +48,7 @@ ROTOR = 'shaft = "shaft.csv"\n'
         ROTOR + "[[disc]]\nnode = 2\nmass_kg = -1",
         ROTOR + "[[bearing]]\nnode = 1\nkind = 'seel'",
         ROTOR + "[[bearing]]\nnode = 1\npedestal_stiffness_N_per_m = [1, 2, 3]",
-        ROTOR + "[[seal]]\nnode = 1\nkind = 'seal'",
+        ROTOR + "[[seal]]\nnode = 1\nkind = 'bearing'",
     ],
 )
 def test_what_no_rotor_file_may_say_does_not_keep_to_it(text):

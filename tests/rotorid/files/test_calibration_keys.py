@@ -79,8 +79,6 @@ def test_without_errors_and_with_nothing_but_angles(tmp_path):
         assert again.names == found.names
         np.testing.assert_array_equal(again.covariance, found.covariance)
         assert again.lack_of_fit == 0
-    with pytest.raises(ValueError, match="cannot hold a calibration"):
-        write_rotor(tmp_path / "r.csv", replace(rotor, calibration=found))
 
 
 def test_what_an_engineer_writes_is_read(read):
@@ -95,18 +93,10 @@ def test_what_an_engineer_writes_is_read(read):
 @pytest.mark.parametrize(
     ("text", "key", "words"),
     [
-        (
-            PLAIN.replace("[DE]", "[DF]"),
-            "calibration.parameter[1].name",
-            r"the bearing 'DF' is not known: one of 1, DE",
-        ),
-        (PLAIN.replace("kxx", "kxxx"), "calibration.parameter[1].name", "did you mean 'kxx'"),
-        (PLAIN.replace("[DE]", "[*]"), "calibration.parameter[1].name", r"single parameter, without \[\*\]"),
-        (
-            PLAIN.replace("[1.0, -0.5]", "[1.0]"),
-            "calibration.parameter[1].correlation",
-            "2 numbers, one for each",
-        ),
+        (PLAIN.replace("[DE]", "[DF]"), "calibration", r"the bearing 'DF' is not known: one of 1, DE"),
+        (PLAIN.replace("kxx", "kxxx"), "calibration", "did you mean 'kxx'"),
+        (PLAIN.replace("[DE]", "[*]"), "calibration", r"single parameter: name one, without \[\*\]"),
+        (PLAIN.replace("[1.0, -0.5]", "[1.0]"), "calibration", "2 numbers, one for each"),
         (PLAIN.replace("std = 2e5", "std = -2e5"), "calibration.parameter[1].std", "0 or more"),
         (PLAIN.replace("std = 2e5", ""), "calibration.parameter[1].std", "its std"),
         (PLAIN.replace("-0.5", "-2"), "calibration", "must not be negative in any direction"),

@@ -15,13 +15,14 @@ from repetitions import FULL
 from timedomain_cases import motion_in
 
 import fem
+from rotorid.files.model import equations_of
+from rotorid.files.toml_writing import toml_bytes
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.second_order import state_space
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
-from rotorid.tables.models.model_writing import ode_model_bytes
 
 TRUTH = {"d_x7": 1234.5, "d_x12": 321.0, "d_x18": 567.0}
 BEGIN = {"x7": 2000.0, "x12": 500.0, "x18": 400.0}
@@ -66,7 +67,7 @@ def worst(document):
 
 @pytest.mark.parametrize("inputs", [(), ("f_x7",)])
 def test_amplitudes_give_the_dampers_of_a_reduced_rotor(cli, tmp_path, three, inputs):
-    model = saved(tmp_path, "model.toml", ode_model_bytes(three, BEGIN, inputs=inputs))
+    model = saved(tmp_path, "model.toml", toml_bytes(equations_of(three, BEGIN, inputs=inputs)))
     X = response(three, TRUTH, np.array([2.0, 0, 0]))
     force = np.full(len(X), 2.0 + 0j)
     columns = {name: X[:, i] for i, name in enumerate(three.coordinates)} | {"f_x7": force}
@@ -85,7 +86,7 @@ def test_matrices_keep_all_digits_in_both_planes(tmp_path):
     rng = np.random.default_rng(5)
     M, C, K = (rng.standard_normal((4, 4)) * 10.0 ** rng.integers(-9, 9, (4, 4)) for _ in range(3))
     motion = fem.Motion(M + 1e9 * np.eye(4), C, K, ("x7", "x12", "y7", "y12"), 314.1)
-    path = saved(tmp_path, "m.toml", ode_model_bytes(motion, {"x7": 3.0, "y12": 4.0}))
+    path = saved(tmp_path, "m.toml", toml_bytes(equations_of(motion, {"x7": 3.0, "y12": 4.0})))
     back = motion_in(path, {"d_x7": 0.0, "d_y12": 0.0})
     for key in "MCK":
         np.testing.assert_array_equal(getattr(back, key), getattr(motion, key))
@@ -97,7 +98,9 @@ def test_matrices_keep_all_digits_in_both_planes(tmp_path):
 
 def test_nothing_to_estimate(tmp_path, three):
     """Such a file is simulated and read back; fit and identify refuse it in words."""
-    path = saved(tmp_path, "m.toml", begun(ode_model_bytes(three, {}, outputs=["x7", "v_x18"]), "x7 = 0.001"))
+    path = saved(
+        tmp_path, "m.toml", begun(toml_bytes(equations_of(three, {}, outputs=["x7", "v_x18"])), "x7 = 0.001")
+    )
     model = read_ode_model(path)
     assert model.parameters == ()
     assert model.outputs == ("x7", "v_x18")
@@ -106,22 +109,10 @@ def test_nothing_to_estimate(tmp_path, three):
         read_harmonic_model(path)
 
 
-LIGHT = fem.Motion(
-    np.diag([100.0, 80.0, 0.0, 0.0]),
-    np.diag([0.0, 20.0, 3e3, 0.0]),
-    np.array(
-        [[3e6, -1e6, -1e6, 0.0], [-1e6, 3e6, -2e5, -1e6], [-1e6, -2e5, 4e6, 0.0], [0.0, -1e6, 0.0, 5e6]]
-    ),
-    ("x7", "x12", "x2", "x22"),
-    0.0,
-)
-"""Two masses, a massless support with a damper, and one without."""
-
-
 def test_outputs_that_do_not_show_a_mass(tmp_path, three):
     """It is predicted."""
     X = response(three, TRUTH | {"d_x18": 0.0}, np.array([1.0, 0, 0]))
-    content = ode_model_bytes(three, {"x7": 900.0, "x12": 900.0}, outputs=["x7", "x12"])
+    content = toml_bytes(equations_of(three, {"x7": 900.0, "x12": 900.0}, outputs=["x7", "x12"]))
     file = read_harmonic_model(saved(tmp_path, "m.toml", content))
     assert file.model.outputs == ("x7", "x12", "x18")
     assert file.unmeasured == ("x18",)
@@ -132,18 +123,17 @@ def test_outputs_that_do_not_show_a_mass(tmp_path, three):
 
 
 def test_writing_refuses(three):
-    with pytest.raises(ValueError, match="damper to be estimated at x2, which has no mass"):
-        ode_model_bytes(LIGHT, {"x2": 1.0})
     with pytest.raises(ValueError, match="K holds numbers that are not finite"):
-        ode_model_bytes(replace(three, K=three.K * np.nan), {})
-    with pytest.raises(ValueError, match="no input 'f_x8'"):
-        ode_model_bytes(three, {}, inputs=["f_x8"])
-    with pytest.raises(ValueError, match="the output x7 is named twice"):
-        ode_model_bytes(three, {}, outputs=["x7", "x7"])
+        equations_of(replace(three, K=three.K * np.nan), {})
+    with pytest.raises(ValueError, match="no 'f_x8' in this model: it has x7, x12 and x18"):
+        equations_of(three, {}, inputs=["f_x8"])
+    loose = fem.Motion(np.diag([1.0, 0.0]), np.zeros((2, 2)), np.diag([1.0, 0.0]), ("x1", "x2"), 0.0)
+    with pytest.raises(ValueError, match="neither mass nor damping need stiffness"):
+        equations_of(loose, {})
 
 
 def test_lines_of_a_comment_stay_comments(tmp_path, three):
-    path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, comments=["one\nM = 3", ""]))
+    path = saved(tmp_path, "m.toml", toml_bytes(equations_of(three, BEGIN), ["one\nM = 3", ""]))
     assert path.read_text().startswith("# one\n# M = 3\n# \nschema_version = 1\ncoordinates")
     assert read_ode_model(path).parameters == tuple(TRUTH)
 
@@ -174,23 +164,11 @@ amplitude_percent = 1
 STATES = """
 inputs = ["u"]
 [states]
-x = "v"
-v = "-k*x - d*v + c*z + 3*u"
-z = "-r*z + x - 0.25*v"
-[outputs]
-x = "x"
-speed = "v"
-z = "2*z"
+x = "u - k*x"
 [initial]
 x = 0
-v = "v0"
-z = 0
-[known]
-c = 0.7
 [estimate]
 k = 9.0
-d = 0.2
-r = 4.0
 """
 
 
@@ -199,11 +177,8 @@ def predicted(file, name, w):
     return values[name]
 
 
-@pytest.mark.parametrize(
-    "text", [MATRICES, STATES.replace('"v0"', "1")], ids=["matrices with outputs", "states with outputs"]
-)
-def test_amplitudes_are_those_of_the_model_in_time(tmp_path, text):
-    path = saved(tmp_path, "m.toml", text)
+def test_amplitudes_are_those_of_the_model_in_time(tmp_path):
+    path = saved(tmp_path, "m.toml", MATRICES)
     file, model = read_harmonic_model(path), read_ode_model(path)
     assert dict(file.start) == dict(zip(model.parameters, model.start, strict=True))
     assert set(model.outputs) <= set(file.model.outputs)
@@ -221,76 +196,98 @@ def test_stated_errors_and_bounds_are_kept(tmp_path):
 
 
 def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
-    path = saved(tmp_path, "m.toml", STATES.replace("r = 4.0", "r = 4.0\nv0 = 1.0"))
+    text = MATRICES.replace("k = 3.0", "k = 3.0\nv0 = 1.0").replace(
+        "[known]", '[initial]\nv_y1 = "v0"\n[known]'
+    )
+    path = saved(tmp_path, "m.toml", text)
     assert "v0" in read_ode_model(path).parameters
-    with pytest.warns(TableWarning, match="v0 stands in initial values only, .* left out"):
+    with pytest.warns(TableWarning, match=r"v0 stands in initial values only, .* left out"):
         file = read_harmonic_model(path)
-    assert file.model.parameters == ("k", "d", "r")
-
-
-def test_states_need_no_initial_values_for_amplitudes(tmp_path):
-    text = re.sub(r"\[initial\].*?\[known\]", "[known]", STATES, flags=re.DOTALL)
-    assert read_harmonic_model(saved(tmp_path, "m.toml", text)).model.inputs == ("u",)
+    assert file.model.parameters == ("m", "d", "k")
 
 
 @each_of(
-    ("text", "old", "new", "said"),
+    ("old", "new", "said"),
     [
-        (MATRICES, '"g*u"', '"g*cos(3*t)"', r"force.y1 depends on the time t.*measured input"),
-        (MATRICES, '"g*u"', '"g*u*y1"', r"not linear in the signals: it contains"),
-        (MATRICES, '"g*u"', '"g*u + 1"', r"constant one has no influence"),
-        (MATRICES, '"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
-        (MATRICES, '[["m", 0]', '[["m", "u"]', r"row 1 of M holds u"),
-        (
-            MATRICES.replace('w = "v_y2/4"', ""),
-            'a = "1e3*y1"',
-            'y2 = "1e3*y1"',
-            r"outputs.y2: the amplitude needs a name of its own",
-        ),
-        (MATRICES, 'a = "1e3*y1"', 'k = "1e3*y1"', r"outputs.k: the amplitude needs a name of its own"),
-        (MATRICES, "[outputs]", 'per = ["m"]\n[outputs]', r"per: expected a name of coordinates"),
-        (STATES.replace('"v0"', "1"), "c*z", "c*z**2", r"not linear in the signals"),
-        (STATES.replace('"v0"', "1"), "3*u", "3*cos(t)", r"states.v depends on the time t"),
-        (STATES.replace('"v0"', "1"), "3*u", "3*u + 1", r"constant one has no influence"),
-        (STATES.replace('"v0"', "1"), "r = 4.0", "r = 4.0\np = 1.0", r"estimate: p is d/dt"),
-        (
-            STATES.replace('"v0"', "1"),
-            'inputs = ["u"]',
-            'inputs = ["u"]\nper_record = ["k"]',
-            r"per_record: k stands in the equations",
-        ),
+        ('"g*u"', '"g*cos(3*t)"', r"t in 'g\*cos\(3\*t\)' has no meaning .*measured input"),
+        ('"g*u"', '"g*u*y1"', r"not linear in the signals: it contains"),
+        ('"g*u"', '"g*u + 1"', r"constant one has no influence"),
+        ('"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
+        ('[["m", 0]', '[["m", "u"]', r"u in 'u' has no meaning"),
+        ('[["m", 0]', '[["m"]', r"key M: expected square matrices"),
+        ('w = "v_y2/4"', 'y2 = "1e3*y1"', r"y2: an amplitude needs a name of its own"),
+        ('a = "1e3*y1"', 'k = "1e3*y1"', r"k: an amplitude needs a name of its own"),
+        ('y1 = "g*u"', 'y3 = "g*u"', r"y3: .*a force one of y1 or y2"),
+        ("[outputs]", 'per = ["m"]\n[outputs]', r"key force.per: expected a number, or an expression"),
+        ("[force]", 'per_record = ["k"]\n[force]', r"k in 'k' has no meaning for amplitudes"),
+        ("[force]", "[states]\nx = 1\n[force]", r"key M: expected equations, matrices or states"),
+        ("k = 3.0", "k = 3.0\np = 1.0", r"p: an amplitude needs a name of its own"),
     ],
 )
-def test_what_has_no_meaning_for_amplitudes_is_refused(tmp_path, text, old, new, said):
-    assert old in text
-    path = saved(tmp_path, "m.toml", text.replace(old, new, 1))
+def test_what_has_no_meaning_for_amplitudes_is_refused(tmp_path, old, new, said):
+    assert old in MATRICES
+    path = saved(tmp_path, "m.toml", MATRICES.replace(old, new, 1))
     with pytest.raises(InputError) as caught:
         read_harmonic_model(path)
     assert re.search(said, str(caught.value), re.DOTALL), str(caught.value)
     assert str(path) in str(caught.value)
 
 
-def test_names_of_forces_that_are_taken(tmp_path):
-    text = 'M = [[1]]\nK = [["f_y1"]]\n[estimate]\nf_y1 = 1.0\n'
-    with pytest.raises(InputError, match="f_y1 is the force on y1 here"):
-        read_harmonic_model(saved(tmp_path, "m.toml", text))
+@each_of(
+    ("read", "text", "said"),
+    [
+        (read_harmonic_model, STATES, r"neither equations nor M and K; \[states\] are for `fit`"),
+        (
+            read_ode_model,
+            'equations = ["k*X = F"]\nestimate = ["k"]',
+            r"key equations: expected \[states\], or M",
+        ),
+        (read_ode_model, 'estimate = ["k"]\n[states]\nx = "k"', r"key estimate: .*starting value, k = 1.0"),
+        (
+            read_ode_model,
+            STATES.replace("[estimate]", "[estimates]"),
+            r"key estimate: expected names to estimate",
+        ),
+        (
+            read_ode_model,
+            f"{STATES}[bounds]\nk = [10, inf]",
+            r"key bounds.k: found '\[10.0, inf\]'.*starting",
+        ),
+        (read_ode_model, f"{STATES}[bounds]\nkk = [0, 1]", r"key bounds.kk: .*did you mean 'k'"),
+        (read_ode_model, STATES.replace("u - k", "u - q"), r"state x: 'u - q\*x': q is not defined here"),
+        (read_ode_model, STATES.replace("9.0", '"nine"'), r"key estimate.k: found 'nine', expected a number"),
+        (
+            read_harmonic_model,
+            'M = [[1]]\nK = [["f_y1"]]\n[estimate]\nf_y1 = 1.0\n',
+            r"f_y1: an amplitude needs",
+        ),
+    ],
+)
+def test_models_that_are_none(tmp_path, read, text, said):
+    with pytest.raises(InputError) as caught:
+        read(saved(tmp_path, "m.toml", text))
+    assert re.search(said, str(caught.value), re.DOTALL), str(caught.value)
 
 
-@pytest.mark.parametrize("rates", [["b", "a"], ["b", "c", "a"], ["a"], ["b", "c", "-a - b - c"], ["b", "b"]])
-def test_chains_and_circles_of_rates(tmp_path, rates):
-    """Rates that are plain states, also in circles, keep their meaning."""
-    names = "abc"[: len(rates)]
-    lines = [f'{n} = "{r}"' for n, r in zip(names, rates, strict=True)]
-    lines[-1] = lines[-1][:-1] + ' - e*a + u"'
-    outputs = [f'{n} = "{n}"' for n in names]
-    zeros = [f"{n} = 0" for n in names]
-    text = ["inputs = ['u']", "[states]", *lines, "[outputs]", *outputs, "[initial]", *zeros]
-    path = saved(tmp_path, "m.toml", "\n".join([*text, "[estimate]", "e = 3.0", ""]))
-    file, model = read_harmonic_model(path), read_ode_model(path)
-    w = np.array([0.5, 1.1, 4.0])
-    expected = frequency_response(state_space(model), w)[:, :, 0]
-    for i, name in enumerate(names):
-        np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-11)
+def test_names_with_starting_values_serve_equations_too(tmp_path):
+    path = saved(tmp_path, "m.toml", 'equations = ["(k + c*p)*X = F"]\n[estimate]\nk = 3.0\nc = 1\n')
+    assert read_harmonic_model(path).start == {"k": 3.0, "c": 1.0}
+
+
+def test_a_damper_at_a_support_without_mass(tmp_path):
+    """Of first order: c y2' = −k2 (y2 − y1), beside m y1'' = −k2 (y1 − y2) + f."""
+    text = 'M = [[2, 0], [0, 0]]\nC = [[0, 0], [0, "c"]]\nK = [[9, -9], [-9, 14]]\ninputs = ["f"]\n'
+    path = saved(tmp_path, "m.toml", text + '[force]\ny1 = "f"\n[estimate]\nc = 0.7\n')
+    model = read_ode_model(path)
+    assert model.states == ("y1", "v_y1", "y2")
+    w = np.array([0.5, 2.0, 5.0])
+    s = 1j * w
+    y1 = 1 / (2 * s**2 + 9 - 81 / (0.7 * s + 14))
+    found = frequency_response(state_space(model), w)[:, :, 0]
+    np.testing.assert_allclose(found[:, 0], y1, rtol=1e-12)
+    np.testing.assert_allclose(found[:, 1], 9 * y1 / (0.7 * s + 14), rtol=1e-12)
+    with pytest.raises(InputError, match="mass matrix is singular"):
+        read_ode_model(saved(tmp_path, "m.toml", path.read_text().replace("0.7", "0.0")))
 
 
 @settings(max_examples=100 if FULL else 40)
@@ -300,8 +297,10 @@ def test_chains_and_circles_of_rates(tmp_path, rates):
     damped=st.booleans(),
     force=st.integers(0, 2),
 )
-def test_every_form_has_the_response_of_the_matrices(tmp_path_factory, entries, light, damped, force):
-    """Written in matrices or in states, read for time or amplitudes: always the same response."""
+def test_time_and_amplitudes_have_the_response_of_the_matrices(
+    tmp_path_factory, entries, light, damped, force
+):
+    """Written in matrices, read for time or amplitudes: always the same response."""
     M, C, K = np.array(entries, dtype=float).reshape(3, 3, 3) / 10
     M = M @ M.T + np.diag([2.0, 3.0, 4.0])
     C = C + (np.diag([6.0, 5.0, 7.0]) if damped else 0)
@@ -313,7 +312,8 @@ def test_every_form_has_the_response_of_the_matrices(tmp_path_factory, entries, 
     names = ("x1", "x2", "y1")
     motion = fem.Motion(M, C, K, names, 0.0)
     heavy = [name for i, name in enumerate(names) if i not in light]
-    content = ode_model_bytes(motion, {heavy[0]: 2.0}, inputs=[f"f_{names[force]}"], outputs=heavy)
+    force = force if damped or force not in light else names.index(heavy[0])
+    content = toml_bytes(equations_of(motion, {heavy[0]: 2.0}, inputs=[f"f_{names[force]}"], outputs=heavy))
     path = saved(tmp_path_factory.mktemp("f"), "m.toml", content)
     w = np.array([0.7, 2.9, 8.0])
     damping = C + np.diag([2.0 if name == heavy[0] else 0.0 for name in names])

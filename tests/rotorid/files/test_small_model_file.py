@@ -5,9 +5,9 @@ import pytest
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from rotorid.files.small_model import read_small_model, small_model_files
 from rotorid.reduction import SmallModel
 from rotorid.tables import InputError, TableWarning
-from rotorid.tables.models.small_model_file import read_small_model, small_model_bytes, small_model_files
 from tests.helpers.cases import each_of
 
 PLAIN = """
@@ -80,7 +80,9 @@ def some(seed):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_is_written_is_read(tmp_path, seed):
     model = some(seed)
-    back = read_small_model(written(tmp_path, small_model_bytes(model, ["a comment"])))
+    path = tmp_path / "small.toml"
+    path.write_bytes(small_model_files(path, model, ["a comment"])[path])
+    back = read_small_model(path)
     assert back.nodes == model.nodes
     for name in ("masses", "weight", "stiffness", "material_damping", "gyroscopic", "damping"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name), err_msg=name)
@@ -107,8 +109,6 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
     (tmp_path / "far.csv").write_text("speed_rad_s,stiffness_N_per_m\n0,1e7\n100,2e7\n")
     model = read_small_model(written(tmp_path, PLAIN.replace("stiffness_N_per_m = 1e7", 'table = "far.csv"')))
     assert model.motion(50.0).K[0, 0] == pytest.approx(1e6 + 1.5e7)
-    with pytest.raises(ValueError, match="in a file of their own"):
-        small_model_bytes(model)
     for path, content in small_model_files(tmp_path / "again.toml", model).items():
         path.write_bytes(content)
     again = read_small_model(tmp_path / "again.toml")
@@ -118,33 +118,33 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
 @each_of(
     ("old", "new", "message"),
     [
-        ("nodes = [1, 5, 9]", "", r"key nodes: expected a list of the nodes' numbers"),
+        ("nodes = [1, 5, 9]", "", r"key nodes: expected different whole numbers from 1 up, nodes ="),
         ("[1, 5, 9]", "[1, 5, 5]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[1, 5, 9.5]", r"key nodes: expected different whole numbers from 1 up"),
         ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: expected different whole numbers from 1 up"),
-        ("[1, 5, 9]", "[]", r"^[^\n]*key nodes: expected a list of finite numbers, one for each node$"),
+        ("[1, 5, 9]", "[]", r"key nodes: expected a list of finite numbers, one for each node"),
         ("masses_kg", "mass_kg", r"key masses_kg: expected a mass for each node"),
-        ("80.5, 12", "80.5", r"key masses_kg: expected 3 finite numbers for 3 nodes"),
-        ("80.5", "-80.5", r"key masses_kg: expected 0 or more"),
+        ("80.5, 12", "80.5", r"masses: 3 finite numbers for 3 nodes"),
+        ("80.5", "-80.5", r"masses: 0 or more"),
         ("80.5", "nan", r"key masses_kg: expected a list of finite numbers"),
-        ("[-2e6, 4e6", "[-2.1e6, 4e6", r"key shaft_stiffness_N_per_m: expected a symmetric matrix"),
-        (", [1e6, -2e6, 1e6]]", "]", r"key shaft_stiffness_N_per_m: expected 3 × 3 finite"),
-        (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: expected a square matrix"),
+        ("[-2e6, 4e6", "[-2.1e6, 4e6", r"stiffness: a symmetric matrix"),
+        (", [1e6, -2e6, 1e6]]", "]", r"stiffness: 3 × 3 finite"),
+        (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: expected .*a square matrix"),
         ("shaft_stiffness", "stiffness", r"shaft_stiffness_N_per_m: expected the shaft's stiffness"),
         (
             "node = 1\n",
             "node = 2\n",
             r"key bearing\[1\].node: found '2', expected one of the nodes 1, 5 or 9",
         ),
-        ("node = 9\n", "", r"key journal_bearing\[1\].node: expected one of the nodes 1, 5 or 9"),
+        ("node = 9\n", "", r"key journal_bearing\[1\].node: expected a node"),
         (
             "[-2e6, 4e6",
             "[-2e6, -4e6",
-            r"key shaft_stiffness_N_per_m: .* no negative eigenvalue",
+            r"stiffness: .* no negative eigenvalue",
         ),
-        ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected one of the nodes"),
+        ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected a node"),
         ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
-        ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected the angle"),
+        ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected .* angle"),
         (
             "stiffness_N_per_m = 1e7",
             "tilting_stiffness_N_m_per_rad = 1.0\nstiffness_N_per_m = 1e7",

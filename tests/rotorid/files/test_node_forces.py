@@ -64,23 +64,23 @@ def test_every_kind_in_field_units(file):
 
 
 BAD = [
-    ("journal_bearing", BEARING[:3], "viscosity_mPa_s", "the viscosity of the fluid in the film"),
+    ("journal_bearing", BEARING[:3], "viscosity_mPa_s", "viscosity of the fluid in the film"),
     ("journal_bearing", [*BEARING[:3], "viscosity = 3"], "viscosity", "did you mean 'viscosity_mPa_s'?"),
     ("journal_bearing", [*BEARING[:2], "clearance_um = 0", BEARING[3]], "clearance_um", "a number above 0"),
     ("journal_bearing", [*BEARING, "clearance_mm = 0.1"], "clearance_mm", "clearance_um says it already"),
     ("journal_bearing", [*BEARING, 'film = "pi"'], "film", "'pressure' or 'line of centres'"),
     ("journal_bearing", [*BEARING, "orientation_deg = 30"], "orientation_deg", "a known key"),
-    ("squeeze_film", [*BEARING[:3], 'viscosity_cP = "9"'], "viscosity_cP", "a number, without quotes"),
+    ("squeeze_film", [*BEARING[:3], 'viscosity_cP = "thin"'], "viscosity_cP", "a number"),
     (
         "squeeze_film",
         [*BEARING, "centring_stiffness_N_per_m = -1"],
         "centring_stiffness_N_per_m",
         "0 or more",
     ),
-    ("annular_seal", SEAL[:3], "clearance_um", "the radial clearance"),
-    ("annular_seal", [*SEAL, "swirl_exponent = 11"], "swirl_exponent", "a number from 0 to 10"),
-    ("cubic_spring", ["stiffness_N_per_m = 1"], "cubic_stiffness_N_per_m3", "the force by the cube"),
-    ("stop", ["gap_um = 9"], "stiffness_N_per_m", "the stiffness of the contact"),
+    ("annular_seal", SEAL[:3], "clearance_um", "radial clearance"),
+    ("annular_seal", [*SEAL, "swirl_exponent = -1"], "swirl_exponent", "0 or more"),
+    ("cubic_spring", ["stiffness_N_per_m = 1"], "cubic_stiffness_N_per_m3", "force by the cube"),
+    ("stop", ["gap_um = 9"], "stiffness_N_per_m", "of the contact"),
     (
         "stop",
         ["gap_um = 9", "stiffness_N_per_m = 1e6", "friction = 0.1"],
@@ -100,7 +100,9 @@ def test_bad_forces(file, kind, lines, key, words):
 
 @each_of("node", ["0", "5", '"NDE"', "1.5"])
 def test_a_node_that_is_none(file, node):
-    with pytest.raises(InputError, match=r"key internal_damping\[1\]\.node: .* a node from 1 to 4 or|whole"):
+    with pytest.raises(
+        InputError, match=r"key internal_damping\[1\]\.node: .* a node( from 1 to 4|: its number)"
+    ):
         file(table("internal_damping", "damping_N_s_per_m = 1", node=node))
 
 
@@ -119,8 +121,6 @@ UNLIKELY = [
     ("journal_bearing", [*BEARING[:3], "viscosity_Pa_s = 28"], "viscosity 28 Pa·s; is this in another unit?"),
     ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "viscosity 5e-06 Pa·s; is this"),
     ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length 300 m; is this in mm?"),
-    ("squeeze_film", [*BEARING[:2], "clearance_um = 2000", BEARING[3]], "is 0.04 of the journal's radius"),
-    ("journal_bearing", ["length_mm = 90", *BEARING[1:]], "its length is 0.9 of its diameter; short films"),
     (
         "annular_seal",
         [*SEAL[:2], "swirl_ratio = 40", SEAL[3]],
@@ -137,12 +137,6 @@ def test_values_that_are_no_machine_s(file, kind, lines, words):
     (warning,) = caught
     assert " at node 2: " in str(warning.message)
     assert words in str(warning.message)
-
-
-def test_a_table_alone_holds_no_forces(tmp_path):
-    rotor = fem.Rotor([0.3], 0.1, forces=[fem.InternalDamping(1, damping=1.0)])
-    with pytest.raises(ValueError, match="cannot hold forces that are not linear"):
-        write_rotor(tmp_path / "r.csv", rotor)
 
 
 LINEAR = [

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
-from cases import each_of
 from tables_data import complaints, replaced, the_only, write_book, write_csv
 
 from fem import Disc, Model, Pedestal, Rotor, Support
@@ -128,19 +126,20 @@ def test_files_of_a_rotor_with_tables(file):
 
 SCALAR = "stiffness_N_per_m = 1e7"
 BAD_BEARINGS = [
-    ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "kxx", "10000000.0", "either stiffness_N_per_m or kxx_N_per_m, "),
-    ((SCALAR, "damping_N_s_per_m = 1", "cxx = 3", "cyy = 3"), "cxx", "3", "not some of both"),
-    (("kxx = 1e7",), "kyy_N_per_m", None, "kyy too, as kxx is given"),
-    (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "cxx_N_s_per_m", None, "cxx too, as cyy is given"),
-    (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx", "10000000.0", "the coefficient once, kxx"),
+    ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "kxx", "10000000.0", "either stiffness_N_per_m, or both"),
+    ((SCALAR, "damping_N_s_per_m = 1", "cxx = 3", "cyy = 3"), "cxx", "3", "or both cxx_N_s_per_m"),
+    (("kxx = 1e7",), "kxx", "10000000.0", "or both kxx_N_per_m and kyy_N_per_m"),
+    (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "cxy", "3", "or both cxx_N_s_per_m and cyy_N_s_per_m"),
+    (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx_N_per_m", "10000000.0", "kxx says it already"),
     ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "the stiffness of the pedestal"),
-    ((SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"), "pedestal_stiffness_N_per_m", "[1, 2, 3]", "[x, y]"),
-    ((SCALAR, "pedestal_stiffness_N_per_m = [1, nan]"), "pedestal_stiffness_N_per_m", "[1, nan]", "[x, y]"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"), "pedestal_stiffness_N_per_m", None, "[x, y]"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = [1, nan]"), "pedestal_stiffness_N_per_m", "nan", "[x, y]"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = 0"), "", None, "leave out a rigid pedestal"),
     ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),
     (("tilting_stiffness_N_m_per_rad = 3",), "stiffness_N_per_m", None, "the stiffness of the bearing, or"),
     (("kxx = -5e7", "kyy = 5e7"), "kxx", "-50000000.0", "a finite number, 0 or more"),
     ((SCALAR, "cxx = 1", "cyy_N_s_per_m = -1"), "cyy_N_s_per_m", "-1", "a finite number, 0 or more"),
-    (('table = "b.csv"', SCALAR), "kxx_N_per_m", "kxx_N_per_m", "either stiffness_N_per_m or"),
+    (('table = "b.csv"', SCALAR), "table", "b.csv", "either stiffness_N_per_m, or both"),
     (('table = "b.csv"', "kxx = 3"), "kxx", "3", "has a column kxx_N_per_m"),
 ]  # fmt: skip
 
@@ -148,19 +147,9 @@ BAD_BEARINGS = [
 @pytest.mark.parametrize(("lines", "key", "value", "words"), BAD_BEARINGS)
 def test_bad_bearings(file, lines, key, value, words):
     (problem,) = complaints(file, bearing(*lines))
-    in_table = problem.row is not None
-    assert problem.file.endswith("b.csv" if in_table else "rotor.toml")
-    assert (problem.column, problem.value) == (key if in_table else f"bearing[1].{key}", value)
+    assert problem.file.endswith("rotor.toml")
+    assert (problem.column, problem.value) == (f"bearing[1].{key}".strip("."), value)
     assert words in problem.expected
-
-
-def test_a_pedestal_of_no_stiffness_and_one_under_a_seal(file):
-    (problem,) = complaints(file, bearing(SCALAR, "pedestal_stiffness_N_per_m = 0"))
-    assert problem.column == "bearing[1]"
-    assert "leave out a rigid pedestal" in problem.expected
-    (problem,) = complaints(file, bearing(SCALAR, "pedestal_stiffness_N_per_m = 1e9", kind="seal"))
-    assert problem.column == "seal[1].pedestal_stiffness_N_per_m"
-    assert "a known key" in problem.expected
 
 
 BAD_TABLES = [
@@ -168,7 +157,6 @@ BAD_TABLES = [
     (replaced(TABLE, 3, "speed_rad_s", 50), 3, "speed_rad_s", "50", "above that of the row before"),
     (replaced(TABLE, 2, "speed_rad_s", -1), 2, "speed_rad_s", "-1", "a speed of 0 or more"),
     (replaced(TABLE, 1, "kxx_N_per_m", "kxx"), 1, "kxx", "kxx", "one of the units N_per_m, "),
-    (replaced(TABLE, 1, "kyy_N_per_m", "kyx_N_per_m"), 1, "kyy_N_per_m", None, "kyy too, as kxx is given"),
     ([row[:1] for row in TABLE], 1, "stiffness_N_per_m", None, "a column of coefficients, such as"),
     ([row[1:] for row in TABLE], 1, "speed_rpm", None, "a column speed_rpm, speed_rad_s or speed_Hz"),
 ]  # fmt: skip
@@ -224,10 +212,16 @@ def test_names_that_a_command_line_would_take_apart_are_refused(file, name):
 
 
 BAD_DISCS = [
-    ("mass_kg = 3\nwidth_m = 1", "mass_kg", "3", "either mass and moments of inertia or a geometry"),
-    ("width_m = 1", "outer_diameter_m", None, "the disc's width and outer diameter"),
+    ("mass_kg = 3\nwidth_m = 1", "mass_kg", "3", "either the mass of the disc or its geometry"),
+    ("width_m = 1", "width_m", "1", "the disc's width and outer diameter"),
+    (
+        "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
+        "polar_inertia_kg_m2",
+        "1",
+        "beside the geom",
+    ),
     ("width_m = 0\nouter_diameter_m = 1", "width_m", "0", "a number above 0"),
-    ("mass_kg = 3\npolar_inertia_kg_m2 = nan", "polar_inertia_kg_m2", "nan", "a finite number, 0 or more"),
+    ("mass_kg = 3\npolar_inertia_kg_m2 = nan", "polar_inertia_kg_m2", "nan", "a finite number"),
     ("mass_kg = 3\nmas = 1", "mas", "1", "did you mean 'mass_kg'?"),
 ]
 
@@ -277,38 +271,14 @@ def test_a_rotor_with_everything_comes_back_from_its_file(tmp_path):
     assert written[0] == path
 
 
-BEYOND = [
-    ({"stations": {"a": 1}}, "the names of stations"),
-    ({"model": Model(gyroscopic=True)}, "the effects of its model"),
-    ({"discs": [Disc(1, 2, name="wheel")]}, "names of discs or supports"),
-    ({"supports": [Support(1, 2), Support(1, 2)]}, "several discs or supports at a node"),
-    ({"discs": [Disc(2, 2), Disc(1, 2)]}, "in another order than the nodes'"),
-    ({"discs": [Disc(1, 0)]}, "without mass"),
-    ({"supports": [Support(1, 0)]}, "without mass, stiffness and damping"),
-    ({"supports": [Support(1, ((1, 2), (3, 4)))]}, "not isotropic"),
-    ({"supports": [Support(1, (1, 2), speeds=(1, 2))]}, "depend on speed"),
-    ({"supports": [Support(1, 1, pedestal=Pedestal(1, 1))]}, "stand on a pedestal"),
-    ({"supports": [Support(1, 1, tilting_stiffness=1)]}, "hold the slope"),
-    ({"supports": [Support(1, 1, kind="seal")]}, "seals"),
-]  # fmt: skip
-
-
-@each_of(("more", "words"), BEYOND)
-def test_a_table_refuses_what_it_cannot_hold(tmp_path, more, words):
-    with pytest.raises(ValueError, match=r"write a rotor file, r\.toml") as caught:
-        write_rotor(tmp_path / "r.csv", Rotor([1.0], 0.1, **more))
-    assert words in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_names_that_would_not_come_back_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="would read as a node number or as none; rename it"):
+    with pytest.raises(ValueError, match=r"key station.1..name: found '12', expected a name, not a number"):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, stations={"12": 1}))
-    with pytest.raises(ValueError, match="no Unicode text"):
+    with pytest.raises(ValueError, match=r"would not come back from its file: .*surrogates not allowed"):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, discs=[Disc(1, 2, name="\ud800")]))
-    with pytest.raises(ValueError, match="length_m = 1e-31 cannot be written to a file"):
+    with pytest.raises(ValueError, match=r"r_shaft.csv, row 2, column length_m: found '1e-31'"):
         write_rotor(tmp_path / "r.toml", Rotor([1e-31], 0.1))
-    with pytest.raises(InputError, match=r"ends in \.toml or \.csv"):
+    with pytest.raises(InputError, match=r"ends in \.toml"):
         write_rotor(tmp_path / "r.txt", Rotor([1.0], 0.1))
     assert list(tmp_path.iterdir()) == []
 
@@ -331,24 +301,8 @@ def test_a_small_model_is_no_rotor_and_said_so_once():
     assert "this is a small model, for `rotorid motion`" in str(found)
 
 
-def test_a_plain_rotor_comes_back_from_its_table(tmp_path):
-    plain = Rotor(
-        [0.1, 1 / 3],
-        [0.05, 0.07],
-        [0.0, 0.01],
-        [2e11, 7e10],
-        7700.0,
-        [Disc(1, 2.5, 3.0, 1.7), Disc(3, 1e-3)],
-        [Support(2, 0.0, 40.0), Support(3, 2e7, 3.0)],
-        poisson_ratio=0.25,
-        material_damping=1e-5,
-        model=Model(shear=True),
-    )
-    assert write_rotor(tmp_path / "plain.csv", plain) == (tmp_path / "plain.csv",)
-    assert read_rotor(tmp_path / "plain.csv") == plain
-    bare = replace(plain, model=Model())
-    with pytest.raises(ValueError, match="Poisson's ratio without shear"):
-        write_rotor(tmp_path / "bare.csv", bare)
+def test_a_ratio_without_shear_comes_back(tmp_path):
+    bare = Rotor([0.1, 1 / 3], [0.05, 0.07], poisson_ratio=0.25, material_damping=1e-5)
     write_rotor(tmp_path / "bare.toml", bare)
     assert read_rotor(tmp_path / "bare.toml") == bare
 
