@@ -179,13 +179,15 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
     from rotorid.files.problems import Problems
+    from rotorid.files.waveforms import read_vectors_grid
     from rotorid.tables.runs.vectors_table import read_vectors
-    from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
-    from rotorid.tables.waveforms.waveforms import WaveformWishes
 
-    given = WaveformWishes(
-        tacho=options.tacho, sensors=names(options.sensors), unit=options.unit, phase=options.phase
-    )
+    given = {
+        "tacho": options.tacho,
+        "sensors": names(options.sensors),
+        "unit": options.unit,
+        "phase": options.phase,
+    }
     problems = Problems()
     grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
     return read_vectors(grid, phase), read

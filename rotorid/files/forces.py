@@ -170,7 +170,9 @@ def in_si(keys: type[Settings], values: Mapping[str, Any]) -> dict[str, Any]:
     """Values by field as a table of a file, by its keys in SI, without those that are the default."""
     names = {field: one.alias or field for field, one in keys.model_fields.items()}
     return {
-        next(name for name, unit in keys.known_keys()[names[field]].variants.items() if unit.scale == 1.0): value
+        next(
+            name for name, unit in keys.known_keys()[names[field]].variants.items() if unit.scale == 1.0
+        ): value
         for field, value in values.items()
         if value != keys.model_fields[field].default
     }

@@ -319,7 +319,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
     for key in ("runs", "check", "slow_roll"):
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
-            from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
+            from rotorid.files.waveforms import read_vectors_grid
 
             grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
             tables[key], records = grid, (*records, *read)

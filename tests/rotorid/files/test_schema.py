@@ -15,7 +15,7 @@ from rotorid.tables.schema import FILES, schema
 
 FILES_OF = {
     kind: sorted(p for p in sample_data().glob("*/*.toml") if key in tomllib.loads(p.read_text("utf-8")))
-    for kind, key in (("job", "runs"), ("rotor", "shaft"), ("small", "masses_kg"), ("study", "samples"))
+    for kind, key in (("job", "runs"), ("rotor", "shaft"), ("small", "masses_kg"))
 }
 
 

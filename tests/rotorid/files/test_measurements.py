@@ -128,7 +128,7 @@ HEAD = "frequency_rad_s,F_re,X_re,X_im\n"
         ("repeat,frequency_rad_s,F_re,X_re,X_im\n1,1,1,2,3\n1,1,1,2,3\n", ["row 3", "another repeat"]),
         (
             "experiment,repeat,frequency_rad_s,F_re,X_re,X_im\na,1,1,1,2,3\na,2,2,1,2,3\na,3,1,4,2,3\n",
-            ["row 3", "the frequency of row 2", "row 4", "the excitation of row 2"],
+            ["row 3", "row 4", "the frequency and the excitation of row 2"],
         ),
         ("", ["empty"]),
     ],

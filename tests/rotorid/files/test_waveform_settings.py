@@ -11,7 +11,7 @@ from waveform_files import RATE, drawn, write
 from balancing import Labels
 from rotorid.files.input_file import each_file_once, sha256
 from rotorid.files.problems import InputError
-from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
+from rotorid.files.waveforms import read_waveforms
 from rotorid.waveforms.record import SignalPath, TachoSettings
 
 FILE = """
@@ -78,7 +78,7 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
         "B1Y [mm/s]": channels["B1Y"],
         "T_degC": channels["B1X"],
     }
-    wishes = WaveformWishes(tacho="KEY", sensors=["B1X", "B1Y"])
+    wishes = {"tacho": "KEY", "sensors": ["B1X", "B1Y"]}
     found = read_waveforms([write(tmp_path / "base.csv", named)], wishes)
     (record,) = found.records
     assert [(s.name, s.derivative, s.factor) for s in record.sensors] == [("B1X", 0, 1e-6), ("B1Y", 1, 1e-3)]
@@ -87,7 +87,7 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
     del named["T_degC"], named["B1Y [mm/s]"]
     named["B2 (µm)"] = channels["B1Y"]
     named["B2_mil"] = channels["B1X"]
-    (record,) = read_waveforms([write(tmp_path / "base.npz", named)], WaveformWishes(tacho="KEY")).records
+    (record,) = read_waveforms([write(tmp_path / "base.npz", named)], {"tacho": "KEY"}).records
     assert [(s.name, s.factor) for s in record.sensors] == [
         ("B1X", 1e-6),
         ("B2", 1e-6),
@@ -98,7 +98,7 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
 def test_numbers_without_a_unit_or_with_a_label_stay_numbers(tmp_path):
     path = write(tmp_path / "base.npz")
     for unit in (None, "V"):
-        found = read_waveforms([path], WaveformWishes(tacho="KEY", unit=unit))
+        found = read_waveforms([path], {"tacho": "KEY", "unit": unit})
         assert found.labels == Labels(unit or "", 1.0)
         assert [(s.factor, s.derivative) for s in found.records[0].sensors] == [(1.0, None)] * 2
 
@@ -118,18 +118,18 @@ def test_integers_of_a_wav_are_shares_of_full_scale_and_so_is_the_level_of_the_t
 
 
 def test_the_command_line_replaces_what_the_file_says(folder):
-    wishes = WaveformWishes(
-        tacho="B1Y",
-        sensors=("probe", "KEY"),
-        unit="um",
-        amplitude="mm_s_rms",
-        pulses=3,
-        edge="centre",
-        phase="lead",
-        orders=(1,),
-        rate=5120.5,
-        speeds=(100.0,),
-    )
+    wishes = {
+        "tacho": "B1Y",
+        "sensors": ("probe", "KEY"),
+        "unit": "um",
+        "amplitude": "mm_s_rms",
+        "pulses": 3,
+        "edge": "centre",
+        "phase": "lead",
+        "orders": [1],
+        "rate_Hz": 5120.5,
+        "speeds_rad_s": [100.0],
+    }
     found = read_waveforms([settings(folder)], wishes)
     record = found.records[0]
     assert (record.rate, record.tacho.name) == (5120.5, "B1Y")
@@ -141,7 +141,7 @@ def test_the_command_line_replaces_what_the_file_says(folder):
 
 def test_a_rate_that_is_stated_serves_a_file_without_one(tmp_path):
     np.savez(tmp_path / "a.npz", **drawn())
-    (record,) = read_waveforms([tmp_path / "a.npz"], WaveformWishes(tacho="KEY", rate=2560.0)).records
+    (record,) = read_waveforms([tmp_path / "a.npz"], {"tacho": "KEY", "rate_Hz": 2560.0}).records
     assert record.rate == 2560.0
 
 
@@ -153,39 +153,39 @@ def complaint(files, wishes=None):
 
 OPTIONS = {
     "no tacho": (
-        WaveformWishes(),
+        {},
         "expected a tacho channel, without which there is no phase: --tacho NAME "
         "(tacho in a file); the channels are KEY, B1X and B1Y",
     ),
     "another tacho": (
-        WaveformWishes(tacho="KEI"),
+        {"tacho": "KEI"},
         "column KEI: expected a channel of this name (did you mean 'KEY'?)",
     ),
     "another sensor": (
-        WaveformWishes(tacho="KEY", sensors=("B1YY",)),
+        {"tacho": "KEY", "sensors": ("B1YY",)},
         "B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
     ),
     "another rate": (
-        WaveformWishes(tacho="KEY", rate=5200.0),
+        {"tacho": "KEY", "rate_Hz": 5200.0},
         "the rate that the file has, 5120 Hz, not 5200 Hz",
     ),
     "a unit": (
-        WaveformWishes(tacho="KEY", unit="MM"),
+        {"tacho": "KEY", "unit": "MM"},
         "column unit: found 'MM', expected the unit written mm",
     ),
-    "pp": (WaveformWishes(tacho="KEY", unit="um_pp"), "expected the unit of a sample, um, not um_pp"),
+    "pp": ({"tacho": "KEY", "unit": "um_pp"}, "expected the unit of a sample, um, not um_pp"),
     "kinds": (
-        WaveformWishes(tacho="KEY", unit="V", amplitude="um"),
+        {"tacho": "KEY", "unit": "V", "amplitude": "um"},
         "column B1X: found 'V', expected a unit that can become that of the amplitudes, um",
     ),
     "none": (
-        WaveformWishes(tacho="KEY", amplitude="um"),
+        {"tacho": "KEY", "amplitude": "um"},
         "column B1X: found nothing (a blank), expected a unit that can become that of the amplitudes, um",
     ),
-    "orders": (WaveformWishes(tacho="KEY", orders=(0,)), "column orders"),
+    "orders": ({"tacho": "KEY", "orders": [0]}, "column orders"),
     "pulses": (
-        WaveformWishes(tacho="KEY", pulses=0),
-        "column pulses: found '0', expected pulses, a whole number",
+        {"tacho": "KEY", "pulses": 0},
+        "column pulses: found '0', expected a number of 1 or more: pulses a turn",
     ),
 }
 
@@ -199,7 +199,7 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
-    'tacho = "KEY"\nrecords = []\n': "key records: expected files by the names of their runs",
+    'tacho = "KEY"\nrecords = []\n': "key records: expected a table, [records]: a file for each run",
     'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
     'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
     'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",
@@ -208,7 +208,7 @@ FILES = {
     FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
     FILE.replace("mm/s", "mm_s_pk"): "key channels.B1Y.unit",
     FILE.replace("high_pass_Hz", "high_pass_rpm"): "key channels.probe.high_pass_rpm",
-    "records = 5\nchannels = 3\n": "key channels: found '3', expected a table of settings",
+    "records = 5\nchannels = 3\n": "key channels: found '3', expected a table, [channels]",
 }
 
 
@@ -222,17 +222,17 @@ def test_units_in_names_and_settings_agree(tmp_path):
     channels = {"KEY": drawn()["KEY"], "A_um": drawn()["B1X"]}
     path = write(tmp_path / "a.npz", channels)
     for unit in ("um", "mil", None):  # those of channels that state none
-        assert read_waveforms([path], WaveformWishes(tacho="KEY", unit=unit)).labels.vibration_unit == "um"
+        assert read_waveforms([path], {"tacho": "KEY", "unit": unit}).labels.vibration_unit == "um"
     text = 'tacho = "KEY"\nrecords = ["a.npz"]\n[channels.A]\nunit = "mil"\n'
     assert "column A_um: expected the unit um of its name, not mil" in complaint([settings(tmp_path, text)])
     twice = write(tmp_path / "b.npz", {**channels, "A_mil": drawn()["B1Y"]})
-    assert "the channels are A_um and A_mil" in complaint([twice], WaveformWishes(tacho="KEY", sensors=["A"]))
+    assert "the channels are A_um and A_mil" in complaint([twice], {"tacho": "KEY", "sensors": ["A"]})
     only = write(tmp_path / "c.npz", {"KEY": drawn()["KEY"]})
-    assert "a channel besides that of the tacho" in complaint([only], WaveformWishes(tacho="KEY"))
+    assert "a channel besides that of the tacho" in complaint([only], {"tacho": "KEY"})
 
 
 def test_several_files(folder):
-    wishes = WaveformWishes(tacho="KEY")
+    wishes = {"tacho": "KEY"}
     found = read_waveforms([folder / "base.npz", folder / "t1.csv"], wishes)
     assert [record.run for record in found.records] == ["base", "t1"]
     assert "one waveforms file alone" in complaint([settings(folder), folder / "base.npz"], wishes)
@@ -246,14 +246,14 @@ def test_a_gap_in_a_channel_that_nobody_wants_is_no_problem(tmp_path):
     channels = drawn()
     channels["B1Y"][7] = np.nan
     path = write(tmp_path / "a.npz", channels)
-    read_waveforms([path], WaveformWishes(tacho="KEY", sensors=["B1X"]))
-    words = complaint([path], WaveformWishes(tacho="KEY"))
+    read_waveforms([path], {"tacho": "KEY", "sensors": ["B1X"]})
+    words = complaint([path], {"tacho": "KEY"})
     assert "row 8, column B1Y: found nothing (a blank), expected a number in each sample" in words
 
 
 def test_a_tacho_of_true_and_false_is_one_of_numbers(tmp_path):
     path = write(tmp_path / "a.npz", {"KEY": drawn()["KEY"] > 1, "A": drawn()["B1X"]})
-    (record,) = read_waveforms([path], WaveformWishes(tacho="KEY")).records
+    (record,) = read_waveforms([path], {"tacho": "KEY"}).records
     assert record.tacho.samples.dtype.kind == "i"
 
 

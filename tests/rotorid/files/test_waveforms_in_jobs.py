@@ -10,7 +10,7 @@ from scipy.io import wavfile
 from rotorid.files.job import read_job
 from rotorid.tables import InputError, TableWarning
 
-SAMPLE = Path(__file__).parents[4] / "sample_data" / "waveforms"
+SAMPLE = Path(__file__).parents[3] / "sample_data" / "waveforms"
 
 
 @pytest.fixture

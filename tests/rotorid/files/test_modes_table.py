@@ -8,7 +8,7 @@ from cases import each_of
 from tables_data import complaints, replaced, the_only, write_book, write_csv
 
 import fem
-from rotorid.tables.data.modes_table import read_compliance, read_modes
+from rotorid.files.modes import read_compliance, read_modes
 
 MODES = [
     ["mode", "frequency_rad_s", "node", "shape"],
@@ -131,7 +131,7 @@ def test_a_node_twice_in_a_mode(tmp_path):
 
 def test_frequencies_ascend_with_the_mode(tmp_path):
     lower = replaced(replaced(MODES, 5, "frequency_rad_s", 135.2), 6, "frequency_rad_s", "")
-    words = "above that of mode 1 (135.2 in row 2): modes are numbered from the lowest"
+    words = "above that of the mode before (135.2 in row 2): modes are numbered from the lowest"
     the_only(bad_modes(tmp_path, lower), "modes.csv", 5, "frequency_rad_s", "135.2", words)
 
 
@@ -279,7 +279,7 @@ def test_a_compliance_that_does_not_fit(tmp_path, row, value, words):
 
 def test_compliances_of_no_shaft_are_refused(tmp_path):
     wrong = replaced(COMPLIANCE, 5, "compliance_m_per_N", 9.35e-8)  # as [S] misprints α22
-    words = "Between nodes 7 and 12 it is larger"
+    words = "Check those between nodes 7, 12 and 18, "
     the_only(bad_compliance(tmp_path, wrong), "alpha.csv", None, "compliance_m_per_N", None, words)
     unlikely = replaced(COMPLIANCE, 4, "compliance_m_per_N", 1e-8)  # every pair possible, the three not
     words = "Check those between nodes 7, 12 and 18"
