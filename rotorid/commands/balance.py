@@ -146,7 +146,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         return job_workbook_bytes(read, with_limits_of(files, read, options), path, outcome, made)
 
     def coefficients(path: Path) -> Written:
-        from rotorid.tables.runs.influence_table import influence_bytes
+        from rotorid.files.influence import influence_bytes
 
         return influence_bytes(path, influence)
 

@@ -13,6 +13,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.influence import influence_frame as influence_frame
+    from rotorid.files.influence import read_influence as read_influence
+    from rotorid.files.influence import write_influence as write_influence
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
@@ -35,9 +38,6 @@ if TYPE_CHECKING:
     from rotorid.tables.rotor.rotor_file import rotor_files as rotor_files
     from rotorid.tables.rotor.rotor_writing import write_rotor as write_rotor
     from rotorid.tables.rotor.unbalance_table import read_unbalance as read_unbalance
-    from rotorid.tables.runs.influence_table import influence_frame as influence_frame
-    from rotorid.tables.runs.influence_table import read_influence as read_influence
-    from rotorid.tables.runs.influence_table import write_influence as write_influence
 
 _HOME = {
     "read_measurements": "data.measurements",
@@ -61,9 +61,9 @@ _HOME = {
     "rotor_files": "rotor.rotor_file",
     "write_rotor": "rotor.rotor_writing",
     "read_unbalance": "rotor.unbalance_table",
-    "influence_frame": "runs.influence_table",
-    "read_influence": "runs.influence_table",
-    "write_influence": "runs.influence_table",
+    "influence_frame": ".files.influence",
+    "read_influence": ".files.influence",
+    "write_influence": ".files.influence",
     "Conventions": ".files.conventions",
     "StatedErrors": ".files.conventions",
     "read_trials": ".files.runs",

@@ -22,13 +22,13 @@ from rotorid.files.conventions import (
     as_phase,
     resolve_angles,
 )
+from rotorid.files.influence import Stored, fit_to_readings, load_influence
 from rotorid.files.layout import stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.settings_keys import Said
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.job_holes import hole_angles
-from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
 from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 
 

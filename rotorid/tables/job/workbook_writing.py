@@ -16,13 +16,12 @@ from balancing import Influence
 from rotorid.files.excel_pages import Line, Page, book_bytes
 from rotorid.files.excel_workbook import is_workbook
 from rotorid.files.grid import Cell
+from rotorid.files.influence import influence_frame
 from rotorid.files.problems import Problems
 from rotorid.files.text_file import read_bytes
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.job_data import Job
 from rotorid.tables.job.job_from_excel import RESULTS
-from rotorid.tables.runs.influence_comments import PHASE_MEANING
-from rotorid.tables.runs.influence_table import influence_frame, labels_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,9 +129,7 @@ def result_sheets(results: Results, provenance: Mapping[str, Any] | None) -> dic
             sheets[f"{RESULTS} {name}"] = [*head, *_records(found)]
     if results.mounted is not None:
         sheets[f"{RESULTS} holes"] = [*head, *_frame(results.mounted.to_frame())]
-    labels = labels_of(results.influence)
-    said = [(f"# phase = {labels.phase}",), (f"# angles = {labels.angles}",), (f"# {PHASE_MEANING}",)]
-    sheets[f"{RESULTS} influence"] = [*head, *said, *_frame(influence_frame(results.influence))]
+    sheets[f"{RESULTS} influence"] = [*head, *_frame(influence_frame(results.influence))]
     return sheets
 
 
