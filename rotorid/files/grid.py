@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from rotorid.base.text import counted
@@ -53,6 +53,8 @@ class CommentLine(str):
 
 Cell = str | int | float | BadCell
 Row = tuple[int, tuple[Cell, ...]]
+Finder = Callable[[Sequence[Sequence[str]]], tuple[int, int, Sequence[str]] | None]
+"""Finds where a header surely stands: its first and last row among some, and its names; None: nowhere."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,8 @@ class Grid:
         False where a line could not be split into cells, so that nothing can be said about missing rows.
     first_rows
         The first rows as they stood, the header among them, to find a header that is not the first row.
-    named, taken
-        Where the columns are not those of the file: their names there, and which of them each cell of each
-        row is from.
+    named
+        Where the columns are not those of the file: the name of the column there of each cell of each row.
     """
 
     source: str
@@ -90,8 +91,7 @@ class Grid:
     comments: tuple[str, ...] = ()
     complete: bool = True
     first_rows: tuple[Row, ...] = ()
-    named: tuple[str, ...] = ()
-    taken: tuple[tuple[int, ...], ...] = ()
+    named: tuple[tuple[str, ...], ...] = ()
 
 
 def clean(text: str) -> str:
@@ -129,6 +129,17 @@ def begins_comment(text: str) -> bool:
 def is_spreadsheet_error(cell: str) -> bool:
     """Whether a cell holds what a spreadsheet shows for an error, in English or another language."""
     return _SPREADSHEET_ERROR.fullmatch(cell) is not None
+
+
+def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
+    """Rows with the header in one row, where that is found; those above it become comments."""
+    header = find([[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]])
+    if header is None:
+        return list(rows)
+    first, last, names = header
+    above = [(n, (f"# {' '.join(filter(None, map(show, cells))).lstrip('# ')}",)) for n, cells in rows[:last]]
+    changed = rows[last] if first == last else (rows[last][0], tuple(names))
+    return [*above, changed, *rows[last + 1 :]]
 
 
 def make_grid(

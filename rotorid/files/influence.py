@@ -228,7 +228,7 @@ def _tidied(grid: Grid) -> Grid:
         if "phase_deg" not in header and all(vectors):
             header.append("phase_deg")
             rows = tuple(
-                (number, (*cells[:at], vector[0].strip(), *cells[at + 1 :], vector[1].rstrip("° ")))
+                (number, (*cells[:at], vector[0], *cells[at + 1 :], vector[1].rstrip("° ")))
                 for (number, cells), vector in zip(rows, filter(None, vectors), strict=True)
             )
     return replace(grid, header=tuple(header), rows=rows)

@@ -6,13 +6,16 @@ import codecs
 import csv
 import re
 import warnings
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.files.grid import (
+    MOST_ABOVE,
     MOST_CELLS,
     CommentLine,
+    Finder,
     Grid,
     Row,
     begins_comment,
@@ -26,7 +29,8 @@ SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _BLANK = ';,\t" \xa0\ufeff\r\n'
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
 _WIDE = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
-_NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
+MOST_BYTES_ABOVE = 10_000
+"""Of a line that may be a header."""
 
 
 def read_bytes(path: Path, problems: Problems) -> bytes | None:
@@ -114,20 +118,23 @@ def _looks_cyrillic(data: bytes) -> bool:
     return votes > 0
 
 
-def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool = False) -> Grid | None:
-    """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`."""
+def parse_text(
+    source: str, text: str, problems: Problems, *, may_be_empty: bool = False, find: Finder | None = None
+) -> Grid | None:
+    """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`.
+
+    With `find`, what stands above the header that it finds is comment.
+    """
     lines = re.split(r"\r\n|\n|\r", text)
-    separator = ""
+    # A spreadsheet takes `sep=;` as an instruction and does not show it: rows count from the next.
     declared = SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
     if declared:
-        # A spreadsheet takes this line as an instruction and does not show it: rows count from the next.
-        separator = declared.group(1)
         lines = lines[1:]
-        if separator not in _NAMES:
-            problems.add(source, 1, None, f"sep={separator}", "sep=; or sep=, or a tab")
+        if declared.group(1) not in ";,\t":
+            problems.add(source, 1, None, f"sep={declared.group(1)}", "sep=; or sep=, or a tab")
             return None
-    else:
-        separator = _separator(lines)
+    start, names, separator = _header(lines, find)
+    separator = declared.group(1) if declared else separator
     if len(lines) + text.count(separator) > MOST_CELLS:
         problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
         return None
@@ -135,8 +142,9 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
     complete, below_header = True, False
     for number, line in enumerate(lines, start=1):
         stripped = clean(line)
-        if begins_comment(stripped) and not (below_header and separator in line):
-            rows.append((number, (CommentLine(stripped),)))
+        above = number <= start and bool(stripped)
+        if above or (begins_comment(stripped) and not (below_header and separator in line)):
+            rows.append((number, (CommentLine(stripped if stripped[:1] == "#" else f"# {stripped}"),)))
             continue
         try:
             cells = _cells(line, separator)
@@ -145,6 +153,8 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             problems.add(source, number, None, None, f"{rule}: {error}")
             complete = False
             continue
+        if number == start + 1 and names is not None:
+            cells = tuple(names)
         if not below_header and cells and begins_comment(cells[0]) and not any(cells[1:]):
             cells = (CommentLine(cells[0]),)  # a comment with a separator in it, as a spreadsheet saves it
         else:
@@ -153,10 +163,21 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
     return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
 
 
-def cells_of_line(line: str) -> tuple[tuple[str, ...], str]:
-    """Cells of one line, and what separates them; csv.Error where its quotes are not closed."""
-    separator = _separator([line])
-    return _cells(line, separator), separator
+def _header(lines: Sequence[str], find: Finder | None) -> tuple[int, Sequence[str] | None, str]:
+    """How many lines stand above the header, its names where it has two rows, and what separates columns."""
+    top: dict[int, tuple[tuple[str, ...], str]] = {}
+    for at, line in enumerate(lines[:MOST_ABOVE] if find is not None else ()):
+        plain = line.strip(_BLANK)
+        if plain and not plain.startswith("#") and len(line) < MOST_BYTES_ABOVE:
+            with suppress(csv.Error):
+                separator = _separator([line])
+                top[at] = _cells(line, separator), separator
+    header = None if find is None else find([cells for cells, _ in top.values()])
+    if header is None:
+        return 0, None, _separator(lines)
+    first, last, names = header
+    at = [*top][last]
+    return at, names if first != last else None, top[at][1]
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:
@@ -165,7 +186,7 @@ def _cells(line: str, separator: str) -> tuple[str, ...]:
     return tuple(map(clean, next(csv.reader([line], delimiter=separator, strict=True), [])))
 
 
-def _separator(lines: list[str]) -> str:
+def _separator(lines: Sequence[str]) -> str:
     """What separates the columns of the header, outside quotes."""
     for line in lines:
         if line.strip(';,\t" \xa0\ufeff') and not line.strip().startswith(("#", '"#')):

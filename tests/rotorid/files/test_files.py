@@ -153,7 +153,7 @@ def test_a_workbook_without_the_sheet(tmp_path, weights):
         (True, "TRUE", "not a logical value"),
         ("#DIV/0!", "#DIV/0!", "not an error of the spreadsheet"),
         ("=1+1", "=1+1", "open and save the file in Excel"),
-        ("2.5 um", "2.5 um", "unit in the header"),
+        ("2.5 um", "2.5 um", "a number in um_pp, as the heading"),
         ("9,487", "9,487", "comma may separate thousands"),
         ("", "", "a number"),
         (None, "", "a number"),

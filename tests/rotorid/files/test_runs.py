@@ -158,7 +158,7 @@ def test_two_near_speeds_in_one_run(bad, read):
 BAD_READINGS = [
     ("amplitude_um_pp", "nan", "a finite number"),
     ("amplitude_um_pp", "", "a number"),
-    ("amplitude_um_pp", "7.2 um", "write the unit in the header"),
+    ("amplitude_um_pp", "7.2 um", "a number in um_pp, as the heading says"),
     ("amplitude_um_pp", -1, "an amplitude of 0 or more"),
     ("phase_deg", "", "a number"),
     ("phase_deg", 361, "a phase from -360 to 360 degrees"),
