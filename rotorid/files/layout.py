@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -113,7 +114,7 @@ def read_runs_grids(
         grid = read_grid(file, "runs", problems, first=first, find=partial(find_header, named=named))
         if grid is None or not _are_there(named, grid, conventions):
             continue
-        with Explained(grid, problems):
+        with explained(grid, problems):
             grid = _runs_form(grid, named, conventions)
             if isinstance(file, Path) and files and "run" not in grid.header:
                 rows = tuple((number, (file.stem, *cells)) for number, cells in grid.rows)
@@ -123,21 +124,13 @@ def read_runs_grids(
     return grids if len(grids) == len(files or (source,)) else None
 
 
-class Explained:
-    """Notes what was unclear in a table as a problem of it."""
-
-    def __init__(self, grid: Grid, problems: Problems) -> None:
-        self.grid, self.problems = grid, problems
-
-    def __enter__(self) -> None:
-        """Nothing."""
-
-    def __exit__(self, kind: object, reason: BaseException | None, trace: object) -> bool:
-        """Whether it was explained."""
-        if isinstance(reason, Unclear):
-            row = reason.row or self.grid.header_row
-            self.problems.add(self.grid.source, row, reason.column, reason.value, str(reason))
-        return isinstance(reason, Unclear)
+@contextmanager
+def explained(grid: Grid, problems: Problems) -> Iterator[None]:
+    """What is unclear in a table becomes a problem of it."""
+    try:
+        yield
+    except Unclear as reason:
+        problems.add(grid.source, reason.row or grid.header_row, reason.column, reason.value, str(reason))
 
 
 def stated_phase(source: Source, columns: Said | None = None) -> Phase | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -60,40 +59,32 @@ def merge_speeds(
     speeds, index, words
         rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
-    values, runs, unit = table.numbers("speed"), table.texts("run"), table.unit("speed")
+    values, unit, tolerance = table.numbers("speed"), table.unit("speed"), tolerance_percent
     groups: list[list[float]] = []
     for speed in np.unique(values[list(usable)]).tolist():
-        if groups and same_speed(speed, groups[-1][-1], tolerance_percent):
-            groups[-1].append(speed)
-        else:
-            groups.append([speed])
+        if not groups or not same_speed(speed, groups[-1][-1], tolerance):
+            groups.append([])
+        groups[-1].append(speed)
     place = {speed: g for g, group in enumerate(groups) for speed in group}
     index = {row: place[float(values[row])] for row in usable}
-    rows: dict[tuple[int, str], dict[float, int]] = defaultdict(dict)
+    remedy = f"within the tolerance of {tolerance:g} %; write the nominal speed, or set "
+    remedy += "speed_tolerance_percent smaller"
+    names = [table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table]
+    first: dict[tuple[object, ...], int] = {}
+    of_group: list[dict[str, dict[float, None]]] = [{} for _ in groups]
+    unclear = set[tuple[int, str]]()
     for row in usable:
-        rows[index[row], runs[row]].setdefault(float(values[row]), row)
-    remedy = (
-        f"within the tolerance of {tolerance_percent:g} %; write the nominal speed, or set "
-        "speed_tolerance_percent smaller"
-    )
-    unclear, steady = set(), False
-    sensors, repeats = (table.texts(stem) if stem in table else runs for stem in ("sensor", "repeat"))
-    readings = Counter((index[row], runs[row], sensors[row], repeats[row]) for row in usable)
-    several = {key[:2] for key, count in readings.items() if count > 1}
-    of_group: list[list[float]] = [[] for _ in groups]
-    for (g, run), row_of in rows.items():
-        of_group[g].extend(row_of)
-        if len(row_of) > 1 and (g, run) not in several:
-            steady = True
-        elif len(row_of) > 1:
-            one, row = list(row_of.values())[:2]
+        g, one = index[row], first.setdefault((index[row], *(each[row] for each in names)), row)
+        of_group[g].setdefault(names[0][row], {})[float(values[row])] = None
+        if values[one] != values[row] and (g, names[0][row]) not in unclear:
             other = table.shown("speed", one)
-            table.complain(row, "speed", f"one speed: run {run!r} has {other} as well, {remedy}")
-            unclear.add(g)
-    alike = []
-    merged = [group[0] if len(group) == 1 else float(np.mean(of_group[g])) for g, group in enumerate(groups)]
+            table.complain(row, "speed", f"one speed: run {names[0][row]!r} has {other} as well, {remedy}")
+            unclear.add((g, names[0][row]))
+    alike, merged = [], []
     for g, group in enumerate(groups):
-        if g not in unclear and not same_speed(group[0], group[-1], tolerance_percent):
+        speeds = [speed for own in of_group[g].values() for speed in own]
+        merged.append(group[0] if len(group) == 1 else float(np.mean(speeds)))
+        if g not in {k for k, _ in unclear} and not same_speed(group[0], group[-1], tolerance):
             shown = [show_speed(speed, unit) for speed in group]
             chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
             expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
@@ -101,7 +92,8 @@ def merge_speeds(
         if not same_speed(group[0], group[-1], UNSAID):
             numbers = ", ".join(f"{speed * unit.scale:.6g}" for speed in group)
             alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
+    steady = any(len(own) > 1 for runs in of_group for own in runs.values())
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
     of = "of one run, or of different ones," if steady else "of different runs"
-    words = f"speeds {of} within {tolerance_percent:g} % count as one: {'; '.join(alike[:3])}{more}"
+    words = f"speeds {of} within {tolerance:g} % count as one: {'; '.join(alike[:3])}{more}"
     return np.array(merged), index, (words,) if alike else ()

@@ -8,7 +8,7 @@ import os
 import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rotorid.base import logs
 from rotorid.base.tables import Value, csv_bytes, one_line
@@ -44,13 +44,15 @@ def table_bytes(path: str | Path, frame: pd.DataFrame, *, sheet: str = "table") 
     """What `write_table` writes to a file of this name."""
     path = Path(path)
     kind = path.suffix.lower()
-    names = [str(name) for name in frame.columns]
+    names = [*map(str, frame.columns)]
     plain = frame.astype(object).where(frame.notna(), None)  # the blanks of all kinds of columns
-    rows = [[_plain(value) for value in row] for row in plain.itertuples(index=False)]
+    cells: list[list[Any]] = plain.to_numpy().tolist()
+    rows = [[_plain(value) for value in row] for row in cells]
     if kind == ".csv":
         return csv_bytes((), names, rows)
     if kind == ".xlsx":
-        page = [tuple(one_line(c) if isinstance(c, str) else c for c in line) for line in (names, *rows)]
+        lines: list[list[Value]] = [[*names], *rows]
+        page = [tuple(one_line(c) if isinstance(c, str) else c for c in line) for line in lines]
         return book_bytes([Page(sheet, page)], sheet)
     raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 

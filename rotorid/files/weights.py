@@ -9,24 +9,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Column, Source, make_table, read_grid
+from rotorid.files.columns import Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.grid import Cell, Grid, show
-from rotorid.files.headings import Heading, find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, Explained, Unclear, long_rows
+from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.grid import Grid, show
+from rotorid.files.headings import find_header, read_headings
+from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
 from rotorid.files.problems import Problems
-from rotorid.files.units import Unit, one_of
+from rotorid.files.units import Unit, UnitError, one_of
 
 COLUMNS = (
     Column("run"),
@@ -37,9 +37,10 @@ COLUMNS = (
     Column("unbalance", one_of(units.UNBALANCE), ("unbalance_g_mm", "unbalance_oz_in"), required=False),
     Column("angle", one_of(units.ANGLE), ("angle_deg",)),
 )
-ANGLES = ("angle", "hole", "clock")
+_PLACES = ("angle", "hole", "clock")
 """Columns that say where a weight is; the first that is filled in counts."""
-_NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?")
+_BESIDE = (*_PLACES[1:], "action", "unit", "pieces")
+_PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
@@ -75,12 +76,18 @@ def read_weights(
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     if grid is None:
         return None
-    before = len(problems)
-    with Explained(grid, problems):
-        grid = _tidied(grid, runs, conventions)
-    if len(problems) > before:
-        return None
-    table = make_table(grid, COLUMNS, problems)
+    before, angle_unit = len(problems), ""
+    with explained(grid, problems):
+        grid, angle_unit = _long(grid, conventions)
+    one = runs is not None and len(runs) == 1  # whose name need not stand there
+    there = {name.partition("_")[0] for name in grid.header}
+    columns = [
+        replace(c, unit=None, blank=True, required=there.isdisjoint(_PLACES)) if c.stem == "angle" else c
+        for c in COLUMNS
+    ]
+    columns[0] = replace(columns[0], required=not one)
+    columns += [Column(stem, required=False, blank=True) for stem in _BESIDE if stem in there]
+    table = make_table(grid, columns, problems) if len(problems) == before else None
     if table is None:
         return None
     missing = "one column of weights, mass_<unit> or unbalance_<unit>, such as mass_g or unbalance_g_mm"
@@ -88,82 +95,70 @@ def read_weights(
     what = table.only(("mass", "unbalance"), "mass_g", missing, several)
     if what is None:
         return None
-    size, angle = table.numbers(what), table.numbers("angle")
+    size, plane = table.numbers(what), table.texts("plane")
     table.must_be(
         what,
         size > 0,
         "a weight above 0 (a run without weights has no row here; what was removed is a weight 180° away)",
     )
-    table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
-    run, plane = table.texts("run"), table.texts("plane")
+    known = {name.casefold(): name for name in runs or ()} | {name: name for name in runs or ()}
+    names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
+    run = [known.get(name, known.get(name.casefold(), name)) for name in names]
+    try:
+        unit = one_of(units.ANGLE)(angle_unit) if angle_unit else None
+    except UnitError as error:
+        name = table.fields["angle"].name
+        problems.add(table.source, table.header_row, name, name, str(error))
+        return None
+    angle = _angles(table, conventions, unit)
     planes = tuple(dict.fromkeys(name for name in plane if name))
     values = conventions.labels.weight_from(size, angle)
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
     seen: dict[tuple[str, str, complex], int] = {}
     for i in range(len(table)):
         if runs is not None and run[i] and run[i] not in runs:
-            expected = (
-                f"a run of the runs table{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
-            )
-            table.complain(i, "run", expected)
+            hint = f"{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
+            table.complain(i, "run", f"a run of the runs table{hint}")
         elif run[i] and plane[i] and size[i] > 0 and np.isfinite(angle[i]):
             first = seen.setdefault((run[i], plane[i], complex(values[i])), i)
             if first != i:
-                table.complain(i, "run", f"each weight once (row {table.rows[first]} says the same)")
+                stem = "run" if "run" in table else "plane"
+                table.complain(i, stem, f"each weight once (row {table.rows[first]} says the same)")
             elif runs is not None:
                 total[runs.index(run[i]), planes.index(plane[i])] += values[i]
     return Weights(planes, total, table.unit(what), tuple(seen))
 
 
-def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) -> Grid:
-    """The table with the columns run, plane, mass or unbalance with its unit, and angle_deg."""
+def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
+    """The table with one row a weight, as far as its columns are clear, and the unit of its angles."""
     headings = read_headings(grid.header, weights=True)
     stems = [heading.stem for heading in headings if heading.stem not in ("", "note")]
     sizes = {"mass", "unbalance"} & {*stems}
     wide = "plane" not in stems and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
-    if len(sizes) != 1 or not (wide or ("plane" in stems and len({*stems}) == len(stems))):
-        return grid  # the table explains
-    [size] = sizes
-    headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
-    if not wide:
-        headings = [replace(h, sensor="") for h in headings]
-        grid = _with_units(grid, {h.stem: h.index for h in headings})
-    grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
-    header = [_size_name(name, size) for name in grid.header]
-    at = {name.partition("_")[0]: k for k, name in enumerate(header)}
-    filled = [at[s] for s in ("plane", size, *ANGLES) if s in at and not (wide and s == "plane")]
+    if len(sizes) == 1 and (wide or ("plane" in stems and len({*stems}) == len(stems))):
+        [size] = sizes
+        headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
+        if not wide:
+            headings = [replace(h, sensor="") for h in headings]
+            grid = _with_units(grid, {h.stem: h.index for h in headings})
+        grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
+        grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
+    header = [name.partition("_") for name in grid.header]
+    places = {k for k, (stem, *_) in enumerate(header) if stem in _PLACES}
+    told = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
+    filled = [k for k, (stem, *_) in enumerate(header) if stem in told]
     kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in filled)]
-    rows, named = [grid.rows[k] for k in kept], [grid.named[k] for k in kept]
-    columns = {
-        name: [(names[k], row[k]) for (_, row), names in zip(rows, named, strict=True)]
-        for k, name in enumerate(header)
-        if name.partition("_")[0] not in (*ANGLES, "action", "unit", "pieces")
-    }
-    if "run" in at:
-        folded = {name.casefold(): name for name in runs or ()} | {name: name for name in runs or ()}
-        columns["run"] = [
-            (name, folded.get(show(cell), folded.get(show(cell).casefold(), cell)))
-            for name, cell in columns["run"]
-        ]
-    elif runs is not None and len(runs) == 1:
-        columns["run"] = [("run", runs[0]) for _ in rows]
-    if any(stem in at for stem in ANGLES):
-        unit = next((name.partition("_")[2] for name in header if name.startswith("angle_")), "")
-        angles = [
-            _angle(_Place(number, row, names, at), conventions, unit, grid.separator)
-            for (number, row), names in zip(rows, named, strict=True)
-        ]
-        plain = [abs(value) for _, value, by_name in angles if isinstance(value, float) and not by_name]
-        if not unit and any(plain) and max(plain) <= math.tau:
-            heading = Heading(0, grid.named[0][at["angle"]])
-            raise Unclear(f"its unit too, such as '{heading.name} (deg)'", heading)
-        columns[f"angle_{unit or 'deg'}"] = [(name, value) for name, value, _ in angles]
-    return replace(
+    rows = ((n, tuple(show(c) if k in places else c for k, c in enumerate(r))) for n, r in grid.rows)
+    every = tuple(rows)
+    names = ("angle" if part[0] == "angle" else name for name, part in zip(grid.header, header, strict=True))
+    named = grid.named or (grid.header,) * len(every)
+    grid = replace(
         grid,
-        header=tuple(columns),
-        rows=tuple((n, tuple(c[k][1] for c in columns.values())) for k, (n, _) in enumerate(rows)),
-        named=tuple(tuple(c[k][0] for c in columns.values()) for k in range(len(rows))),
+        header=tuple(names),
+        rows=tuple(every[k] for k in kept),
+        named=tuple(named[k] for k in kept),
     )
+    return grid, next((unit for stem, _, unit in header if stem == "angle"), "")
 
 
 def _with_units(grid: Grid, at: Mapping[str, int]) -> Grid:
@@ -186,62 +181,59 @@ def _size_name(name: str, size: str) -> str:
     return f"{kind}_{unit}" if unit else kind
 
 
-class _Place(NamedTuple):
-    """A row of the table: its number, cells, the names of its columns in the file, places by stem."""
-
-    number: int
-    row: Sequence[Cell]
-    names: Sequence[str]
-    at: Mapping[str, int]
-
-    def cell(self, stem: str) -> str:
-        """A cell as text; nothing where there is no such column."""
-        return show(self.row[self.at[stem]]) if stem in self.at else ""
-
-    def unclear(self, stem: str, expected: str) -> Unclear:
-        """What a cell should be."""
-        return Unclear(expected, Heading(0, self.names[self.at[stem]]), self.number, self.cell(stem))
-
-
-def _angle(place: _Place, conventions: Conventions, unit: str, separator: str) -> tuple[str, Cell, bool]:
-    """Heading and angle of a weight, and whether it is no plain number; what is none the table explains."""
-    stem = next((s for s in ANGLES if place.cell(s)), next(s for s in ANGLES if s in place.at))
-    cell, written, turn = place.row[place.at[stem]], place.cell(stem), math.tau if unit == "rad" else 360.0
-    degrees = _by_name(written, stem, place, conventions) if written else None
-    by_name = degrees is not None
-    if degrees is not None:
-        cell = degrees * turn / 360.0
-    elif _NUMBER.fullmatch(written) and not (separator == "," and "," in written):
-        cell = float(written.replace(",", "."))
-    action = place.cell("action").casefold()
-    if action not in ("", "add", "added", "remove", "removed"):
-        raise place.unclear("action", "add or remove")
-    if action.startswith("remove") and isinstance(cell, float):
-        cell = (cell + turn / 2) % turn
-    return place.names[place.at[stem]], cell, by_name
+def _angles(table: Table, conventions: Conventions, unit: Unit | None) -> FloatArray:
+    """Angle of each weight, rad; NaN and a problem where there is none."""
+    angle, plain = np.full(len(table), math.nan), np.zeros(len(table), dtype=bool)
+    places = [stem for stem in _PLACES if stem in table]
+    for i in range(len(table)):
+        stem = next((stem for stem in places if table.texts(stem)[i]), places[0])
+        written = table.texts(stem)[i]
+        try:
+            degrees = _by_name(table, i, stem, written, conventions)
+            plain[i] = degrees is None
+            if degrees is None:
+                degrees = parse_number(written.replace(",", ".") if _PLAIN.fullmatch(written) else written)
+            angle[i] = degrees
+        except NotANumber as error:
+            table.complain(i, stem, str(error))
+    largest = np.abs(angle[plain]).max(initial=0.0, where=np.isfinite(angle[plain]))
+    if unit is None and 0 < largest <= math.tau:
+        name = table.fields["angle"].name
+        table.problems.add(
+            table.source, table.header_row, name, name, f"its unit too, such as '{name} (deg)'"
+        )
+    degree = units.ANGLE["deg"]
+    angle = np.where(plain & (unit != degree) & (unit is not None), angle, degree.to_si(1.0) * angle)
+    wrong = np.abs(angle) > FULL_TURN
+    table.complain_where(wrong, places[0], "an angle from -360 to 360 degrees")
+    for i, action in enumerate(table.texts("action") if "action" in table else ()):
+        if action.casefold() in ("remove", "removed"):
+            angle[i] += math.pi
+        elif action.casefold() not in ("", "add", "added"):
+            table.complain(i, "action", "add or remove")
+    return np.where(wrong, math.nan, angle)
 
 
-def _by_name(written: str, stem: str, place: _Place, conventions: Conventions) -> float | None:
+def _by_name(table: Table, i: int, stem: str, written: str, conventions: Conventions) -> float | None:
     """The angle in degrees of 90°, a clock, a hole, a blade or a position; None: a number of the angle."""
     if match := _ANGLE.fullmatch(written):
-        return float(match[1].replace(",", ".")) if _NUMBER.fullmatch(match[1]) else None
+        return parse_number(match[1].replace(",", "."))
     clock = _CLOCK.fullmatch(written)
     if clock and (stem == "clock" or ":" in written or not written[-1:].isdigit()):
         return (30.0 * int(clock[1]) + int(clock[2] or 0) / 2.0) % 360.0
     match = _HOLE.fullmatch(written)
-    if stem == "clock":
-        raise place.unclear(stem, "a time of the clock face, such as 10:20")
-    if stem != "hole" and match is None:
+    if stem == "clock" and written:
+        raise NotANumber("a time of the clock face, such as 10:20")
+    if not written or (stem != "hole" and match is None):
         return None
-    hole, plane = match[1] if match else written, place.cell("plane")
+    hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:
         keys = f"[planes.{plane}] holes = 12 or holes_deg = [0, 30, 75]"
-        raise place.unclear(stem, f"an angle, or the holes of the plane in the job, {keys}")
+        raise NotANumber(f"an angle, or the holes of the plane in the job, {keys}")
     if hole not in holes:
         hint = f"{did_you_mean(hole, holes)}; it has {listing(holes, 'and')}"
-        raise place.unclear(stem, f"a hole of plane {plane!r}{hint}")
-    if plane in conventions.removed and "action" not in place.at:
-        expected = f"a column action with add or remove: material is taken away from plane {plane!r}"
-        raise place.unclear(stem, expected)
+        raise NotANumber(f"a hole of plane {plane!r}{hint}")
+    if plane in conventions.removed and "action" not in table:
+        raise NotANumber(f"a column action with add or remove: material is taken away from plane {plane!r}")
     return holes[hole]

@@ -263,7 +263,7 @@ def test_a_sensor_that_no_run_has_at_a_speed(bad):
     more = [*RUNS, *([run, 2000, "A", 5, 0] for run in ("initial", "trial 1", "trial 2"))]
     problems = bad(more)
     assert len(problems) == 3
-    assert "every run needs every sensor at every speed" in problems[0].expected
+    assert "as every run needs at every speed" in problems[0].expected
 
 
 BAD_WEIGHTS = [
