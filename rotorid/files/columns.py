@@ -15,6 +15,19 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
+from rotorid.files.cells import (
+    BadCell,
+    Cell,
+    Finder,
+    Grid,
+    below_title,
+    decode,
+    is_spreadsheet_error,
+    make_grid,
+    parse_text,
+    read_bytes,
+    show,
+)
 from rotorid.files.decimal_numbers import (
     NotANumber,
     check_size,
@@ -24,9 +37,7 @@ from rotorid.files.decimal_numbers import (
 )
 from rotorid.files.digits import written_steps
 from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.files.grid import BadCell, Cell, Finder, Grid, below_title, is_spreadsheet_error, make_grid, show
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import decode, parse_text, read_bytes
 from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")

@@ -9,7 +9,7 @@ from decimal import Decimal
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.files.grid import Cell, Shown, show
+from rotorid.files.cells import Cell, Shown, show
 
 _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""

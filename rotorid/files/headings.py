@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 from rotorid.base.suggestions import suggest
 from rotorid.files import units
+from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
-from rotorid.files.grid import MOST_ABOVE
 from rotorid.files.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")

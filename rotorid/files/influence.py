@@ -23,16 +23,15 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
+from rotorid.files.cells import Grid, read_bytes, show
 from rotorid.files.columns import Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
-from rotorid.files.grid import Grid, show
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.runs import SPEED
 from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.files.table_writing import table_bytes, write_bytes
-from rotorid.files.text_file import read_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:

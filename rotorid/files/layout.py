@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.cells import Cell, Grid, Row, below_title, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
-from rotorid.files.grid import Cell, Grid, Row, below_title, show
 from rotorid.files.headings import (
     DEVIATION,
     LONGEST,

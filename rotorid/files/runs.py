@@ -21,6 +21,7 @@ from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import off_axis, turned
 from rotorid.files import units
+from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
@@ -30,7 +31,6 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
-from rotorid.files.grid import Grid
 from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.speeds import merge_speeds, show_speed

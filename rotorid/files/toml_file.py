@@ -12,9 +12,9 @@ from typing import Any
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.files.cells import read_bytes
 from rotorid.files.decimal_numbers import LARGEST
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import read_bytes
 from rotorid.files.units import Unit
 
 MOST_BYTES = 2_000_000

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from balancing import Trials
     from rotorid.base.arrays import FloatArray
+    from rotorid.files.cells import Grid
     from rotorid.files.columns import Source, Table
     from rotorid.files.conventions import Conventions
-    from rotorid.files.grid import Grid
     from rotorid.files.settings_keys import Said
 
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?")

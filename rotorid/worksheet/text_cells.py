@@ -12,12 +12,11 @@ from pathlib import Path
 from rotorid.base.tables import guarded
 from rotorid.files import runs as runs_table
 from rotorid.files import weights as weights_table
+from rotorid.files.cells import SEP_LINE, Grid, clean, decode_as, parse_text, show
 from rotorid.files.columns import REMARKS, column_of
 from rotorid.files.decimal_numbers import decimal_comma, has_decimal_comma
-from rotorid.files.grid import Grid, clean, show
 from rotorid.files.headings import find_header
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.text_file import SEP_LINE, decode_as, parse_text
 from rotorid.tables.job.job_keys import READINGS
 from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS
 

@@ -15,7 +15,7 @@ import numpy as np
 import openpyxl
 from tables_data import RUNS
 
-from rotorid.files.grid import Shown
+from rotorid.files.cells import Shown
 from rotorid.tables.job.job_keys import TABLES
 from rotorid.tables.job.workbook_template import template_bytes
 

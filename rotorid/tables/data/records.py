@@ -14,8 +14,8 @@ from rotorid.base import result
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
+from rotorid.files.cells import Cell, Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid
-from rotorid.files.grid import Cell, Grid
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import TIME, Unit, UnitError, one_of
 

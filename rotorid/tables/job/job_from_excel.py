@@ -11,10 +11,10 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.cells import BadCell, Cell, Grid, Row, is_comment, make_grid, show
 from rotorid.files.columns import REMARKS, sheet_source
 from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
 from rotorid.files.excel_workbook import is_workbook, read_workbook
-from rotorid.files.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
 from rotorid.files.layout import rows_from_header
 from rotorid.files.problems import Problems
 from rotorid.files.toml_file import Section, read_toml

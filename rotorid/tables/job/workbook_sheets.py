@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
+from rotorid.files.cells import Cell, Shown, show
 from rotorid.files.decimal_numbers import parse_number
-from rotorid.files.grid import Cell, Shown, show
 from rotorid.tables.job.job_keys import FORBIDDEN
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from balancing import Influence
+from rotorid.files.cells import Cell, read_bytes
 from rotorid.files.excel_pages import Line, Page, book_bytes
 from rotorid.files.excel_workbook import is_workbook
-from rotorid.files.grid import Cell
 from rotorid.files.influence import influence_frame
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import read_bytes
 from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.job_data import Job
 from rotorid.tables.job.job_from_excel import RESULTS

@@ -13,9 +13,9 @@ from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
+from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
-from rotorid.files.grid import Grid
 from rotorid.files.layout import read_runs_grid
 from rotorid.files.problems import Problems
 from rotorid.files.units import one_of

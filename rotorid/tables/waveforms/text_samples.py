@@ -13,10 +13,10 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.files.cells import decode
 from rotorid.files.decimal_numbers import NotANumber, decimal_comma, parse_number
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import decode
 from rotorid.files.units import TIME, spelt
 from rotorid.files.value_kinds import plain_number
 from rotorid.tables.waveforms.sampled_file import Sampled, refusal, sampled

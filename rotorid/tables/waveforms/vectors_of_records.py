@@ -16,8 +16,8 @@ from rotorid.base.result import Column
 from rotorid.base.rpm import RPM
 from rotorid.base.text import listing
 from rotorid.base.words import Phase
+from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase
-from rotorid.files.grid import Grid
 from rotorid.files.problems import InputError, Problems, TableWarning
 from rotorid.files.units import VIBRATION
 from rotorid.tables.waveforms.waveforms import DERIVATIVE, Waveforms, WaveformWishes, read_waveforms

@@ -14,10 +14,10 @@ from balancing import Labels
 from rotorid.base.arrays import AnyArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.files.cells import readable
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.settings_keys import Said, take
-from rotorid.files.text_file import readable
 from rotorid.files.toml_file import Section, read_toml
 from rotorid.files.units import VIBRATION, Unit, spelt
 from rotorid.tables.waveforms.array_files import read_mat, read_npz
