@@ -20,8 +20,8 @@ from rotorid.base.text import counted
 from rotorid.files.input_file import file_content
 from rotorid.files.problems import Problems, TableWarning
 
-LOOKED_AT, MOST_ABOVE = 10, 60
-"""Rows among which a header stands that is not the first one; and one that is known by its columns."""
+MOST_ABOVE = 60
+"""Rows among which a header stands that is known by its columns."""
 LONGEST_LINE = 10_000
 """Of a header that is not the first line."""
 MOST_CELLS = 5_000_000
@@ -97,8 +97,6 @@ class Grid:
         Comment lines without `#`.
     complete
         False where a line could not be split into cells, so that nothing can be said about missing rows.
-    first_rows
-        The first rows as they stood, the header among them, to find a header that is not the first row.
     named
         Where the columns are not those of the file: the name of the column there of each cell of each row.
     """
@@ -110,7 +108,6 @@ class Grid:
     separator: str = ""
     comments: tuple[str, ...] = ()
     complete: bool = True
-    first_rows: tuple[Row, ...] = ()
     named: tuple[tuple[str, ...], ...] = ()
 
 
@@ -208,8 +205,7 @@ def make_grid(
             problems.add(source, header_row, None, None, expected)
         return None
     body = [_fit(source, header_row, header, row, separator, problems) for row in filled[1:]]
-    top = tuple(filled[:LOOKED_AT])
-    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
+    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
 
 
 def _fit(

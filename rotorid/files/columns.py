@@ -53,7 +53,7 @@ KINDS = {
     "an unbalance table": ("unbalance", "angle"),
 }
 """Columns by which a table is known that is taken for another kind."""
-_UNCLEAR = Unit("?", "unclear")
+UNCLEAR = Unit("?", "unclear")
 Source = str | Path | Grid | tuple[Path, ...]
 """A table: a file, the cells of a sheet, or, of runs, files with one run each."""
 
@@ -327,7 +327,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
             try:
                 unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else None
             except UnitError as error:
-                wrong, unit = str(error), _UNCLEAR
+                wrong, unit = str(error), UNCLEAR
             places[column.stem] = k, unit
         if wrong:
             problems.add(grid.source, grid.header_row, names[k], names[k], wrong)
@@ -389,10 +389,6 @@ def _has_columns(
         fits, column = False, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
         problems.withdraw(grid.source)  # that rows are longer than a title is no news
-        if (later := _header_below(grid, columns)) is not None:
-            value = (grid.separator or " ").join(name for name in grid.header if name)
-            expected = f"the header in the first row, and it seems to be row {later}: "
-            expected += "delete what stands above it, or begin those rows with #"
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
         fits, end = False, seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"
@@ -408,16 +404,6 @@ def _has_columns(
     if expected:
         problems.add(grid.source, grid.header_row, column, value, expected)
     return fits
-
-
-def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
-    """The row that names most of the required columns, if it is not the first one."""
-    needed = {column.stem for column in columns if column.required}
-    for number, cells in grid.first_rows[1:]:
-        names = [column_of(show(cell), columns) for cell in cells]
-        if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
-            return number
-    return None
 
 
 def _field(
@@ -457,7 +443,7 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
         )
     written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
     check_size(written)
-    value = math.nan if unit is _UNCLEAR else unit.to_si(written)
+    value = math.nan if unit is UNCLEAR else unit.to_si(written)
     if math.isinf(value):
         raise NotANumber("a finite number")
     return value

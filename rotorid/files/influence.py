@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from dataclasses import asdict, fields, replace
 from itertools import islice, product
 from pathlib import Path
@@ -24,7 +25,7 @@ from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
 from rotorid.files.cells import Grid, read_bytes, show
-from rotorid.files.columns import Column, Source, Table, make_table, read_grid
+from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
 _OLDER = re.compile(r"(?:std_(?:re|im)|correlation|common)_")
 """Columns of errors that versions before 1.0 wrote, with rows of a plane `(baseline)`: passed over."""
-_RECIPROCAL = "weight per vibration"
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
@@ -77,37 +77,38 @@ class Coefficients(Protocol):
         """Shape (S, C, P), SI."""
 
 
-def _split(name: str) -> tuple[Unit, Unit]:
-    """Units of the vibration and of the weight from `um_pp_per_g`."""
-    above, separator, below = name.rpartition("per_")
-    if not separator or (above and not above.endswith("_")):
-        raise UnitError(f"a name like {_PATTERN}")
-    return units.vibration(above.rstrip("_")), units.weight(below)
+class _Halves(NamedTuple):
+    """Units of a coefficient: of the vibration and of the weight, and whether it is weight per vibration."""
+
+    vibration: Unit
+    weight: Unit
+    reciprocal: bool = False
 
 
-def _reciprocal(name: str) -> tuple[Unit, Unit] | None:
-    """Units of the weight and of the vibration from `influence_g_per_in_s` or `Sensitivity (oz/mil)`."""
-    match = _NAMED.fullmatch(name)
-    text = "" if match is None else re.sub("[ _]per[ _]", "/", match[1])
+def _halves(name: str) -> _Halves:
+    """From `um_pp_per_g`, or `g_per_in_s`, or what stands in a heading such as `Sensitivity (oz/mil)`."""
+    text = re.sub("[ _]per[ _]", "/", name)
     for sign in re.finditer("/", text):
         above, below = text[: sign.start()], text[sign.end() :].strip("()")
         if above and below and readable("mass", above) and readable("amplitude", below):
             weight, vibration = read_unit("mass", above)[0], read_unit("amplitude", below)[0]
             if vibration not in units.WEIGHT:
-                return units.WEIGHT[weight], units.VIBRATION[vibration]
-    return None
+                return _Halves(units.VIBRATION[vibration], units.WEIGHT[weight], reciprocal=True)
+    above, separator, below = name.rpartition("per_")
+    if not separator or (above and not above.endswith("_")):
+        raise UnitError(f"a name like {_PATTERN}")
+    return _Halves(units.vibration(above.rstrip("_")), units.weight(below))
 
 
 def _influence_unit(name: str) -> Unit:
-    halves = _reciprocal(f"influence_{name}")
-    one, other = _split(name) if halves is None else halves
-    kind = f"{one.kind} per {other.kind}" if halves is None else _RECIPROCAL
+    halves = _halves(name)
+    one, other = halves[1::-1] if halves.reciprocal else halves[:2]
+    kind = f"{one.kind} per {other.kind}"
     return Unit(name, kind, one.multiply * other.divide, one.divide * other.multiply)
 
 
 def _phase_unit(name: str) -> Unit:
-    unit = read_unit("phase", name.replace("_", " "))[0]
-    return units.one_of(units.ANGLE)(unit)
+    return units.one_of(units.ANGLE)(read_unit("phase", name.replace("_", " "))[0])
 
 
 COLUMNS = (
@@ -168,7 +169,7 @@ def load_influence(
     before = len(problems)
     grid = read_grid(source, "influence", problems)
     table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
-    if table is None or not _is_sound(table):
+    if table is None or table.unit("influence") == UNCLEAR or not _is_sound(table):
         return None
     said = _stated(table)
     written = Labels(
@@ -176,10 +177,9 @@ def load_influence(
         angles=as_angles(said.get("angles") or angles or "with rotation"),
     )
     size, angle, name = table.numbers("influence"), table.numbers("phase"), table.unit("influence").name
-    halves = _reciprocal(f"influence_{name}")
-    vibration, weight = _split(name) if halves is None else halves[::-1]
+    vibration, weight, reciprocal = _halves(name)
     values = written.vibration_from(size, angle)
-    if halves is not None:
+    if reciprocal:
         values = 1.0 / written.weight_from(size, angle)
     rows = _keys(table)
     speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*rows, strict=True))
@@ -218,9 +218,13 @@ def _tidied(grid: Grid) -> Grid:
     rows = grid.rows
     if "plane" in header:
         rows = tuple(row for row in rows if show(row[1][header.index("plane")]) != "(baseline)")
-    named = {k: halves for k, name in enumerate(header) if (halves := _reciprocal(name)) is not None}
-    if len(named) == 1:
-        [(at, (weight, vibration))] = named.items()
+    named = dict[int, _Halves]()
+    for k, name in enumerate(header):
+        if match := _NAMED.fullmatch(name):
+            with suppress(UnitError):
+                named[k] = _halves(match[1])
+    if len(named) == 1 and next(iter(named.values())).reciprocal:
+        [(at, (vibration, weight, _))] = named.items()
         header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(header)]
         header[at] = f"influence_{weight.name}_per_{vibration.name}"
         vectors = [vector_in(cells[at]) for _, cells in rows]
@@ -239,7 +243,7 @@ def _is_sound(table: Table) -> bool:
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
     table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
-    if table.unit("influence").kind == _RECIPROCAL:
+    if _halves(table.unit("influence").name).reciprocal:
         table.must_be("influence", size > 0, "a weight above 0")
         if len({*table.texts("sensor")}) > 1 or len({*table.texts("plane")}) > 1 or "std" in table:
             expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
@@ -260,17 +264,10 @@ def _keys(table: Table) -> list[tuple[float, str, str]]:
 
 def _stated(table: Table) -> dict[str, str]:
     """What the heading of the phases, or comment lines of older versions, say about conventions."""
-    heading = table.fields["phase"].name
-    texts = [heading]
-    if not re.search("lag|lead", heading):
-        texts = [comment for comment in table.comments if "phase" in comment.lower()]
-    phases = {word.lower() for text in texts for word in re.findall("(?i)(?<![a-z])(lag|lead)", text)}
-    turned = {word for text in table.comments for word in re.findall("(with|against) rotation", text)}
-    said = {"phase": phases, "angles": {f"{word} rotation" for word in turned}}
-    for key, words in said.items():
-        if len(words) > 1:
-            table.as_whole(None, f"one convention of {key}, not {listing(sorted(words), 'and')}")
-    return {key: next(iter(words)) for key, words in said.items() if words}
+    patterns = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
+    texts = (*table.comments, table.fields["phase"].name)
+    found = [(key, re.search(pattern, text)) for text in texts for key, pattern in patterns.items()]
+    return {key: match[1] for key, match in found if match}
 
 
 def _from_json(path: Path, problems: Problems) -> Influence | None:
@@ -283,34 +280,27 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
         problems.refuse_newer(str(path), whole["schema_version"])
         stored = whole["influence"]
         reading, run = stored["reading"], stored["run_errors"]
-        labels = Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])})
+        sizes, chances = (np.array(run[key], dtype=float) for key in ("sizes", "probability"))
+        if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
+            raise ValueError("sizes of errors and probabilities must be 0 or more")
+        run = RunErrors(**{**run, "sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()})
         errors = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
-        dof = np.inf if reading["dof"] is None else float(reading["dof"])
-        chances = np.array(run["probability"], dtype=float)
-        sizes = np.array(run["sizes"], dtype=float).reshape(len(chances), 4)
-        W, own = _complex(stored["W"]), np.array(stored["covariance"], dtype=float)
-        S, C, P = W.shape
-        common = _complex(stored["common"]).reshape(-1, S, C, P + 1)
-        positive = np.concatenate((sizes.ravel(), chances, [run["level"], run["evenly"]]))
-        least = np.linalg.eigvalsh(own.reshape(S, C, 2 * P + 2, -1)).min(initial=0.0)
-        if not least >= -1e-6 * np.abs(own).max(initial=0.0):
-            raise ValueError("a covariance is none")
-        if not (np.isfinite(common).all() and np.all(positive >= 0) and abs(chances.sum() - 1) < 1e-6):
-            raise ValueError("errors must be finite and not negative, probabilities of sum 1")
-        return Influence(
+        reading = Reading(errors, reading["source"], dof=reading["dof"] or np.inf)
+        own = np.array(stored["covariance"], dtype=float)
+        common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
+        influence = Influence(
             speeds=np.array(stored["speeds_rad_s"], dtype=float),
             sensors=tuple(stored["sensors"]),
             planes=tuple(stored["planes"]),
-            W=W,
-            baseline=_complex(stored["baseline"]).reshape(S, C),
-            errors=Gaussian(
-                own,
-                common,
-                Reading(errors, reading["source"], dof=dof),
-                RunErrors(sizes, chances / chances.sum(), run["origin"], run["level"], run["evenly"]),
-            ),
-            labels=labels,
+            W=_complex(stored["W"]),
+            baseline=_complex(stored["baseline"]),
+            errors=Gaussian(own, common, reading, run),
+            labels=Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])}),
         )
+        covariance = influence.channels() if own.shape[:2] == influence.W.shape[:2] else own[:0]
+        if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
+            raise ValueError("a covariance is none")
+        return influence
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         problems.add(str(path), None, None, None, f"coefficients as --save-influence writes them ({reason})")
@@ -424,37 +414,25 @@ def fit_to_readings(
 
     Every speed and sensor of the readings must be there; further ones are left out.
     """
-    ours, theirs = trials.labels, influence.labels
-
-    def complain(column: str, value: str | None, expected: str) -> None:
-        problems.add(source, None, column, value, expected)
-
-    if units.vibration(ours.vibration_unit).kind != units.vibration(theirs.vibration_unit).kind:
-        expected = (
-            f"coefficients for readings in {ours.vibration_unit or 'no unit'}, "
-            f"as the runs table has, or in a unit that converts to it"
-        )
-        complain("influence", theirs.vibration_unit or "no unit", expected)
-    if trials.planes and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
-        expected = f"coefficients per {ours.weight_unit} or a unit that converts, as the weights table has"
-        complain("influence", theirs.weight_unit, expected)
-    rpm, rows = units.SPEED["rpm"], []
-    for speed in trials.speeds:
-        near = nearest_speed(influence.speeds, float(speed), tolerance_percent)
-        rows.append(near or 0)
-        if near is None:
-            known = show_speeds(influence.speeds, rpm)
-            shown = show_speed(float(speed), rpm)
-            complain("speed", None, f"coefficients at {shown}, as the runs table has; there are {known}")
-    for what, names, there, table in (
-        ("sensor", trials.sensors, influence.sensors, "runs"),
-        ("plane", trials.planes, influence.planes, "weights"),
-    ):
-        for name in names:
-            if name not in there:
-                known = f"{listing(there, 'and')}{did_you_mean(name, there)}"
-                expected = f"coefficients of {what} {name!r}, as the {table} table has; there are {known}"
-                complain(what, None, expected)
+    ours, theirs, rpm = trials.labels, influence.labels, units.SPEED["rpm"]
+    pairs = [("influence", units.vibration, ours.vibration_unit, theirs.vibration_unit, "runs")]
+    if trials.planes:
+        pairs.append(("influence", units.weight, ours.weight_unit, theirs.weight_unit, "weights"))
+    for column, unit_of, our, their, table in pairs:
+        if unit_of(our).kind != unit_of(their).kind:
+            expected = f"coefficients in {our or 'no unit'} or a unit that converts, as the {table} table has"
+            problems.add(source, None, column, their or "no unit", expected)
+    rows = [nearest_speed(influence.speeds, float(speed), tolerance_percent) for speed in trials.speeds]
+    speeds = zip(trials.speeds.tolist(), rows, strict=True)
+    lacking = [("speed", show_speed(speed, rpm), "runs") for speed, row in speeds if row is None]
+    lacking += [("sensor", repr(name), "runs") for name in trials.sensors if name not in influence.sensors]
+    lacking += [("plane", repr(name), "weights") for name in trials.planes if name not in influence.planes]
+    there = {"sensor": influence.sensors, "plane": influence.planes}
+    for what, name, table in lacking:
+        known = show_speeds(influence.speeds, rpm) if what == "speed" else listing(there[what], "and")
+        hint = did_you_mean(name.strip("'"), there.get(what, ()))
+        expected = f"coefficients of {what} {name}, as the {table} table has; there are {known}{hint}"
+        problems.add(source, None, what, None, expected)
     if len(problems):
         return None
     columns = [influence.sensors.index(name) for name in trials.sensors]
@@ -462,4 +440,4 @@ def fit_to_readings(
     if not trials.planes and unit.name == "kg_m":
         unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
     labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
-    return replace(influence.part(rows, columns), speeds=trials.speeds, labels=labels)
+    return replace(influence.part([row or 0 for row in rows], columns), speeds=trials.speeds, labels=labels)

@@ -207,7 +207,7 @@ def _channels(
     from balancing import reading_of
     from rotorid.files.problems import Problems
     from rotorid.files.runs import make_trials
-    from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
+    from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 
     def read(part: Grid) -> Trials | None:
         trials = make_trials(part, None, conventions, said["errors"], Problems())

@@ -16,11 +16,11 @@ from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
+from rotorid.files.slow_roll import subtract_slow_roll
 from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.files.weights import read_weights
 from rotorid.tables.job.job_planes import Planes
 from rotorid.tables.job.readings import Readings
-from rotorid.tables.runs.slow_roll import subtract_slow_roll
 
 IN_HOLE = 1e-3
 """Relative distance of a weight from the hole that it is in."""

@@ -27,9 +27,9 @@ from rotorid.files.layout import stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.settings_keys import Said
+from rotorid.files.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.job_holes import hole_angles
-from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 
 
 @dataclass(frozen=True, eq=False)
