@@ -21,7 +21,7 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid, show
 from rotorid.files.columns import Column, Source, Table, make_table, read_grid
-from rotorid.files.conventions import FULL_TURN, Conventions
+from rotorid.files.conventions import Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import find_header, read_headings
 from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
@@ -202,16 +202,15 @@ def _angles(table: Table, conventions: Conventions, unit: Unit | None) -> FloatA
         table.problems.add(
             table.source, table.header_row, name, name, f"its unit too, such as '{name} (deg)'"
         )
-    degree = units.ANGLE["deg"]
-    angle = np.where(plain & (unit != degree) & (unit is not None), angle, degree.to_si(1.0) * angle)
-    wrong = np.abs(angle) > FULL_TURN
+    half = np.where(plain & (unit == units.ANGLE["rad"]), math.pi, 180.0)
+    wrong = np.abs(angle) > 2 * half
     table.complain_where(wrong, places[0], "an angle from -360 to 360 degrees")
     for i, action in enumerate(table.texts("action") if "action" in table else ()):
         if action.casefold() in ("remove", "removed"):
-            angle[i] += math.pi
+            angle[i] = (angle[i] + half[i]) % (2 * half[i])
         elif action.casefold() not in ("", "add", "added"):
             table.complain(i, "action", "add or remove")
-    return np.where(wrong, math.nan, angle)
+    return np.where(wrong, math.nan, angle * math.pi / half)
 
 
 def _by_name(table: Table, i: int, stem: str, written: str, conventions: Conventions) -> float | None:
