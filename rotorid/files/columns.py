@@ -34,8 +34,8 @@ from rotorid.files.decimal_numbers import (
     decimal_comma,
     parse_number,
     thousands_or_decimals,
+    written_steps,
 )
-from rotorid.files.digits import written_steps
 from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader

@@ -30,8 +30,7 @@ from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_ph
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems
-from rotorid.files.runs import SPEED
-from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.files.runs import SPEED, nearest_speed, show_speed, show_speeds
 from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 

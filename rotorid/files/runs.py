@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
@@ -33,8 +34,7 @@ from rotorid.files.conventions import (
 )
 from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
-from rotorid.files.speeds import merge_speeds, show_speed
-from rotorid.files.units import one_of
+from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
@@ -50,6 +50,30 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
+ROUNDING = 1e-12
+UNSAID = 0.1
+"""Per cent within which no machine keeps its speed from run to run, so that nothing need be said."""
+
+
+def same_speed(a: float, b: float, tolerance_percent: float) -> bool:
+    """Whether two speeds count as one."""
+    return abs(a - b) <= (tolerance_percent / 100.0 + ROUNDING) * max(a, b)
+
+
+def nearest_speed(speeds: FloatArray, speed: float, tolerance_percent: float) -> int | None:
+    """Which of some speeds counts as one with this one; None: none of them does."""
+    near = int(np.argmin(np.abs(speeds - speed)))
+    return near if same_speed(float(speeds[near]), speed, tolerance_percent) else None
+
+
+def show_speed(speed: float, unit: Unit) -> str:
+    """A speed in the unit of the table, for messages."""
+    return f"{speed * unit.scale:.6g} {unit.name.replace('rad_s', 'rad/s')}"
+
+
+def show_speeds(speeds: FloatArray, unit: Unit) -> str:
+    """All of some speeds in the unit of a table, for messages."""
+    return listing((show_speed(float(speed), unit) for speed in speeds), "and")
 
 
 def read_trials(
@@ -203,6 +227,65 @@ def _placed(values: NDArray[Any], at: IntArray, shape: tuple[int, ...]) -> NDArr
         out[:] = complex(np.nan, np.nan)
     out[..., *at] = values
     return out
+
+
+def merge_speeds(
+    table: Table, usable: Sequence[int], tolerance_percent: float
+) -> tuple[FloatArray, dict[int, int], tuple[str, ...]]:
+    """Merge the speeds that lie within the tolerance; a merged speed is their mean.
+
+    They are those of different runs, or of the sensors of one steady run. Two such speeds of one sensor of
+    one run, and a chain of speeds whose ends are not within the tolerance, are noted as problems.
+
+    Parameters
+    ----------
+    table
+        The runs table.
+    usable
+        Indices of its rows whose run and speed can be read.
+    tolerance_percent
+        Largest difference.
+
+    Returns
+    -------
+    speeds, index, words
+        rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
+    """
+    values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
+    run, *others = (table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table)
+    distinct = sorted({float(values[row]) for row in usable})
+    breaks = [not k or not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
+    place = dict(zip(distinct, (np.cumsum(breaks) - 1).tolist(), strict=True))
+    index = {row: place[float(values[row])] for row in usable}
+    remedy = f"within the tolerance of {band:g} %; write the nominal speed, or set "
+    remedy += "speed_tolerance_percent smaller"
+    first: dict[tuple[object, ...], int] = {}
+    read: list[dict[tuple[str, float], None]] = [{} for _ in range(sum(breaks))]
+    unclear = set[tuple[int, str]]()
+    for row in usable:
+        g, one = index[row], first.setdefault((index[row], run[row], *(each[row] for each in others)), row)
+        read[g][run[row], float(values[row])] = None
+        if values[one] != values[row] and (g, run[row]) not in unclear:
+            other = table.shown("speed", one)
+            table.complain(row, "speed", f"one speed: run {run[row]!r} has {other} as well, {remedy}")
+            unclear.add((g, run[row]))
+    merged, alike = [], []
+    for g, pairs in enumerate(read):
+        speeds = sorted({speed for _, speed in pairs})
+        merged.append(float(np.mean([speed for _, speed in pairs])) if len(speeds) > 1 else speeds[0])
+        if g not in {k for k, _ in unclear} and not same_speed(speeds[0], speeds[-1], band):
+            shown = [show_speed(speed, unit) for speed in speeds]
+            chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
+            expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
+            table.as_whole(table.fields["speed"].name, expected)
+        if not same_speed(speeds[0], speeds[-1], UNSAID):
+            numbers = ", ".join(f"{speed * unit.scale:.6g}" for speed in speeds)
+            alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
+    steady = any(len(pairs) > len({name for name, _ in pairs}) for pairs in read)
+    more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
+    of = "of one run, or of different ones," if steady else "of different runs"
+    words = f"speeds {of} within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
+    return np.array(merged), index, (words,) if alike else ()
 
 
 def covariances(table: Table, vectors: ComplexArray) -> FloatArray:

@@ -26,9 +26,8 @@ from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import Conventions
 from rotorid.files.problems import Problems
-from rotorid.files.runs import make_trials
+from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 from rotorid.files.settings_keys import Said
-from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""

@@ -227,7 +227,7 @@ def _channels(
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:
     """Indices of the finished rows of each speed and sensor."""
-    from rotorid.files.speeds import same_speed
+    from rotorid.files.runs import same_speed
 
     found: dict[tuple[float, str], list[int]] = {}
     speed, run, sensor = table.numbers("speed"), table.texts("run"), table.texts("sensor")

@@ -15,9 +15,8 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.problems import Problems
-from rotorid.files.runs import make_trials
+from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 from rotorid.files.slow_roll import subtract_slow_roll
-from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.files.weights import read_weights
 from rotorid.tables.job.job_planes import Planes
 from rotorid.tables.job.readings import Readings

@@ -13,8 +13,8 @@ from balancing import Labels, Limits, Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.files import units
 from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.runs import nearest_speed, show_speeds
 from rotorid.files.settings_keys import Quantity, Said
-from rotorid.files.speeds import nearest_speed, show_speeds
 from rotorid.files.toml_file import Section
 from rotorid.files.weights_with_units import in_job_units, other_kind
 from rotorid.tables.job.job_keys import FORBIDDEN
