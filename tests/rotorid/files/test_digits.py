@@ -10,7 +10,7 @@ from tables_data import RUNS, WEIGHTS, csv_text, replaced, write_book, write_csv
 
 from balancing import ReadingErrors, estimate_influence, refine
 from rotorid.files.cells import Shown
-from rotorid.files.decimal_numbers import written_steps
+from rotorid.files.columns import written_steps
 from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
 from rotorid.tables import read_job, read_trials
 
