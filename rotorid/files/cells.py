@@ -204,7 +204,13 @@ def make_grid(
         if complete:
             problems.add(source, header_row, None, None, expected)
         return None
-    body = [_fit(source, header_row, header, row, separator, problems) for row in filled[1:]]
+    odd, width = "" in header, len(header)
+    body = [
+        row
+        if len(row[1]) == width and not odd
+        else _fit(source, header_row, header, row, separator, problems)
+        for row in filled[1:]
+    ]
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
 
 

@@ -197,7 +197,8 @@ class Table:
         if stem not in self:
             return
         bad = ~np.fromiter(allowed, dtype=bool, count=len(self)) & ~np.isnan(self.numbers(stem))
-        self.complain_where(bad, stem, expected)
+        for index in np.flatnonzero(bad):
+            self.complain(index, stem, expected)
 
     def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
         """The one column that there is of several; else None and a problem, if none is only misspelt.
@@ -277,7 +278,7 @@ def read_grid(
     """The cells of a text file or of a sheet: those from the header on that `find` finds, or only the top."""
     if isinstance(source, Grid):
         return source
-    path = Path(source_name(source))
+    path = Path(str(source))
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
@@ -333,7 +334,8 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
                 wrong, unit = str(error), UNCLEAR
             places[column.stem] = k, unit
         if wrong:
-            problems.add(grid.source, grid.header_row, names[k], names[k], wrong)
+            name = grid.named[0][k] if grid.named else names[k]
+            problems.add(grid.source, grid.header_row, name, name, wrong)
     of_numbers = [k for k, unit in places.values() if unit is not None]
     commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
     comma = decimal_comma(commas, grid.separator)
@@ -379,7 +381,7 @@ def _has_columns(
 ) -> bool:
     """Whether it may be a table of this kind; at most one problem of unknown and missing columns."""
     known = listing([example for column in columns for example in column.names], "and")
-    there = [name for row in grid.named for name in row] or [name for name in grid.header if name]
+    there = [name for row in grid.named or (grid.header,) for name in row if name]
     present = listing(dict.fromkeys(there), "and")
     kinds = (
         kind
@@ -404,7 +406,7 @@ def _has_columns(
         what = "a known column" if len(unknown) == 1 else "known columns"
         column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
         expected = f"{what}: {known}; remarks go into 'note'"
-    if expected:
+    if expected and not ("" in grid.header and missing and problems.of(grid.source)):
         problems.add(grid.source, grid.header_row, column, value, expected)
     return fits
 

@@ -112,7 +112,7 @@ def read_runs_grids(
     named, grids = _names_of(conventions.columns), list[Grid]()
     for file in files or (source,):
         grid = read_grid(file, "runs", problems, first=first, find=partial(find_header, named=named))
-        if grid is None or not _are_there(named, grid, conventions):
+        if grid is None or (conventions.columns is not None and not _are_there(named, grid, conventions)):
             continue
         with explained(grid, problems):
             grid = _runs_form(grid, named, conventions)
@@ -172,8 +172,7 @@ def _names_of(columns: Said | None) -> dict[str, str]:
 
 def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -> bool:
     """Whether the file has the columns that the job names; else a problem of the job."""
-    if conventions.columns is None:
-        return True
+    assert conventions.columns is not None
     section, there = conventions.columns.section, [name for name in grid.header if name]
     for name, key in named.items():
         if name not in there and key not in there and key not in section.refused:
@@ -184,21 +183,26 @@ def _are_there(named: Mapping[str, str], grid: Grid, conventions: Conventions) -
 
 def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
     headings = read_headings(grid.header, named)
-    tidy = [heading for heading in headings if heading.tidy and heading.name not in named]
-    stems = [heading.stem for heading in tidy]
-    if len(set(stems)) < len(tidy):
+    stems = [heading.stem for heading in headings if heading.tidy]
+    if len(set(stems)) < len(stems):
         return grid  # a column of a runs table stands there twice
     for heading in headings:
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"
             raise Unclear(f"readings at the running speed (1X) alone: {other}", heading)
-    others = all(h in tidy or h.stem == "" or _is_kept(h.name) for h in headings)
-    stems = [h.stem for h in tidy if h.unit or h.stem != "phase"]
-    if others and {"run", "speed", "sensor", *READING} <= {*stems}:
-        places = [h.index for h in tidy if h.stem in NUMBERS]
-        if all(map(_PLAIN.fullmatch, {show(cells[k]) for _, cells in grid.rows for k in places})):
-            return grid
+    needed = {"run", "speed", "sensor", *READING}
+    if named.keys().isdisjoint(grid.header) and is_long(grid, headings, needed):
+        return grid
     return long_rows(grid, headings, READING, "sensor", conventions)
+
+
+def is_long(grid: Grid, headings: Sequence[Heading], needed: set[str]) -> bool:
+    """Whether a table has its form already, and plain numbers."""
+    stems = {h.stem for h in headings if h.tidy and (h.unit or h.stem != "phase")}
+    places = [h.index for h in headings if h.stem in NUMBERS]
+    plain = needed <= stems and all(h.tidy or h.stem == "" or _is_kept(h.name) for h in headings)
+    cells = {show(cells[k]) for _, cells in grid.rows for k in places} if plain else ()
+    return plain and all(map(_PLAIN.fullmatch, cells))
 
 
 def long_rows(

@@ -24,7 +24,7 @@ from rotorid.files.columns import Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
+from rotorid.files.layout import NUMBER, WEIGHT, explained, is_long, long_rows
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, one_of
 
@@ -86,13 +86,13 @@ def read_weights(
         for c in COLUMNS
     ]
     columns[0] = replace(columns[0], required=not one)
+    columns[2] = replace(columns[2], required=there.isdisjoint(("mass", "unbalance")))
     columns += [Column(stem, required=False, blank=True) for stem in _BESIDE if stem in there]
     table = make_table(grid, columns, problems) if len(problems) == before else None
     if table is None:
         return None
-    missing = "one column of weights, mass_<unit> or unbalance_<unit>, such as mass_g or unbalance_g_mm"
     several = "one column of weights, mass_<unit> or unbalance_<unit>, not both"
-    what = table.only(("mass", "unbalance"), "mass_g", missing, several)
+    what = table.only(("mass", "unbalance"), "mass_g", several)
     if what is None:
         return None
     size, plane = table.numbers(what), table.texts("plane")
@@ -138,11 +138,12 @@ def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
     if len(sizes) == 1 and (wide or ("plane" in stems and len({*stems}) == len(stems))):
         [size] = sizes
         headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
-        if not wide:
-            headings = [replace(h, sensor="") for h in headings]
+        if "unit" in stems:
             grid = _with_units(grid, {h.stem: h.index for h in headings})
-        grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
-        grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
+        if not is_long(grid, headings, {"plane", "mass"}) or "unit" in stems:
+            headings = headings if wide else [replace(h, sensor="") for h in headings]
+            grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
+            grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
     header = [name.partition("_") for name in grid.header]
     places = {k for k, (stem, *_) in enumerate(header) if stem in _PLACES}
     told = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
@@ -163,8 +164,6 @@ def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
 
 def _with_units(grid: Grid, at: Mapping[str, int]) -> Grid:
     """The table with the units of a column `unit` behind its weights."""
-    if "unit" not in at:
-        return grid
     rows = []
     for number, row in grid.rows:
         cell = f"{show(row[at['mass']])} {show(row[at['unit']])}".strip()
