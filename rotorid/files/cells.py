@@ -204,13 +204,9 @@ def make_grid(
         if complete:
             problems.add(source, header_row, None, None, expected)
         return None
-    odd, width = "" in header, len(header)
-    body = [
-        row
-        if len(row[1]) == width and not odd
-        else _fit(source, header_row, header, row, separator, problems)
-        for row in filled[1:]
-    ]
+    body, width = filled[1:], len(header)
+    if "" in header or any(len(cells) != width for _, cells in body):
+        body = [_fit(source, header_row, header, row, separator, problems) for row in body]
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
 
 

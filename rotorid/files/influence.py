@@ -12,13 +12,12 @@ from contextlib import suppress
 from dataclasses import asdict, fields, replace
 from itertools import islice, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
-from fem import label
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -35,11 +34,10 @@ from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     import pandas as pd
 
-    from fem import SensorLike
 
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
 _OLDER = re.compile(r"(?:std_(?:re|im)|correlation|common)_")
@@ -54,26 +52,6 @@ class Stored(NamedTuple):
 
     influence: Influence
     said: Mapping[str, str]
-
-
-class Coefficients(Protocol):
-    """What can be written as an influence table: results of `balancing` and of `fem`."""
-
-    @property
-    def speeds(self) -> FloatArray:
-        """rad/s, shape (S,)."""
-
-    @property
-    def sensors(self) -> Sequence[SensorLike]:
-        """Names or nodes, those of a rotor model with their angles, length C."""
-
-    @property
-    def planes(self) -> Sequence[str | int]:
-        """Names or nodes, length P."""
-
-    @property
-    def W(self) -> ComplexArray:
-        """Shape (S, C, P), SI."""
 
 
 class _Halves(NamedTuple):
@@ -335,15 +313,8 @@ def _document(influence: Influence) -> dict[str, Any]:
     return plain({"schema_version": SCHEMA_VERSION, "influence": stored})
 
 
-def influence_frame(coefficients: Coefficients, labels: Labels | None = None) -> pd.DataFrame:
-    """Influence coefficients as the table that `read_influence` reads.
-
-    Parameters
-    ----------
-    coefficients
-        Of `balancing` or of a rotor model (`fem`).
-    labels
-        Units and conventions to write; default: those of the coefficients, or m per kg·m and phase lead.
+def influence_frame(influence: Influence) -> pd.DataFrame:
+    """Influence coefficients as the table that `read_influence` reads, in their units and conventions.
 
     Returns
     -------
@@ -353,31 +324,25 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
     """
     import pandas as pd
 
-    labels = labels or labels_of(coefficients)
-    S, C, P = np.shape(coefficients.W)
+    labels = influence.labels
+    S, C, P = influence.W.shape
     speed = units.SPEED[labels.speed_unit]
     unit = "_".join(filter(None, (labels.vibration_unit, "per", labels.weight_unit)))
-    size, phase = labels.vibration(np.asarray(coefficients.W) / labels.weight_scale)
+    size, phase = labels.vibration(influence.W / labels.weight_scale)
     columns: dict[str, Any] = {
-        f"speed_{speed.name}": np.repeat(np.asarray(coefficients.speeds, dtype=float) * speed.scale, C * P),
-        "sensor": [str(label(name)) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
-        "plane": [str(name) for name in coefficients.planes] * (S * C),
+        f"speed_{speed.name}": np.repeat(influence.speeds * speed.scale, C * P),
+        "sensor": [name for _ in range(S) for name in influence.sensors for _ in range(P)],
+        "plane": influence.planes * (S * C),
         f"influence_{unit}": size.ravel(),
         f"phase_{labels.phase}_deg": phase.ravel(),
     }
-    if isinstance(coefficients, Influence) and coefficients.known_errors:
-        variance = np.einsum("scii->sci", coefficients.channels())[..., 2:].reshape(S, C, P, 2).mean(axis=-1)
+    if influence.known_errors:
+        variance = np.einsum("scii->sci", influence.channels())[..., 2:].reshape(S, C, P, 2).mean(axis=-1)
         columns[f"std_{unit}"] = (np.sqrt(variance) * labels.vibration_scale / labels.weight_scale).ravel()
     return pd.DataFrame(columns)
 
 
-def labels_of(coefficients: Coefficients) -> Labels:
-    """How the coefficients are labelled; SI and lead for a rotor model."""
-    labels = getattr(coefficients, "labels", None)
-    return labels if isinstance(labels, Labels) else Labels(weight_unit="kg_m", speed_unit="rad_s")
-
-
-def write_influence(path: str | Path, influence: Coefficients) -> None:
+def write_influence(path: str | Path, influence: Influence) -> None:
     """Write influence coefficients: a table for people to `.csv` or `.xlsx`, without loss to `.json`.
 
     JSON keeps the covariance of the coefficients, what sensors and speeds have in common, the errors of a
@@ -389,7 +354,7 @@ def write_influence(path: str | Path, influence: Coefficients) -> None:
     path
         An existing file is replaced.
     influence
-        Of `balancing` or, as a table, of a rotor model.
+        The coefficients.
 
     Raises
     ------
@@ -399,9 +364,9 @@ def write_influence(path: str | Path, influence: Coefficients) -> None:
     write_bytes(Path(path), influence_bytes(path, influence))
 
 
-def influence_bytes(path: str | Path, influence: Coefficients) -> bytes:
+def influence_bytes(path: str | Path, influence: Influence) -> bytes:
     """What `write_influence` writes."""
-    if Path(path).suffix.lower() == ".json" and isinstance(influence, Influence):
+    if Path(path).suffix.lower() == ".json":
         return json.dumps(_document(influence), ensure_ascii=False).encode()
     return table_bytes(path, influence_frame(influence), sheet="influence")
 

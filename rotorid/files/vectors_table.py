@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from balancing import Labels, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
@@ -59,11 +59,17 @@ def _sweeps(table: Table, labels: Labels) -> Iterator[Readings]:
     """The rows of each run as vectors of its sensors, by rising time or, without times, speed."""
     vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     covariances = runs_table.covariances(table, vectors) if "amplitude_std" in table else None
-    runs, names, speeds = np.array(table.texts("run")), np.array(table.texts("sensor")), table.numbers("speed")
+    runs, names, speeds = (
+        np.array(table.texts("run")),
+        np.array(table.texts("sensor")),
+        table.numbers("speed"),
+    )
     for run in dict.fromkeys(runs.tolist()):
         rows = np.flatnonzero(runs == run)
         instants, first, place = np.unique(
-            table.numbers("time" if "time" in table else "speed")[rows], return_index=True, return_inverse=True
+            table.numbers("time" if "time" in table else "speed")[rows],
+            return_index=True,
+            return_inverse=True,
         )
         sensors = tuple(dict.fromkeys(names[rows].tolist()))
         column = [sensors.index(name) for name in names[rows]]
@@ -82,7 +88,9 @@ def _complain_about_twins(table: Table) -> None:
     stem = "time" if "time" in table else "speed"
     runs, instants, speeds = table.texts("run"), table.numbers(stem).tolist(), table.numbers("speed")
     where = "time" if stem == "time" else "speed; vectors read one after the other need a column time_s"
-    keys = (key if key[2] == key[2] else None for key in zip(runs, table.texts("sensor"), instants, strict=True))
+    keys = (
+        key if key[2] == key[2] else None for key in zip(runs, table.texts("sensor"), instants, strict=True)
+    )
     table.once("sensor", keys, f"another sensor than in row {{}}, which has the same run and {where}")
     first: dict[tuple[str, float], int] = {}
     for row, key in enumerate(zip(runs, instants, strict=True)):
@@ -103,11 +111,10 @@ def runs_columns(
     every = np.concatenate([np.repeat(speeds, len(sweep.sensors)) for sweep, speeds, _, _ in found])
     vectors = np.concatenate([Z.ravel() for _, _, Z, _ in found])
     amplitude, phase = labels.vibration(vectors)
-    own = np.conj(vectors) / np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    u = np.stack((vectors.real, vectors.imag), -1) / size[:, None]
     parts = np.concatenate([C.reshape(-1, 2, 2) for *_, C in found])
-    # along and across: real and imaginary part, turned so that the vector is real
-    turn = np.stack((np.stack((own.real, -own.imag), -1), np.stack((own.imag, own.real), -1)), -2)
-    along, across = np.sqrt(np.einsum("nij,njk,nik->in", turn, parts, turn))
+    along, across = (np.sqrt(np.einsum("ni,nij,nj->n", d, parts, d)) for d in (u, u[:, ::-1] * [-1, 1]))
     columns = (
         Told("run", runs),
         Told(f"speed_{speed.name}", np.round(every * speed.scale, 9)),
@@ -117,7 +124,6 @@ def runs_columns(
     )
     if np.isnan(along).any():
         return columns
-    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
     return (
         *columns,
         Told(f"amplitude_std{unit}", along * labels.vibration_scale),
