@@ -287,6 +287,8 @@ def _halves(
     heading, stem, unit, cells = column
     vectors = {cell: vector_in(cell) for cell in dict.fromkeys(cells) if cell != ""}
     some, every = any(vectors.values()), bool(vectors) and all(vectors.values())
+    if stem == "" and some and all(re.fullmatch("[0-9.,/ ]+", str(cell)) for cell in vectors):
+        return [column]  # fractions or dates: no word and no sign says what they are
     if stem == "" and _WEIGHT.search(heading.name) and pair == READING:
         words = not some and not any(_PLAIN.fullmatch(show(cell)) for cell in vectors)
         return [column._replace(stem="note") if words else column]  # what was mounted

@@ -528,6 +528,11 @@ def test_the_wrong_kind_of_file_is_one_message(name, cli):
     assert outcome.err.strip().count("\n") == lines - 1
 
 
+def test_fractions_are_no_vectors(tmp_path):
+    runs = wide("Run,rpm,DE,DE deg,Batch", "{},1485,{},{},1/12").replace("DE,DE deg", "DE Amp,DE deg")
+    assert "found 'Batch', expected a known column" in refused(trials_of, tmp_path, runs)
+
+
 def test_a_header_that_was_taken_out_is_none(tmp_path):
     assert "found '//run', expected a known column" in refused(trials_of, tmp_path, f"//{PUMP}")
 
