@@ -145,7 +145,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         return job_workbook_bytes(files.files, outcome, made)
 
     def coefficients(path: Path) -> Written:
-        from rotorid.tables.runs.influence_table import influence_bytes
+        from rotorid.files.influence import influence_bytes
 
         return influence_bytes(path, influence)
 

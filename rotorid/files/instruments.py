@@ -26,12 +26,12 @@ import numpy as np
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files import units
+from rotorid.files.cells import decode
+from rotorid.files.cells import readable as why_not_readable
 from rotorid.files.decimal_numbers import decimal_comma, plain_number
 from rotorid.files.headings import read_unit, readable
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import InputError, Problem, Problems, printable
-from rotorid.files.text_file import decode
-from rotorid.files.text_file import readable as why_not_readable
 from rotorid.files.units import TIME, Unit, spelt
 
 LARGEST_SHIFT = 0.3

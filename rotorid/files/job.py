@@ -30,18 +30,17 @@ from rotorid.files.conventions import (
     resolve_angles,
 )
 from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.influence import Stored, fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor, named_tables
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import InputError, Problem, Problems
-from rotorid.files.runs import make_trials
+from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 from rotorid.files.settings import Settings
-from rotorid.files.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.files.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 from rotorid.files.units import Quantity
 from rotorid.files.weights import read_weights
 from rotorid.files.weights_with_units import in_job_units, other_kind
-from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
-from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 
 if TYPE_CHECKING:
     from balancing import Mounted

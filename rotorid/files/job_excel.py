@@ -18,16 +18,15 @@ from balancing import Influence
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import LONGEST_TITLE
 from rotorid.base.text import listing
+from rotorid.files.cells import BadCell, Cell, Grid, Row, Shown, make_grid, read_bytes, show
 from rotorid.files.columns import REMARKS, Source, sheet_source
 from rotorid.files.decimal_numbers import parse_number
 from rotorid.files.excel_pages import Line, Page, book_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
-from rotorid.files.grid import BadCell, Cell, Grid, Row, Shown, make_grid, show
 from rotorid.files.job_models import READINGS, TABLES, JobSettings, Plane, Sensor
 from rotorid.files.layout import rows_from_header
 from rotorid.files.problems import Problems
 from rotorid.files.settings import Settings, read_settings
-from rotorid.files.text_file import read_bytes
 from rotorid.files.toml_file import read_toml
 
 NAMED: dict[str, tuple[str, type[Settings]]] = {"planes": ("plane", Plane), "sensors": ("sensor", Sensor)}
@@ -327,7 +326,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
     InputError
         If the workbook of the job cannot be read any more.
     """
-    from rotorid.tables.runs.influence_table import influence_frame, labels_of
+    from rotorid.files.influence import influence_frame
 
     own = None
     if len(files) == 1 and is_workbook(files[0]):
@@ -344,10 +343,9 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
     sheets: dict[str, list[Line]] = {}
     document = results.to_dict()
     summary = list(_sorted({**document, "provenance": provenance}, (), sheets))
-    coefficients, labels = influence_frame(results.influence), labels_of(results.influence)
+    coefficients = influence_frame(results.influence)
     cells = coefficients.astype(object).where(coefficients.notna(), None).itertuples(index=False)
-    stated = [(f"# phase = {labels.phase}",), (f"# angles = {labels.angles}",)]
-    sheets["influence"] = [*stated, tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
+    sheets["influence"] = [tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
     notes = [(f"# warning: {text}",) for text in document.get("warnings", ())]
     lines = {"": [*notes, *sheets.pop("corrections")], "summary": [("result", "value"), *summary], **sheets}
     head = ("# computed from the other sheets; not read back",)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.files.cells import read_bytes
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import read_bytes
 
 MOST_BYTES = 2_000_000
 _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")

@@ -13,6 +13,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.influence import influence_frame as influence_frame
+    from rotorid.files.influence import read_influence as read_influence
+    from rotorid.files.influence import write_influence as write_influence
     from rotorid.files.job import Job as Job
     from rotorid.files.job import job_from_files as job_from_files
     from rotorid.files.job import read_job as read_job
@@ -35,9 +38,6 @@ if TYPE_CHECKING:
     from rotorid.files.table_writing import write_table as write_table
     from rotorid.files.unbalance import read_bow as read_bow
     from rotorid.files.unbalance import read_unbalance as read_unbalance
-    from rotorid.tables.runs.influence_table import influence_frame as influence_frame
-    from rotorid.tables.runs.influence_table import read_influence as read_influence
-    from rotorid.tables.runs.influence_table import write_influence as write_influence
 
 _HOME = {
     "read_measurements": ".files.measurements",
@@ -61,9 +61,9 @@ _HOME = {
     "rotor_files": ".files.rotor",
     "write_rotor": ".files.rotor_writing",
     "read_unbalance": ".files.unbalance",
-    "influence_frame": "runs.influence_table",
-    "read_influence": "runs.influence_table",
-    "write_influence": "runs.influence_table",
+    "influence_frame": ".files.influence",
+    "read_influence": ".files.influence",
+    "write_influence": ".files.influence",
     "Conventions": ".files.conventions",
     "StatedErrors": ".files.conventions",
     "read_trials": ".files.runs",

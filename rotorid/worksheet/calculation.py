@@ -182,8 +182,8 @@ def rows(name: str, data: str, phase: str) -> dict[str, Any]:
     A file that says that its phases are others than the job's, `phase`, is refused.
     """
     from balancing import Labels
+    from rotorid.files.cells import show
     from rotorid.files.conventions import Conventions, as_phase
-    from rotorid.files.grid import show
     from rotorid.files.input_file import each_file_once
     from rotorid.files.layout import read_runs_grid
     from rotorid.files.problems import Problems

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorid.base.text import listing
+from rotorid.files.cells import clean
 from rotorid.files.excel_workbook import SUFFIXES, is_workbook
-from rotorid.files.grid import clean
 from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError

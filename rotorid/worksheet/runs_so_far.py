@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from balancing import Trials
     from rotorid.base.arrays import FloatArray
+    from rotorid.files.cells import Grid
     from rotorid.files.columns import Source, Table
     from rotorid.files.conventions import Conventions
-    from rotorid.files.grid import Grid
     from rotorid.files.job_models import JobSettings, Vector
 
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?")
@@ -204,7 +204,7 @@ def _channels(
     from balancing import reading_of
     from rotorid.files.problems import Problems
     from rotorid.files.runs import make_trials
-    from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
+    from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 
     stated = None if settings.errors is None else settings.errors.stated
 
@@ -229,7 +229,7 @@ def _channels(
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:
     """Indices of the finished rows of each speed and sensor."""
-    from rotorid.files.speeds import same_speed
+    from rotorid.files.runs import same_speed
 
     found: dict[tuple[float, str], list[int]] = {}
     speed, run, sensor = table.numbers("speed"), table.texts("run"), table.texts("sensor")

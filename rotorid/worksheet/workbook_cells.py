@@ -15,11 +15,11 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import now
+from rotorid.files.cells import Cell, Row, clean, make_grid, show
 from rotorid.files.columns import sheet_source
 from rotorid.files.decimal_numbers import NotANumber, decimal_comma
 from rotorid.files.excel_pages import Line, header_row, keep_cells, put
 from rotorid.files.excel_workbook import find_sheet, sheets_in
-from rotorid.files.grid import Cell, Row, clean, make_grid, show
 from rotorid.files.job_excel import (
     NAMED,
     OPTIONAL,

@@ -15,7 +15,7 @@ import numpy as np
 import openpyxl
 from tables_data import RUNS
 
-from rotorid.files.grid import Shown
+from rotorid.files.cells import Shown
 from rotorid.files.job_excel import template_bytes
 from rotorid.files.job_models import TABLES
 

@@ -34,7 +34,7 @@ def folder(tmp_path):
         write_csv(place / f"{name}.csv", table)
     write_csv(place / "rotor.csv", [["" if cell is None else cell for cell in row] for row in ROTOR])
     trials = job_from_files([place / "runs.csv", place / "weights.csv"], phase="lag").trials
-    write_influence(place / "influence.csv", estimate_influence(trials), ["two runs"])
+    write_influence(place / "influence.csv", estimate_influence(trials))
     return place
 
 

@@ -55,15 +55,6 @@ def test_phase_convention_of_the_table_wins_over_that_of_the_job(stored, tmp_pat
         assert influence.labels.phase == phase or phase is None
 
 
-def test_a_convention_that_is_none(tmp_path, stored):
-    stored()
-    path = tmp_path / "lag.csv"
-    path.write_text("# phase = lagging\n" + (tmp_path / "influence.csv").read_text())
-    the_only(
-        complaints(read_influence, path), "lag.csv", None, None, "# phase = lagging", "did you mean 'lag'?"
-    )
-
-
 @pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
 @pytest.mark.parametrize("phase", ["lead", "lag"])
 @pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
@@ -72,8 +63,8 @@ def test_round_trip(tmp_path, suffix, phase, angles):
     influence = estimate_influence(read_trials(*files, phase=phase, angles=angles))
     path = tmp_path / f"influence{suffix}"
     write_influence(path, influence)
-    again = read_influence(path)
-    np.testing.assert_array_equal(again.speeds, influence.speeds)
+    again = read_influence(path, angles=angles)
+    np.testing.assert_allclose(again.speeds, influence.speeds, rtol=1e-14)
     np.testing.assert_allclose(again.W, influence.W, rtol=1e-14)
     assert (again.sensors, again.planes, again.labels) == (
         influence.sensors,

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
+from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
-from rotorid.files.grid import Grid
 from rotorid.files.layout import read_runs_grid
 from rotorid.files.problems import Problems
+from rotorid.files.slow_roll import make_slow_roll
 from rotorid.files.units import one_of
 from rotorid.identify.modes_result import Readings
-from rotorid.tables.runs.slow_roll import make_slow_roll
 
 COLUMNS = (
     *(column for column in runs_table.COLUMNS if column.stem not in ("repeat", "time_s")),
@@ -52,54 +52,52 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     problems.stop()
     unit = table.unit("amplitude")
     labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
+    return tuple(_sweeps(table, labels))
+
+
+def _sweeps(table: Table, labels: Labels) -> Iterator[Readings]:
+    """The rows of each run as vectors of its sensors, by rising time or, without times, speed."""
     vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     covariances = runs_table.covariances(table, vectors) if "amplitude_std" in table else None
-    runs = np.array(table.texts("run"))
-    return tuple(
-        _sweep(table, np.flatnonzero(runs == run), vectors, covariances, labels)
-        for run in dict.fromkeys(runs.tolist())
+    runs, names, speeds = (
+        np.array(table.texts("run")),
+        np.array(table.texts("sensor")),
+        table.numbers("speed"),
     )
-
-
-def _instants(table: Table) -> FloatArray:
-    """What rows of a run that were read together have in common."""
-    return table.numbers("time" if "time" in table else "speed")
+    for run in dict.fromkeys(runs.tolist()):
+        rows = np.flatnonzero(runs == run)
+        instants, first, place = np.unique(
+            table.numbers("time" if "time" in table else "speed")[rows],
+            return_index=True,
+            return_inverse=True,
+        )
+        sensors = tuple(dict.fromkeys(names[rows].tolist()))
+        column = [sensors.index(name) for name in names[rows]]
+        Z = np.full((len(instants), len(sensors)), complex(np.nan, np.nan))
+        Z[place, column] = vectors[rows]
+        stated = None
+        if covariances is not None:
+            stated = np.full((*Z.shape, 2, 2), np.nan)
+            stated[place, column] = covariances[rows]
+        timed = instants if "time" in table else None
+        yield Readings(run, timed, speeds[rows][first], sensors, Z, stated, labels)
 
 
 def _complain_about_twins(table: Table) -> None:
     """A sensor is read once at a time, and all at one speed."""
-    runs, sensors, instants = table.texts("run"), table.texts("sensor"), _instants(table).tolist()
-    timed = "time" in table
-    where = "time" if timed else "speed; vectors read one after the other need a column time_s"
-    once = [key if key[2] == key[2] else None for key in zip(runs, sensors, instants, strict=True)]
-    table.once("sensor", once, f"another sensor than in row {{}}, which has the same run and {where}")
+    stem = "time" if "time" in table else "speed"
+    runs, instants, speeds = table.texts("run"), table.numbers(stem).tolist(), table.numbers("speed")
+    where = "time" if stem == "time" else "speed; vectors read one after the other need a column time_s"
+    keys = (
+        key if key[2] == key[2] else None for key in zip(runs, table.texts("sensor"), instants, strict=True)
+    )
+    table.once("sensor", keys, f"another sensor than in row {{}}, which has the same run and {where}")
     first: dict[tuple[str, float], int] = {}
-    speeds = table.numbers("speed")
     for row, key in enumerate(zip(runs, instants, strict=True)):
         other = first.setdefault(key, row)
         if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)
-
-
-def _sweep(
-    table: Table, rows: IntArray, vectors: ComplexArray, covariances: FloatArray | None, labels: Labels
-) -> Readings:
-    """The rows of one run as vectors of its sensors, by rising time or, without times, speed."""
-    instants, place = np.unique(_instants(table)[rows], return_inverse=True)
-    names = np.array(table.texts("sensor"))[rows].tolist()
-    sensors = tuple(dict.fromkeys(names))
-    column = [sensors.index(name) for name in names]
-    speeds = np.zeros(len(instants))
-    speeds[place] = table.numbers("speed")[rows]
-    Z = np.full((len(instants), len(sensors)), complex(np.nan, np.nan))
-    Z[place, column] = vectors[rows]
-    stated = None
-    if covariances is not None:
-        stated = np.full((*Z.shape, 2, 2), np.nan)
-        stated[place, column] = covariances[rows]
-    timed = instants if "time" in table else None
-    return Readings(table.texts("run")[rows[0]], timed, speeds, sensors, Z, stated, labels)
 
 
 def runs_columns(
@@ -113,11 +111,10 @@ def runs_columns(
     every = np.concatenate([np.repeat(speeds, len(sweep.sensors)) for sweep, speeds, _, _ in found])
     vectors = np.concatenate([Z.ravel() for _, _, Z, _ in found])
     amplitude, phase = labels.vibration(vectors)
-    own = np.conj(vectors) / np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
+    u = np.stack((vectors.real, vectors.imag), -1) / size[:, None]
     parts = np.concatenate([C.reshape(-1, 2, 2) for *_, C in found])
-    # along and across: real and imaginary part, turned so that the vector is real
-    turn = np.stack((np.stack((own.real, -own.imag), -1), np.stack((own.imag, own.real), -1)), -2)
-    along, across = np.sqrt(np.einsum("nij,njk,nik->in", turn, parts, turn))
+    along, across = (np.sqrt(np.einsum("ni,nij,nj->n", d, parts, d)) for d in (u, u[:, ::-1] * [-1, 1]))
     columns = (
         Told("run", runs),
         Told(f"speed_{speed.name}", np.round(every * speed.scale, 9)),
@@ -127,7 +124,6 @@ def runs_columns(
     )
     if np.isnan(along).any():
         return columns
-    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
     return (
         *columns,
         Told(f"amplitude_std{unit}", along * labels.vibration_scale),
