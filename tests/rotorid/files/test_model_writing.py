@@ -214,13 +214,13 @@ def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
         ('"g*u"', '"g*u + 1"', r"constant one has no influence"),
         ('"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
         ('[["m", 0]', '[["m", "u"]', r"u in 'u' has no meaning"),
-        ('[["m", 0]', '[["m"]', r"key M: expected square matrices"),
+        ('[["m", 0]', '[["m"]', r"key M: .*expected square matrices"),
         ('w = "v_y2/4"', 'y2 = "1e3*y1"', r"y2: an amplitude needs a name of its own"),
         ('a = "1e3*y1"', 'k = "1e3*y1"', r"k: an amplitude needs a name of its own"),
         ('y1 = "g*u"', 'y3 = "g*u"', r"y3: .*a force one of y1 or y2"),
-        ("[outputs]", 'per = ["m"]\n[outputs]', r"key force.per: expected a number, or an expression"),
+        ("[outputs]", 'per = ["m"]\n[outputs]', r"key force.per: .*expected a number, or an expression"),
         ("[force]", 'per_record = ["k"]\n[force]', r"k in 'k' has no meaning for amplitudes"),
-        ("[force]", "[states]\nx = 1\n[force]", r"key M: expected equations, matrices or states"),
+        ("[force]", "[states]\nx = 1\n[force]", r"key M: .*expected equations, matrices or states"),
         ("k = 3.0", "k = 3.0\np = 1.0", r"p: an amplitude needs a name of its own"),
     ],
 )
@@ -240,7 +240,7 @@ def test_what_has_no_meaning_for_amplitudes_is_refused(tmp_path, old, new, said)
         (
             read_ode_model,
             'equations = ["k*X = F"]\nestimate = ["k"]',
-            r"key equations: expected \[states\], or M",
+            r"key equations: .*expected \[states\], or M",
         ),
         (read_ode_model, 'estimate = ["k"]\n[states]\nx = "k"', r"key estimate: .*starting value, k = 1.0"),
         (
