@@ -28,11 +28,11 @@ def main(samples: int = 10_000, runs: int = 0) -> None:
         seconds, bytes_of = {}, {}
 
         def timed(way: str, workers: int, **executor: object) -> None:
-            options = StudyOptions(samples=samples, workers=workers, results=folder / way)
+            options = StudyOptions(samples=samples, workers=workers, results=folder / f"{way}.parquet")
             begun = time.perf_counter()
             study(file, options, **executor)
             seconds[way] = time.perf_counter() - begun
-            bytes_of[way] = [part.read_bytes() for part in sorted((folder / way).glob("part-*"))]
+            bytes_of[way] = (folder / f"{way}.parquet").read_bytes()
             same = bytes_of[way] == bytes_of["one worker"]
             each = 1e3 * seconds[way] / samples
             ratio = seconds["one worker"] / seconds[way]

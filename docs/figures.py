@@ -133,10 +133,9 @@ GALLERY = (
     Picture(
         "type",
         "balancing",
-        "fleet fit fans --type fan-132",
+        "fleet fit sample_data/fleet",
         "Coefficients of six fans over those of their type, with regions of 95 of 100 machines; 132-07 was "
         "written down with lag for lead.",
-        first="fleet add fans sample_data/fleet",
     ),
     Picture(
         "modes",

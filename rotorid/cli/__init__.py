@@ -37,9 +37,7 @@ from rotorid.commands import (
 )
 from rotorid.commands.app import json_text, run, typer_command, written_help
 from rotorid.commands.progress import markup_mode
-from rotorid.fleet.adding import fleet_add
-from rotorid.fleet.fitting import fleet_fit
-from rotorid.fleet.showing import fleet_show
+from rotorid.fleet.fit import fleet_fit
 from rotorid.study.studies import study
 
 app = typer.Typer(
@@ -52,7 +50,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 fleet = typer.Typer(
-    no_args_is_help=True, help="Jobs of many machines as tables, and coefficients of their type."
+    no_args_is_help=True, help="Jobs of many machines as a table, and coefficients of their type."
 )
 _JOBS: dict[str, tuple[Callable[..., Outcome], ...]] = {
     "Balance rotors": (balance, vectors, trial_weight, split, tolerance, unbalance),
@@ -107,7 +105,11 @@ def schema(
 
     Example: rotorid schema job
     """
+    from rotorid.study.study_file import StudyKeys
+    from rotorid.tables.schema import FILES
     from rotorid.tables.schema import schema as schema_of
+
+    FILES["study"] = ("Study file of rotorid", StudyKeys)
 
     typer.echo(json_text(schema_of(kind)))
 
@@ -116,8 +118,7 @@ for _job, _works in _JOBS.items():
     for _work in _works:
         _name = _work.__name__.replace("_", "-")
         app.command(_name, cls=Command, rich_help_panel=_job)(typer_command(_work))
-for _work in (fleet_add, fleet_show, fleet_fit):
-    fleet.command(_work.__name__.removeprefix("fleet_"), cls=Command)(typer_command(_work))
+fleet.command("fit", cls=Command)(typer_command(fleet_fit))
 app.add_typer(fleet, name="fleet", rich_help_panel="More")
 for _more in (worksheet, demo, schema):
     _more.__doc__ = written_help(_more)

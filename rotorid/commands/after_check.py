@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotorid.commands.balance_solution import Solved, correct_job
 from rotorid.commands.coefficients import choose
-from rotorid.fleet.proposals import pieces_mounted
 
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
@@ -96,3 +96,24 @@ def left_to_do(
         bare=None if check is None else check.before,
     )
     return replace(left, why=left.why + no_pieces) if left.word == "trim" else left
+
+
+def pieces_mounted(
+    job: Job, correction: Correction, influence: Influence, runs: Trials | None
+) -> Mounted | None:
+    """The pieces that `--split` proposes for a correction; None where others or none were mounted.
+
+    Parameters
+    ----------
+    job
+        With check runs, whose weights nobody states.
+    correction, influence, runs
+        Before the check runs.
+    """
+    from balancing import mount
+
+    if job.check_mounted or job.check_of_weights or not set(correction.planes) & set(job.holes):
+        return None
+    with suppress(ValueError):  # no pieces can be proposed: the weights were
+        return mount(correction, influence, runs, job.holes)
+    return None

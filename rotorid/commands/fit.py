@@ -185,9 +185,9 @@ def _read(
     weigh: bool,
 ) -> list[Record]:
     """All records, with standard deviations for all of them or for none."""
+    from rotorid.files.records import STD
     from rotorid.identify.records import Record
     from rotorid.tables import read_record
-    from rotorid.tables.data.records import STD
 
     records = [
         replace(one, sigma=one.sigma if sigma is None else sigma)

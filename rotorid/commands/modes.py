@@ -111,15 +111,15 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
     import numpy as np
 
     from balancing import Labels
+    from rotorid.files.measurements import read_amplitudes
     from rotorid.identify.modes_result import Readings
-    from rotorid.tables.data.measurements import read_amplitudes
 
     errors = options.amplitude_error, options.phase_error
     if None in errors and any(error is not None for error in errors):
         raise ValueError("--amplitude-error and --phase-error belong together")
     if errors == (0, 0):
         raise ValueError("--amplitude-error and --phase-error: one of them must be above 0")
-    table = read_amplitudes(file, None)
+    table = read_amplitudes(file)
     if options.excitation is not None:
         one_of(options.excitation, "--excitation", get_args(Excitation))
     elif "F" not in table.signals:

@@ -20,7 +20,7 @@ from rotorid.files.units import Unit, UnitError, spelt
 
 if TYPE_CHECKING:
     from balancing import Labels
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
     from rotorid.tables import Job
 
 Amount = str | float
@@ -118,7 +118,7 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
     from rotorid.files.weights_with_units import in_job_units
 
     own = labels.weight_unit
@@ -205,7 +205,7 @@ def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -
         raise ValueError(
             f"{what} {given!r}: give one value for all planes, or each plane once (a decimal sign is a point)"
         )
-    return _limits(given, what, read, "5g or left=5g,right=3g", "plane", job.planes, job.used)
+    return _limits(given, what, read, "5g or left=5g,right=3g", "plane", list(job.planes), job.used)
 
 
 def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> dict[str, Quantity]:
@@ -246,7 +246,7 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
     """The job with these limits in place of its own."""
-    from rotorid.tables.job.job_limits import with_limits
+    from rotorid.files.job import with_limits
 
     return with_limits(job, largest_weights(job, max_mass), largest_amplitudes(job, limits))
 
@@ -283,7 +283,7 @@ def _limits(
 
 
 def _limit(value: float, unit: Unit, given: object, what: str, example: str) -> Quantity:
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
 
     return Quantity(f"{what} {given!r}", _above_zero(value, given, what, example), unit)
 

@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
+    from rotorid.files.modes import MeasuredModes
     from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
-    from rotorid.tables.data.modes_table import MeasuredModes
 
 Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
@@ -288,6 +288,7 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
     """The masses of a rotor, and what is asked for beside them."""
     from rotorid.commands.reduce_result import small_of
+    from rotorid.files.modes import read_modes
     from rotorid.reduction import (
         check_free,
         compare_methods,
@@ -298,7 +299,6 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         keep_supports,
     )
     from rotorid.reduction import reduce as reduce_rotor
-    from rotorid.tables.data.modes_table import read_modes
 
     whole, files = rotor_source(rotor)
     machine, held = whole, held_nodes(whole) if options.keep_supports else ()
@@ -395,8 +395,8 @@ def _places(
 
 def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     """A reduction without a rotor: its compliance and its modes from tables."""
+    from rotorid.files.modes import read_compliance, read_modes
     from rotorid.reduction import reduce_measured
-    from rotorid.tables.data.modes_table import read_compliance, read_modes
 
     if options.compliance is None or options.measured is None:
         raise ValueError("give a rotor, or --compliance and --measured, which take its place")

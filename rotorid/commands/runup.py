@@ -171,7 +171,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
 
 def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """Vectors of each run in a table, and the files that were read."""
-    from rotorid.tables.runs.vectors_table import read_vectors
+    from rotorid.files.vectors_table import read_vectors
 
     return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
 
@@ -179,13 +179,15 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
     from rotorid.files.problems import Problems
-    from rotorid.tables.runs.vectors_table import read_vectors
-    from rotorid.tables.waveforms.vectors_of_records import read_vectors_grid
-    from rotorid.tables.waveforms.waveforms import WaveformWishes
+    from rotorid.files.vectors_table import read_vectors
+    from rotorid.files.waveforms import read_vectors_grid
 
-    given = WaveformWishes(
-        tacho=options.tacho, sensors=names(options.sensors), unit=options.unit, phase=options.phase
-    )
+    given = {
+        "tacho": options.tacho,
+        "sensors": names(options.sensors),
+        "unit": options.unit,
+        "phase": options.phase,
+    }
     problems = Problems()
     grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
     return read_vectors(grid, phase), read
@@ -271,8 +273,8 @@ def _slow_roll(
     sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
 ) -> SlowRoll:
     """Run-out: of the fit, the mean at slow speeds, or of a file."""
+    from rotorid.files.vectors_table import read_slow_roll
     from rotorid.identify.modes import constant_vectors, slow_vectors
-    from rotorid.tables.runs.vectors_table import read_slow_roll
 
     if isinstance(given, str) and given == "fit":
         if modes is None or modes.undetermined:
@@ -301,8 +303,8 @@ def _passed(
 
     import numpy as np
 
+    from rotorid.files.vectors_table import runs_columns
     from rotorid.identify.modes import fit_sweep, vectors_when_passing
-    from rotorid.tables.runs.vectors_table import runs_columns
 
     speeds = np.unique(read_speeds(options.speeds or (), sweeps[0].labels.speed_unit))
     parts = []

@@ -83,21 +83,20 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     ValueError
         For records without turns, and options that cannot be.
     """
-    from rotorid.tables.waveforms.vectors_of_records import find_each, vectors_columns
-    from rotorid.tables.waveforms.waveforms import WaveformWishes, read_waveforms
+    from rotorid.files.waveforms import find_each, read_waveforms, vectors_columns
     from rotorid.waveforms.plots import figure_tacho
 
     options = options or VectorsOptions()
-    given = WaveformWishes(
-        tacho=options.tacho,
-        sensors=names(options.sensors),
-        unit=options.unit,
-        pulses=options.pulses,
-        phase=options.phase,
-        rate=options.rate,
-        orders=_orders(options.orders),
-        speeds=None if options.speeds is None else speeds(options.speeds),
-    )
+    given = {
+        "tacho": options.tacho,
+        "sensors": names(options.sensors),
+        "unit": options.unit,
+        "pulses": options.pulses,
+        "phase": options.phase,
+        "rate_Hz": options.rate,
+        "orders": _orders(options.orders),
+        "speeds_rad_s": None if options.speeds is None else list(speeds(options.speeds)),
+    }
     waveforms = read_waveforms([Path(record) for record in records], given)
     each = find_each(waveforms)
     columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels

@@ -179,6 +179,6 @@ def in_si(keys: type[Settings], values: Mapping[str, Any]) -> dict[str, Any]:
     """Values by field as a table of a file, by its keys in SI, without those that are the default."""
     return {
         next(name for name, unit in key.variants.items() if unit.scale == 1.0): values[field]
-        for (field, one), key in zip(keys.model_fields.items(), keys.keys().values(), strict=True)
+        for (field, one), key in zip(keys.model_fields.items(), keys.known_keys().values(), strict=True)
         if values.get(field, one.default) != one.default
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi, sqrt
+from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -39,6 +40,22 @@ class Unit:
     def to_si(self, value: float) -> float:
         """A number written in this unit, in SI."""
         return value * self.multiply / self.divide
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number (or several) with the key or option that holds it and its unit."""
+
+    key: str
+    value: Any
+    unit: Unit
+    wrong: str = ""
+    """What is expected of the unit where it is none."""
+
+    @property
+    def si(self) -> float:
+        """In SI."""
+        return self.unit.to_si(self.value)
 
 
 class UnitError(ValueError):

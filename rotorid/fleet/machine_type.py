@@ -32,14 +32,14 @@ from balancing import (
     with_parameters,
 )
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.text import counted, listing
+from rotorid.base.text import counted
 from rotorid.regression import covariance_root, stretch, unstretch
 from rotorid.regression.random_effects import RandomEffects, oddness, random_effects
 
 LEAST_MACHINES = 3
 """Fewer do not show how machines differ."""
 _ALIKE = 4.0
-"""Squared distances that differ by less do not tell two reasons apart."""
+"""Of squared distance, which a reason with a number to choose gives up."""
 
 
 class MachineRecord(NamedTuple):
@@ -60,9 +60,12 @@ class MachineRecord(NamedTuple):
 
     @classmethod
     def of(cls, influence: Influence, machine: str = "", job: str = "") -> MachineRecord:
-        """The coefficients of a job with the covariance of each, zero where errors are not known."""
+        """The coefficients of a job with the covariance of each, of stated and measured errors alone.
+
+        Assumed ones would make the scatter between machines look smaller than it is.
+        """
         S, C, P = influence.W.shape
-        V = np.einsum("scpipj->scpij", influence.channels()[..., 2:, 2:].reshape(S, C, P, 2, P, 2))
+        V = np.einsum("scpipj->scpij", influence.channels(known=True)[..., 2:, 2:].reshape(S, C, P, 2, P, 2))
         return cls(machine, job, influence.W, V)
 
 
@@ -113,7 +116,7 @@ class MachineType:
 
     def influence(self, labels: Labels, machine: str = "") -> Influence:
         """Coefficients to expect of one of `machines`, whose own jobs count then; else of a further one."""
-        mean, covariance = self.effects.mean, self.effects.new_group
+        mean, covariance = self.effects.mean, self.effects.new_group + np.diag(self._doubt)
         if machine in self.machines:
             mean, covariance = self.effects.known(self.machines.index(machine))
         covariance = (covariance + self.effects.within) * self.widening
@@ -132,15 +135,29 @@ class MachineType:
         return all_.part(match_speeds(self.speeds, all_.speeds), [*sensors], [*planes])
 
     def why_odd(self, record: MachineRecord, trials: Trials | None = None) -> str:
-        """What would make a record fit the type, in words; "" where nothing tried does.
+        """What would make a record fit the type best, in words; "" where nothing tried does.
 
         By the runs that it was measured with; None: not known, and the weights taken to be at 0°.
         """
-        changes = list(_changes(self, record, trials))
-        least = min(distance for distance, _ in changes)
-        if least > min(self.limit, self.distance(record.W, record.covariance)):
-            return ""
-        return listing([text for d, text in changes if d <= least + _ALIKE], "or")
+        least, words = min(_changes(self, record, trials))
+        return words if least <= min(self.limit, self.distance(record.W, record.covariance)) else ""
+
+    @property
+    def _doubt(self) -> FloatArray:
+        """By how much more variances between machines may be expected to be, (n,): the rest after errors.
+
+        Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
+        σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
+        """
+        from scipy.special import ndtr
+
+        between = np.diag(self.effects.between)
+        blocks = self.effects.error.mean(axis=0)
+        rest = np.diag(self.effects.within) * np.mean(1 / self.effects.jobs)
+        total = between + blocks[:, [0, 1], [0, 1]].ravel() + rest
+        std = np.sqrt(2 * (total**2 - between**2) / (len(self.machines) - 1))
+        ratio = np.divide(between, std, out=np.full_like(std, np.inf), where=std > 0)
+        return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
 
     @property
     def widening(self) -> float:
@@ -201,9 +218,15 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
     from scipy.optimize import minimize_scalar
 
     W, V = record.W, record.covariance
+    lag = np.conj(W)
+    with suppress(ValueError):  # runs that do not give all coefficients
+        if trials is not None:
+            read = kind.measured(trials).W
+            other = replace(trials, readings=np.conj(trials.readings), covariance=None)
+            size = np.linalg.norm(W, axis=(0, 1)) / np.linalg.norm(read, axis=(0, 1))  # of other radii
+            lag = kind.measured(other).W * size
     mirror = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    lagging = kind.distance(_lagging(kind, W, trials), V * mirror)
-    yield lagging, "its phases were of the other sense (lag for lead)"
+    yield kind.distance(lag, V * mirror), "its phases were of the other sense (lag for lead)"
     for names, axis, what in ((kind.sensors, 1, "sensors"), (kind.planes, 2, "planes")):
         for a, b in combinations(range(len(names)), 2):
             order = np.arange(len(names))
@@ -221,17 +244,6 @@ def _changes(kind: MachineType, record: MachineRecord, trials: Trials | None) ->
     degrees = (round(np.degrees(least.x)) + 180) % 360 - 180
     words = f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
     yield float(least.fun) + _ALIKE, words  # it has a number to choose
-
-
-def _lagging(kind: MachineType, W: ComplexArray, trials: Trials | None) -> ComplexArray:
-    """Coefficients if phases meant the other, at the type's radii; without trial runs conj(W)."""
-    if trials is not None:
-        with suppress(ValueError):
-            read = kind.measured(trials).W
-            lag = replace(trials, readings=np.conj(trials.readings), covariance=None)
-            size = np.linalg.norm(W, axis=(0, 1)) / np.linalg.norm(read, axis=(0, 1))
-            return np.asarray(kind.measured(lag).W * size)
-    return np.conj(W)
 
 
 def _rows(W: ComplexArray, covariance: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing import region_edge
-from rotorid.base.plot_style import legend_below, look, new_figure, note, plain
+from rotorid.base.plot_style import legend_below, look, new_figure, plain
 from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
@@ -27,20 +27,19 @@ def type_figure(kind: MachineType) -> Figure:
     pairs = np.einsum("ninj->nij", (effects.new_group + effects.within).reshape(n, 2, n, 2))
     relative = pairs.reshape(*mean.shape, 2, 2) / (np.abs(mean) ** 2)[..., None, None]
     edges = 100 * region_edge(np.zeros_like(mean), relative * kind.widening, 91)
-    sensors, planes = kind.sensors[:_MOST], kind.planes[:_MOST]
-    figure = new_figure(2.6 * len(planes) + 0.8)
-    axes = figure.subplots(len(planes), len(sensors), sharex=True, sharey=True, squeeze=False)
+    shape = min(len(kind.planes), _MOST), min(len(kind.sensors), _MOST)
+    figure = new_figure(2.6 * shape[0] + 0.8)
+    axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
     for (p, c), ax in np.ndenumerate(axes):
         plain(ax)
         for s, speed in enumerate(map(rpm_text, kind.speeds)):
             style, dots, edge = look(s), machines[:, s, c, p], edges[s, c, p]
             ax.plot(dots.real, dots.imag, ".", color=style["color"], label=f"machines, {speed}")
             ax.plot(edge.real, edge.imag, **style, label=f"95 % of machines, {speed}")
-            for record, _ in kind.odd:
-                other = 100 * complex(record.W[s, c, p] / mean[s, c, p] - 1)
-                ax.plot(other.real, other.imag, "x", color=style["color"], label="odd, left out")
-                note(ax, "" if s else record.machine, (other.real, other.imag), (4, 4))
-        ax.set_title(f"{planes[p]} on {sensors[c]}", fontsize="medium")
+        for record, _ in kind.odd:
+            other = 100 * (record.W / mean - 1)[:, c, p]
+            ax.plot(other.real, other.imag, "x", color="black", label=f"odd: {record.machine}")
+        ax.set_title(f"{kind.planes[p]} on {kind.sensors[c]}", fontsize="medium")
         ax.set(aspect="equal", xlabel="along the mean, % of it", ylabel="across, % of it")
         ax.label_outer()
     legend_below(figure, axes.flat)

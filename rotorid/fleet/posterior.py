@@ -73,8 +73,11 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     A[..., N:] = K
     rows = np.vstack((A.reshape(-1, N + M), np.eye(N + M)[N:]))
     right = np.append(y, np.zeros(M))
-    values, *_ = np.linalg.lstsq(rows, right, rcond=None)
-    covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
+    # in units of each column: else small errors of readings in SI leave no variance of the coefficients
+    scale = np.linalg.norm(rows, axis=0)
+    values = np.linalg.lstsq(rows / scale, right, rcond=None)[0] / scale
+    covariance = np.linalg.pinv((rows.T @ rows) / np.outer(scale, scale), hermitian=True)
+    covariance /= np.outer(scale, scale)
     moved = np.tensordot(values[N : N + m], columns, 1)
     # what a channel's readings tell of its Y₀ alone, all else given, is its own; the rest is in common
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))

@@ -1,4 +1,4 @@
-"""Studies: samples drawn and counted, machines that are balanced or starts of a calibration."""
+"""Studies: drawn machines that are read, balanced and counted."""
 
 from rotorid.base.lazy_names import lazy_names
 
@@ -6,13 +6,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.study.studies import StudyOptions as StudyOptions
     from rotorid.study.studies import study as study
-    from rotorid.study.study_result import StudiedMachines as StudiedMachines
-    from rotorid.study.study_result import StudiedStarts as StudiedStarts
 
-_HOME = {
-    **dict.fromkeys(("StudyOptions", "study"), "studies"),
-    **dict.fromkeys(("StudiedMachines", "StudiedStarts"), "study_result"),
-}
+_HOME = dict.fromkeys(("StudyOptions", "study"), "studies")
 
 __all__ = [*_HOME]
 

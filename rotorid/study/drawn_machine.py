@@ -11,7 +11,7 @@ from balancing import Correction, RunScatter, Trials, UndeterminedError, correct
 from fem import InfluenceCoefficients, Rotor, influence
 from fem.parameters import with_parameters
 from rotorid.base.arrays import ComplexArray
-from rotorid.tables.study_file import MachineStudy
+from rotorid.study.study_file import MachineStudy
 
 TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
@@ -118,4 +118,4 @@ def _trials(study: MachineStudy, readings: list[ComplexArray], weights: list[Com
 
 def _holds(found: Correction, D: ComplexArray) -> bool | None:
     """Whether the joint 95 % region of the weights holds D; None where there is none."""
-    return found.region().holds(D) if found.region_known else None
+    return bool(found.region().holds(D)) if found.region_known else None

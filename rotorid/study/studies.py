@@ -1,31 +1,27 @@
-"""`study`: what becomes of many drawn machines, or of many starts of a calibration, on any executor."""
+"""`study`: what becomes of many drawn machines, on any executor."""
 
 from __future__ import annotations
 
 import json
-import sqlite3
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import counted
 from rotorid.report.options import file_of
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
-from rotorid.study.study_result import StudiedMachines, StudiedStarts
+from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-    from rotorid.study.chunks import Task
-    from rotorid.tables.study_file import StudyFile
-
-MACHINES, STARTS = 250, 8
-"""Samples in a file: some seconds of work."""
-MANIFEST = "_study.json"  # with _: who reads the folder as a table passes it over
-LOCK = "_study.lock"
+UNDETERMINED = "the readings do not determine a correction"
 
 
 @dataclass(frozen=True)
@@ -40,15 +36,18 @@ class StudyOptions:
         In place of what the file says.
     workers : N from 1
         Processes on this machine.
-    results : FOLDER
-        For the samples, as Parquet; a study that was broken off there is continued.
+    scheduler : ADDRESS
+        Of a Dask cluster whose workers draw the samples, such as tcp://10.0.0.5:8786.
+    results : FILE
+        For the samples, .parquet; a study that was broken off there is continued.
     """
 
     samples: int | None = None
     seed: int | None = None
     workers: int = 1
+    scheduler: str | None = None
     results: Path | str | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Work": "workers results"}
+    panels: ClassVar[Mapping[str, str]] = {"Work": "workers scheduler results"}
     to: ClassVar[Sequence[str]] = USUAL
 
 
@@ -57,7 +56,7 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
     """Chance that a machine meets its limit, as built and balanced, by simulation.
 
     A study that was broken off is continued by the same command with --results; the samples do not
-    depend on the workers. In Python it runs on any executor, such as that of a Dask cluster.
+    depend on the workers.
 
     Example: rotorid study sample_data/study/study.toml --samples 50
 
@@ -66,100 +65,148 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
     file : STUDY
         Study file (.toml).
     options
-        How many samples, where they are kept.
+        How many samples, who draws them, where they are kept.
     executor
-        Any of `concurrent.futures`, such as `client.get_executor()` of Dask, in place of own processes.
+        Any of `concurrent.futures`, in place of own processes.
 
     Raises
     ------
     ValueError
-        For files that cannot be, a folder of another study, a sample that fails, and workers that die again
-        and again.
+        For files that cannot be, a result file of another study or of one that is running, a sample that
+        fails, and workers that die.
     """
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise ValueError("a study needs pyarrow: pip install pyarrow") from error
     from rotorid.files.input_file import sha256
-    from rotorid.study.chunks import read_parts, run_study
-    from rotorid.tables.study_file import read_study
+    from rotorid.study.drawn_machine import draw_machine, nominal
+    from rotorid.study.results import Task, run
+    from rotorid.study.study_file import read_study
 
     options = options or StudyOptions()
-    path = file_of(file, "a study")
-    read = read_study(path)
+    read = read_study(file_of(file, "a study"))
     seed = read.seed if options.seed is None else options.seed
     samples = read.samples if options.samples is None else options.samples
+    results = None if options.results is None else Path(options.results)
     if samples < 1 or seed < 0 or options.workers < 1:
         raise ValueError("--samples and --workers take a number from 1, --seed one from 0")
-    task, files, words = _task(read, path.parent, seed)
-    told = provenance(files, options)
-    kept = {"schema_version": SCHEMA_VERSION, "version": told["version"], "seed": seed}
-    with tempfile.TemporaryDirectory() as own:
-        folder = Path(options.results or own)
-        with _claimed(folder, {**kept, "inputs": [*map(sha256, files)]}):
-            run_study(task, samples, folder, options.workers, executor)
-        parts = read_parts(task, samples, folder)
-        common: dict[str, Any] = {"samples": samples, "seed": seed, "warnings": words}
-        if read.machine is not None:
-            from rotorid.study.machine_counts import count_machines
-
-            planes, most = len(read.machine.planes), read.machine.corrections
-            machines = StudiedMachines(**common, **count_machines(parts, planes, most))
-            return outcome_of(machines, told, title="Study of machines")
-        from rotorid.study.calibration_starts import count_minima
-
-        starts = StudiedStarts(**common, **count_minima(parts, tuple(task.columns)[2:]))
-        return outcome_of(starts, told, title="Study of starts")
+    if results is not None and results.suffix != ".parquet":
+        raise ValueError(f"--results {results}: the name of the file must end in .parquet")
+    ratios = [f"ratio_{k}" for k in range(read.machine.corrections + 1)]
+    columns = dict.fromkeys(ratios, "double")
+    columns |= {"runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
+    coefficients, words = nominal(read.machine)
+    made = provenance(read.files, options)
+    identity = {"version": made["version"], "seed": seed, "inputs": [*map(sha256, read.files)]}
+    task = Task(draw_machine, (read.machine, coefficients), seed, columns, json.dumps(identity))
+    with ExitStack() as stack:
+        if options.scheduler is not None:
+            executor = stack.enter_context(_cluster(options.scheduler))
+        frame = run(task, samples, results, executor, options.workers)
+    return _outcome(frame, len(read.machine.planes), ratios, {"samples": samples, "seed": seed}, words, made)
 
 
-def _task(read: StudyFile, folder: Path, seed: int) -> tuple[Task, list[Path], tuple[str, ...]]:
-    """What the workers get, all files that were read, and what is to be known of them."""
-    from rotorid.study.chunks import Task
-
-    if read.machine is not None:
-        from rotorid.study.drawn_machine import draw_machine, nominal
-
-        ratios = {f"ratio_{k}": "double" for k in range(read.machine.corrections + 1)}
-        columns = {**ratios, "runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
-        coefficients, words = nominal(read.machine)
-        machine = read.machine, coefficients
-        return Task(draw_machine, machine, seed, columns, MACHINES), [*read.files], words
-    from rotorid.commands.calibrate import CalibrateOptions, prepared
-    from rotorid.study.calibration_starts import draw_start
-
-    said = dict(read.calibrate)
-    data = [folder / name for name in said.pop("data")]
-    given = prepared(read.rotor_file, data, CalibrateOptions(**said))
-    labels = [number.label for number in given.numbers]
-    if taken := {"sample", "converged", "chi_square"}.intersection(labels):
-        raise ValueError(f"calibrate.estimate: {taken.pop()!r} is another column of the samples: rename it")
-    columns = {"converged": "bool", "chi_square": "double", **dict.fromkeys(labels, "double")}
-    files = [*read.files, *given.data_files]
-    return Task(draw_start, given, seed, columns, STARTS), files, ()
+def _cluster(address: str) -> Any:  # noqa: ANN401 - of Dask
+    """The executor of a Dask cluster."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ValueError("--scheduler needs Dask: pip install dask[distributed]") from error
+    try:
+        return Client(address, timeout=10).get_executor()  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--scheduler {address}: no cluster answers there ({error})") from error
 
 
-@contextmanager
-def _claimed(folder: Path, study: dict[str, Any]) -> Iterator[None]:
-    """Say in the folder which study it holds; refuse one that holds another, or is being written."""
-    manifest, lock = folder / MANIFEST, folder / LOCK
-    new = manifest.with_suffix(".tmp")
-    told = json.dumps(study, indent=1).encode()
-    folder.mkdir(parents=True, exist_ok=True)
-    if not manifest.exists() and any(file not in (new, lock) for file in folder.iterdir()):
-        raise ValueError(f"{folder}: no study is kept here, but other files: name another folder")
-    with closing(sqlite3.connect(lock, timeout=0, isolation_level=None)) as held:
-        try:
-            held.execute("BEGIN EXCLUSIVE")  # until it is closed, or the process ends
-        except sqlite3.OperationalError as error:
-            busy = error.sqlite_errorcode == sqlite3.SQLITE_BUSY
-            why = "a study is running here: wait for its end" if busy else f"cannot be written ({error})"
-            raise ValueError(f"{folder}: {why}, or name another folder") from error
-        if not manifest.exists():
-            new.write_bytes(told)
-            new.replace(manifest)
-        elif manifest.read_bytes() != told:
-            raise ValueError(
-                f"{folder}: another study is kept here (its file, its rotor, the seed or the version of "
-                "rotorid differs): name another folder"
+def interval(k: int, n: int) -> tuple[float, float]:
+    """Of a probability at 95 % where k of n samples are so, exact (Clopper and Pearson)."""
+    from scipy.special import betaincinv
+
+    low = float(betaincinv(k, n - k + 1, 0.025)) if k else 0.0
+    return low, float(betaincinv(k + 1, n - k, 0.975)) if k < n else 1.0
+
+
+def _outcome(
+    frame: pd.DataFrame,
+    planes: int,
+    ratios: list[str],
+    drawn: dict[str, int],
+    words: tuple[str, ...],
+    made: Mapping[str, Any],
+) -> Outcome:
+    """Probabilities to meet the limit after each correction, and whether regions of weights are honest."""
+    from rotorid.study.drawn_machine import UNSTABLE
+
+    n, most = len(frame), len(ratios) - 1
+    runs = [1, *range(planes + 2, planes + 2 + most)]
+    met = [int((frame["runs_needed"] <= one).sum()) for one in runs]
+    low, high = zip(*(interval(k, n) for k in met), strict=True)
+    shown = "{:.4f}".format
+    table = Table(
+        "corrections",
+        (
+            Column("corrections", range(most + 1)),
+            Column("runs", runs),
+            Column("met", met),
+            Column("probability", [k / n for k in met], shown),
+            Column("low", low, shown),
+            Column("high", high, shown),
+        ),
+    )
+    head = f"The limit is met by {100 * met[0] / n:.4g} % as built"
+    after = f" and {100 * met[-1] / n:.4g} % after at most {counted(most, 'correction')}" if most else ""
+    reasons = Counter(one if one == UNSTABLE else UNDETERMINED for one in frame["why"].dropna())
+    notes = [f"{count} of {n} were not balanced: {why}" for why, count in reasons.items()]
+    coverage = {}
+    for name, said, warned in (("silent", "no warning", False), ("warned", "a warning", True)):
+        held = frame["held"][frame["warned"] == warned]
+        good, count = int((held == True).sum()), len(held)  # noqa: E712 - None where there is no region
+        coverage[name] = {"held": good, "corrections": count}
+        if count:
+            ends = " to ".join(f"{100 * end:.1f}" for end in interval(good, count))
+            notes.append(
+                f"first corrections with {said}: {good} of {count} of the 95 % regions hold the true one "
+                f"({ends} %)"
             )
-        yield
+    return Outcome(
+        result=frame,
+        sentences=(f"{head}{after}, of {counted(n, 'drawn machine')}.",),
+        tables=(table,),
+        file=table,
+        keys={
+            "kind": "balance",
+            **drawn,
+            "warnings": list(words),
+            "probability": met[-1] / n,
+            "interval": list(interval(met[-1], n)),
+            "rows": [dict(zip(table.headings, row, strict=True)) for row in table.rows],
+            "coverage": coverage,
+            "not_balanced": dict(reasons),
+        },
+        pictures={"Largest readings over their limit.": lambda: _figure(frame[ratios])},
+        warnings=words,
+        notes=tuple(notes),
+        title="Study of machines",
+        provenance=made,
+    )
+
+
+def _figure(ratios: pd.DataFrame) -> Figure:
+    """Which share of the machines lies below a ratio to the limit, as built and at last."""
+    from rotorid.base.plot_style import look, on_figure, plain
+
+    curves = {"as built": ratios.iloc[:, 0]}
+    if ratios.shape[1] > 1:
+        curves["after the last correction"] = ratios.ffill(axis=1).iloc[:, -1]
+
+    def draw(ax: Axes) -> None:
+        plain(ax)
+        for k, (name, values) in enumerate(curves.items()):
+            ax.ecdf(values.dropna(), label=name, **look(k))
+        ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
+        ax.set(xscale="log", xlabel="largest reading over its limit", ylabel="share of machines below")
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.legend(frameon=False)
+
+    return on_figure(draw)

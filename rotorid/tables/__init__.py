@@ -13,12 +13,23 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.influence import influence_frame as influence_frame
+    from rotorid.files.influence import read_influence as read_influence
+    from rotorid.files.influence import write_influence as write_influence
+    from rotorid.files.job import Job as Job
+    from rotorid.files.job import job_from_files as job_from_files
+    from rotorid.files.job import read_job as read_job
+    from rotorid.files.measurements import read_measurements as read_measurements
     from rotorid.files.model import HarmonicFile as HarmonicFile
     from rotorid.files.model import read_harmonic_model as read_harmonic_model
     from rotorid.files.model import read_ode_model as read_ode_model
+    from rotorid.files.modes import MeasuredModes as MeasuredModes
+    from rotorid.files.modes import read_compliance as read_compliance
+    from rotorid.files.modes import read_modes as read_modes
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
+    from rotorid.files.records import read_record as read_record
     from rotorid.files.rotor import read_rotor as read_rotor
     from rotorid.files.rotor import rotor_files as rotor_files
     from rotorid.files.rotor_writing import write_rotor as write_rotor
@@ -27,27 +38,16 @@ if TYPE_CHECKING:
     from rotorid.files.table_writing import write_table as write_table
     from rotorid.files.unbalance import read_bow as read_bow
     from rotorid.files.unbalance import read_unbalance as read_unbalance
-    from rotorid.tables.data.measurements import read_measurements as read_measurements
-    from rotorid.tables.data.modes_table import MeasuredModes as MeasuredModes
-    from rotorid.tables.data.modes_table import read_compliance as read_compliance
-    from rotorid.tables.data.modes_table import read_modes as read_modes
-    from rotorid.tables.data.records import read_record as read_record
-    from rotorid.tables.job.job_file import Job as Job
-    from rotorid.tables.job.job_file import job_from_files as job_from_files
-    from rotorid.tables.job.job_file import read_job as read_job
-    from rotorid.tables.runs.influence_table import influence_frame as influence_frame
-    from rotorid.tables.runs.influence_table import read_influence as read_influence
-    from rotorid.tables.runs.influence_table import write_influence as write_influence
 
 _HOME = {
-    "read_measurements": "data.measurements",
-    "MeasuredModes": "data.modes_table",
-    "read_compliance": "data.modes_table",
-    "read_modes": "data.modes_table",
-    "read_record": "data.records",
-    "Job": "job.job_file",
-    "job_from_files": "job.job_file",
-    "read_job": "job.job_file",
+    "read_measurements": ".files.measurements",
+    "MeasuredModes": ".files.modes",
+    "read_compliance": ".files.modes",
+    "read_modes": ".files.modes",
+    "read_record": ".files.records",
+    "Job": ".files.job",
+    "job_from_files": ".files.job",
+    "read_job": ".files.job",
     "HarmonicFile": ".files.model",
     "read_harmonic_model": ".files.model",
     "read_ode_model": ".files.model",
@@ -61,9 +61,9 @@ _HOME = {
     "rotor_files": ".files.rotor",
     "write_rotor": ".files.rotor_writing",
     "read_unbalance": ".files.unbalance",
-    "influence_frame": "runs.influence_table",
-    "read_influence": "runs.influence_table",
-    "write_influence": "runs.influence_table",
+    "influence_frame": ".files.influence",
+    "read_influence": ".files.influence",
+    "write_influence": ".files.influence",
     "Conventions": ".files.conventions",
     "StatedErrors": ".files.conventions",
     "read_trials": ".files.runs",

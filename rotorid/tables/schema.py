@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
+from rotorid.files.job_models import JobSettings
 from rotorid.files.rotor import RotorFile
 from rotorid.files.settings import Settings, settings_schema
-from rotorid.files.settings_keys import Key, file_schema
 from rotorid.files.small_model import SmallModelFile
-from rotorid.tables.job.job_keys import JOB
-from rotorid.tables.study_file import STUDY
-from rotorid.tables.waveforms.waveform_keys import WAVEFORMS
+from rotorid.files.waveforms import WaveformsFile
 
-FILES: dict[str, tuple[str, Sequence[Key] | type[Settings]]] = {
-    "job": ("Job file of rotorid", JOB),
+FILES: dict[str, tuple[str, type[Settings]]] = {
+    "job": ("Job file of rotorid", JobSettings),
     "rotor": ("Rotor file of rotorid", RotorFile),
     "small": ("Small model for motion of rotorid", SmallModelFile),
-    "study": ("Study file of rotorid", STUDY),
-    "waveforms": ("Waveforms file of rotorid", WAVEFORMS),
+    "waveforms": ("Waveforms file of rotorid", WaveformsFile),
 }
 """What the file is, and its keys, by the names that `rotorid schema` takes."""
 
@@ -38,4 +34,4 @@ def schema(kind: str) -> dict[str, Any]:
         For another kind.
     """
     title, keys = FILES[one_of(kind, "schema", list(FILES))]
-    return settings_schema(keys, title) if isinstance(keys, type) else file_schema(keys, title)
+    return settings_schema(keys, title)

@@ -6,12 +6,10 @@ from pathlib import Path
 from cases import each_of
 from keys_in_files import with_tables
 
-from rotorid.files import bearing, rotor, runs, unbalance, weights
+from rotorid.files import bearing, influence, modes, rotor, runs, unbalance, weights
+from rotorid.files import job_excel as jobbook
+from rotorid.files import job_models as jobkeys
 from rotorid.identify.expressions import FUNCTIONS
-from rotorid.tables.data import modes_table as modes
-from rotorid.tables.job import job_from_excel as jobbook
-from rotorid.tables.job import job_keys as jobkeys
-from rotorid.tables.runs import influence_table as influence
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
 WORDS = {

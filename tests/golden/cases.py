@@ -116,7 +116,6 @@ reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120
 study                       study sample_data/study/study.toml --samples 50 --plot study.png
-study-starts                study sample_data/study/starts.toml --samples 8 --output minima.csv
 study-misspelt              study misspelt.toml
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
 influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
@@ -316,8 +315,6 @@ COMMANDS = (
         "trial-weight",
         "split",
         "tolerance",
-        "fleet add",
-        "fleet show",
         "fleet fit",
     ),
     *(
@@ -427,35 +424,24 @@ def _all() -> list[Case]:
         Case(f"fit-{name}", f"fit {FIT}/{name}/model.toml {FIT}/{name}/record.csv", "models")
         for name in RECORDS
     ]
-    stored = "balance sample_data/model_job/runs.csv --influence w.csv --amplitude-error 2 --phase-error 2"
+    stored = "balance sample_data/model_job/runs.csv --influence w.json --amplitude-error 2 --phase-error 2"
     saved = f"balance {TURBO}/job.toml --save-influence w"
     cases += [
-        Case("turbo-stored", stored, "balance", before=(f"{saved}.csv",)),
-        Case(
-            "turbo-stored-xlsx", stored.replace(".csv --a", ".xlsx --a"), "balance", before=(f"{saved}.xlsx",)
-        ),
+        Case("turbo-stored", stored, "balance", before=(f"{saved}.json",)),
+        Case("turbo-stored-xlsx", stored.replace("w.json", "w.xlsx"), "balance", before=(f"{saved}.xlsx",)),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
-    added = "fleet add fans sample_data/fleet"
-    shown = "fleet show fans"
-    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans:fan-132"
+    fitted = "fleet fit sample_data/fleet"
+    before = (f"{fitted} --output fans.parquet",)
+    of_type, typed = "balance sample_data/fleet/fan-132/132-0", "--type fans.parquet:fan-132"
     cases += [
-        Case("fleet-add", "fleet add d sample_data/fleet", "fleet"),
-        Case("fleet-add-known", added, "fleet", before=(added,)),
-        Case("fleet-add-nothing", "fleet add d sample_data/motion", "fleet"),
-        Case("fleet-show", shown, "fleet", before=(added,)),
-        Case("fleet-show-type", f"{shown} --type fan-132 --output t.csv --table", "fleet", before=(added,)),
-        Case("fleet-show-other", f"{shown} --type fan-123", "fleet", before=(added,)),
-        Case("fleet-fit", "fleet fit fans --type fan-132 --plot t.png", "fleet", before=(added,)),
-        Case(
-            "fleet-fit-table",
-            "fleet fit fans --type fan-132 --output t.csv --table",
-            "fleet",
-            before=(added,),
-        ),
-        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=(added,)),
-        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=(added,)),
-        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=(added,)),
+        Case("fleet-nothing", "fleet fit sample_data/motion", "fleet"),
+        Case("fleet-other", f"{fitted} --type fan-123", "fleet"),
+        Case("fleet-fit", f"{fitted} --plot t.png", "fleet"),
+        Case("fleet-fit-table", f"{fitted} --output t.csv --table", "fleet"),
+        Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=before),
+        Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=before),
+        Case("type-foreign", f"{of_type}7/job.toml {typed}", "fleet", before=before),
     ]
     cases += [Case("demo", "demo d", "demos"), Case("demo-json", "demo d --json", "demos")]
     cases += [Case(f"help-{name.replace(' ', '-')}", f"{name} --help", "usage") for name in COMMANDS]
@@ -489,9 +475,7 @@ STORED = (
     "fit-equations",
     "fit-prior",
     "fit-run-down-plot",
-    "fleet-add",
     "fleet-fit",
-    "fleet-show-type",
     "holes-minmax",
     "holes-report",
     "identify-equations",
@@ -527,7 +511,6 @@ STORED = (
     "split-sum",
     "split-two",
     "study",
-    "study-starts",
     "tolerance-positions",
     "trial-weight",
     "trial-weight-model-all",
@@ -559,7 +542,7 @@ REFUSED = (
     "critical-two-into-one",
     "fit-no-output",
     "fit-not-measured",
-    "fleet-add-nothing",
+    "fleet-nothing",
     "identify-misspelt",
     "identify-no-column",
     "study-misspelt",

@@ -192,6 +192,6 @@ def test_every_command_and_every_sample_has_a_case():
         assert sum(text.startswith(f"{command} ") and "--help" not in text for text in words) >= 2, command
         assert any(text.startswith(f"{command} ") for text in stored), command
     for path in sample_data().rglob("*.toml"):
-        if path.name != "expected.toml" and "fleet" not in path.parts:  # `fleet add` has the whole folder
+        if path.name != "expected.toml" and "fleet" not in path.parts:  # `fleet fit` has the whole folder
             assert any(str(path.relative_to(sample_data())) in text for text in words), path
     assert set(EXERCISES) == {path.parent.name for path in (sample_data() / "identify").glob("*/model.toml")}

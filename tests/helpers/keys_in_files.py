@@ -4,21 +4,20 @@ import re
 import typing
 from pathlib import Path
 
-from rotorid.files import bearing, forces, model, rotor, small_model
+from rotorid.files import bearing, forces, job_models, model, rotor, small_model, waveforms
 from rotorid.files.settings import Settings
-from rotorid.tables import study_file
-from rotorid.tables.job import job_keys
-from rotorid.tables.waveforms import waveform_keys
+from rotorid.study import study_file
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
-    "key": job_keys.JOB,
-    "key of [errors]": job_keys.ERRORS,
-    "key of [key_phasor]": job_keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
-    "key of [columns]": job_keys.COLUMNS,
-    "key of [planes.NAME]": job_keys.PLANE,
-    "key of [sensors.NAME]": job_keys.SENSOR,
+    "key": job_models.JobSettings,
+    "key of [errors]": job_models.Errors,
+    "key of [key_phasor]": job_models.KeyPhasor,
+    "key of [slow_roll.SENSOR]": job_models.Vector,
+    "key of [columns]": job_models.Columns,
+    "key of [planes.NAME]": job_models.Plane,
+    "key of [sensors.NAME]": job_models.Sensor,
+    "key of [sheet]": job_models.Sheet,
     "key of a model file": model.ModelFile,
     "key of [nuisance]": model.Nuisance,
     "key of [errors] of a model file": model.AmplitudeErrorKeys,
@@ -34,14 +33,13 @@ TABLES = {
     "key of a small model": small_model.SmallModelFile,
     "key of [[unbalance]]": small_model.UnbalanceKeys,
     "key of [[bow]]": small_model.BowKeys,
-    "key of a waveforms file": waveform_keys.WAVEFORMS,
-    "key of [channels.NAME]": waveform_keys.CHANNEL,
-    "key of a study file": study_file.STUDY,
-    "key of [planes.NAME] of a study": study_file.PLANE,
-    "key of [sensors.NAME] of a study": study_file.SENSOR,
-    "key of [unbalance.STATION]": study_file.UNBALANCE,
-    "key of [readings]": study_file.READINGS,
-    "key of [calibrate]": study_file.CALIBRATE,
+    "key of a waveforms file": waveforms.WaveformsFile,
+    "key of [channels.NAME]": waveforms.ChannelKeys,
+    "key of a study file": study_file.StudyKeys,
+    "key of [planes.NAME] of a study": study_file.PlaneKeys,
+    "key of [sensors.NAME] of a study": study_file.SensorKeys,
+    "key of [unbalance.STATION]": study_file.UnbalanceKeys,
+    "key of [readings]": study_file.ReadingKeys,
     **{f"key of [[{kind}]]": keys for kind, keys in forces.KEYS.items()},
 }
 
@@ -49,27 +47,23 @@ TABLES = {
 def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
-    if isinstance(keys, type):
-        return lines + [_line(keys, name, field) for name, field in keys.model_fields.items()]
-    for key in keys:
-        names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
-        words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
-        lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
-    return lines
+    return lines + [_line(keys, name, field) for name, field in keys.model_fields.items()]
 
 
 def _line(settings, name, field):
     """A field of typed settings."""
     inner = [one for one in (field.annotation, *typing.get_args(field.annotation)) if isinstance(one, type)]
     table = any(issubclass(one, Settings) for one in inner)
+    choices = settings.model_json_schema()["properties"].get(field.alias or name, {})
     several = typing.get_origin(field.annotation) is list
-    key = settings.keys()[field.alias or name]
+    key = settings.known_keys()[field.alias or name]
     header = "[[{}]]" if table and several else "[{}]" if table or dict in inner else "{}"
     if typing.get_origin(field.annotation) is dict:
-        header = "[{}]"
+        may_be_text = any(hasattr(mark, "func") for mark in field.metadata)
+        header = "[{}.NAME]" if table else "{}" if may_be_text else "[{}]"
     names = ", ".join(f"`{header.format(one)}`" for one in key.names)
-    literal = typing.get_origin(field.annotation) is typing.Literal
-    words = [f'"{word}"' for word in typing.get_args(field.annotation) if literal] or field.examples or []
+    enums = [one.get("enum", ()) for one in (choices, *choices.get("anyOf", ()))]
+    words = [f'"{word}"' for words in enums for word in words] or field.examples or []
     return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words)} |"
 
 

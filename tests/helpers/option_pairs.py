@@ -12,7 +12,7 @@ from rotorid.cli import app
 
 
 def options_of_commands():
-    """Long names of the options of each command, by its name; of those of `fleet` as `fleet add`."""
+    """Long names of the options of each command, by its name; of those of `fleet` as `fleet fit`."""
 
     def commands(group, prefix=""):
         for name, command in group.commands.items():

@@ -9,10 +9,9 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, problems, toml_file
+from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, instruments, problems, toml_file
+from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import expressions
-from rotorid.tables.job.job_keys import MOST_HOLES
-from rotorid.tables.waveforms import array_files
 from rotorid.worksheet import app, server
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -44,7 +43,7 @@ MB = 10**6
             "numbers in files, in size",
             f"from {decimal_numbers.SMALLEST:g} to {decimal_numbers.LARGEST:g}, or 0".replace("+", ""),
         ),
-        ("arrays of waveforms (`.npz`, `.mat`)", f"{array_files.LARGEST // 10**9} GB"),
+        ("arrays of waveforms (`.npz`, `.mat`)", f"{instruments.LARGEST // 10**9} GB"),
         ("a request to the worksheet", f"{app._LARGEST // MB} MB"),
     ],
 )

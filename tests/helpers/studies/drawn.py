@@ -4,7 +4,7 @@ import os
 import signal
 from pathlib import Path
 
-from rotorid.study.chunks import Task
+from rotorid.study.results import Task
 
 ROTOR = """element,length_m,diameter_m,support_stiffness_N_per_m,mass_kg
 1,0.2,0.04,1e7,0
@@ -41,11 +41,6 @@ def write(folder, text=STUDY):
     return folder / "study.toml"
 
 
-def kept(folder):
-    """What the parts of a study hold, by their names."""
-    return {file.name: file.read_bytes() for file in sorted(Path(folder).glob("part-*"))}
-
-
 def number(data, rng):
     """A normal number."""
     return {"x": float(rng.standard_normal())}
@@ -71,6 +66,6 @@ def fatal(data, rng):
     return row
 
 
-def task(sample=number, data=None, chunk=2):
+def task(sample=number, data=None):
     """Of one number a sample."""
-    return Task(sample, data, 7, {"x": "double"}, chunk)
+    return Task(sample, data, 7, {"x": "double"}, "numbers")

@@ -73,7 +73,6 @@ def test_every_example_runs_as_typed(cli, checkout, name, line):
     assert words[: 1 + len(name.split())] == ["rotorid", *name.split()]
     if name.startswith("fleet"):
         pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
-        cli("fleet", "add", "fans", "sample_data/fleet")
     if name == "worksheet":
         return  # its own tests run it
     if line in STORED_LINES and not FULL:

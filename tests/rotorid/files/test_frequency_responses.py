@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotorid.files.measurements import read_amplitudes
 from rotorid.tables import InputError
-from rotorid.tables.data.measurements import read_amplitudes
 
 pyuff = pytest.importorskip("pyuff")
 HERTZ = np.linspace(0.0, 40.0, 401)
@@ -56,7 +56,7 @@ def write(path, responses, **changed):
 def test_responses_become_displacements_by_one_newton(tmp_path, order, scale, changed):
     omega = 2 * np.pi * HERTZ
     path = write(tmp_path / "f.uff", receptances() * (1j * omega[:, None]) ** order * scale, **changed)
-    data = read_amplitudes(path, None)
+    data = read_amplitudes(path)
     np.testing.assert_allclose(data.frequencies, omega[1:], rtol=1e-6)
     assert set(data.signals) == {"point 1", "point 2", "F"}
     found = np.stack([data.signals["point 1"], data.signals["point 2"]], axis=1)
@@ -86,7 +86,7 @@ def test_modes_of_a_file_are_those_of_the_masses(tmp_path, cli):
 def test_what_is_no_response_is_refused(tmp_path, changed, words):
     path = write(tmp_path / "f.uff", receptances(), **changed)
     with pytest.raises(InputError) as caught:
-        read_amplitudes(path, None)
+        read_amplitudes(path)
     assert words in str(caught.value)
 
 
@@ -94,4 +94,4 @@ def test_responses_to_two_forces_are_refused(tmp_path):
     path = write(tmp_path / "f.uff", receptances())
     write(path, receptances(0), ref_node=1)
     with pytest.raises(InputError, match="responses to one force"):
-        read_amplitudes(path, None)
+        read_amplitudes(path)

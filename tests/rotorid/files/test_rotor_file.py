@@ -132,7 +132,7 @@ BAD_BEARINGS = [
     (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "", None, "or both cxx_N_s_per_m and cyy_N_s_per_m"),
     (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx_N_per_m", "10000000.0", "kxx says it already"),
     ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "the stiffness of the pedestal"),
-    ((SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"), "pedestal_stiffness_N_per_m", None, "[x, y]"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"), "pedestal_stiffness_N_per_m", "[1, 2, 3]", "[x, y]"),
     ((SCALAR, "pedestal_stiffness_N_per_m = [1, nan]"), "pedestal_stiffness_N_per_m", "nan", "finite"),
     ((SCALAR, "pedestal_stiffness_N_per_m = 0"), "", None, "leave out a rigid pedestal"),
     ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),

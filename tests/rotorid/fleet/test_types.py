@@ -9,8 +9,8 @@ import pytest
 from balancing import UndeterminedError
 from rotorid.commands import balance
 from rotorid.commands.balance import BalanceOptions
-from rotorid.fleet.adding import FleetAddOptions, fleet_add
-from rotorid.fleet.fitting import FleetFitOptions, fleet_fit
+from rotorid.fleet import FleetFitOptions, fleet_fit
+from rotorid.fleet.jobs import read_fleet
 from rotorid.fleet.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
@@ -70,27 +70,33 @@ class Machine:
         path.write_text("\n".join(lines) + "\n")
 
 
+def fit(tree, file, machine_type=None):
+    """The outcome of a fit, and the table of the fleet in a file."""
+    outcome = fleet_fit(tree, FleetFitOptions(machine_type))
+    file.write_bytes(outcome.written(file))
+    return outcome
+
+
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
-    """A store of 25 machines, five of them balanced three times."""
+    """A table of 25 machines, five of them balanced three times."""
     folder, rng = tmp_path_factory.mktemp("types"), np.random.default_rng(11)
     machines = [Machine(rng) for _ in range(25)]
     for k, machine in enumerate(machines):
         for day in range(3 if k < 5 else 1):
             machine.job(folder / "tree" / "fan" / f"F{k}" / f"2026-01-0{day + 1}", within=0.03)
-    added = fleet_add(folder / "store", [folder / "tree"])
-    assert (added.result.jobs, added.result.damaged) == (35, {})
+    assert fit(folder / "tree", folder / "fans.parquet").to_dict()["types"] == {"fan": 35}
     return folder, machines
 
 
 def address(fleet):
-    return f"{fleet[0] / 'store'}:fan"
+    return f"{fleet[0] / 'fans.parquet'}:fan"
 
 
 def test_a_fit_gives_back_what_was_drawn(fleet):
-    found = fleet_fit(fleet[0] / "store", FleetFitOptions("fan"))
+    found = fleet_fit(fleet[0] / "tree")
     table = found.to_frame()
-    assert len(found.result.known.kind.machines) == 25
+    assert len(found.result.kind.machines) == 25
     mean = Machine.MEAN.ravel()
     W = table["influence"] * np.exp(1j * np.radians(table["phase_deg"]))
     assert np.abs(W.to_numpy() / mean - 1).max() < 0.12  # 0.1/√25 and 10°/√25, four deviations
@@ -151,9 +157,9 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
 
 def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(fleet, tmp_path):
     machine = Machine(np.random.default_rng(28))
-    own = machine.job(tmp_path / "tree" / "fan" / "N").parent
-    store = shutil.copytree(fleet[0] / "store", tmp_path / "store")
-    assert fleet_add(store, [tmp_path / "tree"]).result.jobs == 1
+    shutil.copytree(fleet[0] / "tree", tmp_path / "tree")
+    own, store = machine.job(tmp_path / "tree" / "fan" / "N").parent, tmp_path / "fans.parquet"
+    fit(tmp_path / "tree", store)
     runs = own / "runs.csv"
     runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
     assert type_coefficients(read_job(own / "job.toml"), f"{store}:fan").earlier == 0
@@ -161,20 +167,17 @@ def test_a_job_that_changed_since_it_was_added_does_not_count_as_an_earlier_one(
     assert type_coefficients(read_job(new), f"{store}:fan").earlier == 1
 
 
-def test_copies_count_once_and_names_at_several_places_are_told(tmp_path):
+def test_copies_count_once(tmp_path):
     rng = np.random.default_rng(29)
-    for customer, name in (("a", "P1"), ("b", "P1"), ("a", "P2"), ("a 2025", "P3"), ("a 2026", "P3")):
-        Machine(rng).job(tmp_path / "tree" / customer / name / "2026-02-03")
+    for name in ("P1", "P2", "P3"):
+        Machine(rng).job(tmp_path / "tree" / "a" / name / "2026-02-03")
     for k, name in enumerate(("copy of P2", "digits of P2")):
         copy = shutil.copytree(tmp_path / "tree" / "a" / "P2", tmp_path / "tree" / "a" / name)
         job = copy / "2026-02-03" / "job.toml"
         job.write_text(job.read_text() + f"floor = 0.0{k + 1}\n")
-    fleet_add(tmp_path / "F", [tmp_path / "tree"], FleetAddOptions("fan"))
-    known = fleet_fit(tmp_path / "F", FleetFitOptions("fan")).result.known
+    known = fit(tmp_path / "tree", tmp_path / "f.parquet").result
     assert set(known.kind.machines) == {"P1", "P2", "P3"}
     assert known.notes[0] == "2 jobs with the same coefficients as another left out"
-    assert known.notes[1].startswith("'P1' counts as one machine: a/P1/2026-02-03 and b/P1/2026-02-03; if")
-    assert "P3" not in " ".join(known.notes)
 
 
 def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
@@ -211,29 +214,28 @@ def test_masses_at_other_radii_are_converted(tmp_path):
         machine.W, machine.D = machine.W * radius / 100, machine.D * 100 / radius
         more = f"[planes.L]\nradius_mm = {radius}\n[planes.R]\nradius_mm = {radius}\n"
         machine.job(tmp_path / "tree" / "fan" / f"F{k}", more=more if k < 6 else "")
-    fleet_add(tmp_path / "F", [tmp_path / "tree"])
-    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
+    found = fit(tmp_path / "tree", tmp_path / "f.parquet")
     assert np.sqrt((found.to_frame()["between_percent"] ** 2).mean()) < 5
     new = Machine(rng, 0.02, 2.0)
     new.W = 2 * new.W
     more = "[planes.L]\nradius_mm = 200\n[planes.R]\nradius_mm = 200\n"
     job = read_job(new.job(tmp_path / "new", runs=1, more=more))
-    found = type_coefficients(job, f"{tmp_path / 'F'}:fan")
+    found = type_coefficients(job, f"{tmp_path / 'f.parquet'}:fan")
     assert len(found.known.kind.machines) == 8
     W = found.influence.W[0] * 1e3  # µm pp per g
     assert np.abs(W / (2 * Machine.MEAN * 0.5) - 1).max() < 0.1
 
 
 def test_what_is_wrong_is_told(fleet, tmp_path):
-    machine, store = Machine(np.random.default_rng(27)), fleet[0] / "store"
+    machine, store = Machine(np.random.default_rng(27)), fleet[0] / "fans.parquet"
     job = machine.job(tmp_path / "new", runs=1)
 
     def refused(text, error=ValueError, job=job, **options):
         with pytest.raises(error, match=text):
             balance(job, BalanceOptions(**options))
 
-    refused("expected the folder of a fleet and a type, FLEET:TYPE", machine_type="fan")
-    refused("there is no such fleet", machine_type=f"{tmp_path / 'none'}:fan")
+    refused("expected the table of a fleet and a type, FLEET.parquet:TYPE", machine_type="fan")
+    refused("a table of a fleet .No such file", machine_type=f"{tmp_path / 'none'}:fan")
     refused("there is no type 'fun'.*did you mean 'fan'", machine_type=f"{store}:fun")
     refused("leave --coefficients and --influence away", machine_type=address(fleet), coefficients="measured")
     refused("no check runs to refine with", machine_type=address(fleet), refine=True)
@@ -241,8 +243,8 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
     table = pd.read_csv(other.parent / "runs.csv")
     for changed, said in (
         (table.assign(speed_rpm=2000), "no job of fan has .* of all these speeds"),
-        (table.assign(sensor=["S1", "S9"]), "it has no sensor S9, but S1 and S2"),
-        (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "no quantity velocity, but"),
+        (table.assign(sensor=["S1", "S9"]), "there are sensor S1 and S2, plane L and R"),
+        (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "quantity displacement"),
     ):
         changed.to_csv(other.parent / "runs.csv", index=False)
         refused(said, UndeterminedError, other, machine_type=address(fleet))
@@ -252,8 +254,7 @@ def test_what_is_wrong_is_told(fleet, tmp_path):
 
 
 def test_the_sample_has_one_odd_machine_which_lags(tmp_path):
-    fleet_add(tmp_path / "fans", [sample_data() / "fleet"])
-    found = fleet_fit(tmp_path / "fans", FleetFitOptions("fan-132"))
+    found = fit(sample_data() / "fleet", tmp_path / "fans.parquet")
     assert [(one["machine"], one["reason"]) for one in found.to_dict()["odd"]] == [
         ("132-07", "its phases were of the other sense (lag for lead)")
     ]
@@ -266,7 +267,43 @@ def test_unbalances_at_other_radii_are_the_same(tmp_path):
         job = Machine(rng, 0.02, 2.0).job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
         weights = job.parent / "weights.csv"
         weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
-    fleet_add(tmp_path / "F", [tmp_path / "tree"])
-    found = fleet_fit(tmp_path / "F", FleetFitOptions("fan"))
-    assert found.result.known.labels.weight_unit == "g_mm"
+    found = fleet_fit(tmp_path / "tree")
+    assert found.result.labels.weight_unit == "g_mm"
     assert found.to_frame()["between_percent"].max() < 5
+
+
+def test_a_tree_holds_other_files_too(tmp_path):
+    rng, fans = np.random.default_rng(41), tmp_path / "tree" / "fan"
+    for k in range(4):
+        Machine(rng).job(fans / f"F{k}")
+    (fans / "F0" / "job.toml").write_text('machine = "7"\n' + (fans / "F0" / "job.toml").read_text())
+    Machine(rng).job(fans / "F4", runs=1)
+    shutil.copy(next(sample_data().rglob("rotor*.toml")), fans)
+    (fans / "broken.toml").write_text("a = ")
+    (fans / "broken.xlsx").write_bytes(b"PK")
+    Machine(rng).job(fans / "F5").write_text('runs = "none.csv"\nweights = "weights.csv"\n')
+    Machine(rng).job(fans / ".F6")
+    found = fit(tmp_path / "tree", tmp_path / "f.parquet").to_dict()
+    assert found["machines"] == ["7", "F1", "F2", "F3"]
+    assert set(found["damaged"]) == {"fan/broken.toml", "fan/broken.xlsx", "fan/F5/job.toml"}
+    assert "none.csv" in found["damaged"]["fan/F5/job.toml"]
+    assert found["undetermined"] == ["fan/F4/job.toml"]
+    table = read_fleet(tmp_path / "f.parquet")
+    assert (
+        set(table["job"]) == {f"fan/F{k}/job.toml" for k in range(5)} - {"fan/F4/job.toml"} or len(table) > 16
+    )
+    with pytest.raises(ValueError, match="no balancing job in it has a type"):
+        fleet_fit(sample_data() / "motion")
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_assumed_errors_do_not_lower_the_scatter_between_machines(tmp_path, stated):
+    rng = np.random.default_rng(43)
+    for k in range(12):
+        job = Machine(rng, 0.02, 1.0).job(tmp_path / "tree" / "fan" / f"F{k}")
+        text = job.read_text()
+        job.write_text(text if stated else text[: text.index("[errors]")])
+    found = fit(tmp_path / "tree", tmp_path / "f.parquet")
+    assert (read_fleet(tmp_path / "f.parquet")["var_re"] > 0).all() == stated
+    between = np.sqrt((found.to_frame()["between_percent"] ** 2).mean())
+    assert between > (0 if stated else 1.5)

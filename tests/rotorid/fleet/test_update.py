@@ -63,6 +63,21 @@ def test_a_bare_run_leaves_the_coefficients_and_is_the_baseline():
     assert found.channels()[..., 2:, 2:] == pytest.approx(known.channels()[..., 2:, 2:])
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_the_unit_of_readings_does_not_matter(size):
+    """Errors of 5e-11 m once left no variance of the coefficients: pinv cut it off."""
+    known, rng = prior(S=2, C=3, P=2), np.random.default_rng(2)
+    trials = of_runs(known, known.W, np.array([1.0, 2.0]), [[0.0, 0.0], [0.5, 0.2j]], rng)
+    small = replace(known, W=known.W * size)
+    small = with_parameters(small, known.columns()[..., 1:] * size, 0.0)
+    less = replace(trials, readings=trials.readings * size, errors=ReadingErrors(floor=0.05 * size))
+    found, chance = update(small, less)
+    reference, as_before = update(known, trials)
+    assert found.W / size == pytest.approx(reference.W, rel=1e-9)
+    assert found.channels() / size**2 == pytest.approx(reference.channels(), rel=1e-6, abs=1e-9)
+    assert chance == pytest.approx(as_before, rel=1e-6)
+
+
 def test_without_knowledge_it_is_the_measurement():
     known, rng = prior(std=1e4, S=2, C=3, P=2), np.random.default_rng(3)
     T = [[0, 0], [0.5, 0], [0, 0.7j], [0.3, 0.2]]

@@ -8,11 +8,11 @@ from scipy.linalg import eigh
 from balancing import Labels
 from rotorid.base.tables import csv
 from rotorid.commands import ModesOptions, modes
+from rotorid.files.modes import read_modes
 from rotorid.identify.answers import SteadyAnswers
 from rotorid.identify.modes import fit_modes
 from rotorid.identify.modes_result import Readings
 from rotorid.samples import sample_data
-from rotorid.tables.data.modes_table import read_modes
 
 M = np.diag([20.0, 20.0, 10.0])
 K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])

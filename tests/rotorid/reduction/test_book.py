@@ -6,8 +6,8 @@ from book.rotor import as_printed
 
 import fem
 from rotorid import InputError, read_rotor
+from rotorid.files.modes import read_compliance, read_modes
 from rotorid.samples import sample_data
-from rotorid.tables.data.modes_table import read_compliance, read_modes
 
 NODES = (7, 12, 18)
 

@@ -1,0 +1,247 @@
+"""Study files (.toml): what is drawn of a machine, what it is read with, and the limit that it is to meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from balancing import ReadingErrors
+from fem import Sensor
+from fem.parameters import expand, numbers_of, parameter_value
+from rotorid.files import units
+from rotorid.files.problems import InputError, Problems
+from rotorid.files.rotor import read_rotor, rotor_files
+from rotorid.files.settings import (
+    NotNegative,
+    Positive,
+    Settings,
+    Text,
+    Turn,
+    Whole,
+    by_name,
+    key,
+    listed,
+    of,
+    read_settings,
+)
+from rotorid.files.toml_file import read_toml
+from rotorid.files.units import Quantity
+
+if TYPE_CHECKING:
+    from fem import Rotor
+    from rotorid.base.arrays import ComplexArray, FloatArray
+
+_SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale" = 20'
+_NODE = "the node, a number from 1, or a station"
+Node = Whole | Text
+Percent = Annotated[NotNegative, Field(le=100)]
+Size = Annotated[Quantity, of(Positive)]
+
+
+class PlaneKeys(Settings):
+    """A correction plane: `[planes.NAME]`."""
+
+    node: Node = key(_NODE)
+    trial: NotNegative = key(
+        "trial unbalance; default: what moves a reading by half of the largest",
+        "trial_g_mm",
+        0.0,
+        units=units.UNBALANCE,
+    )
+
+
+class SensorKeys(Settings):
+    """A sensor with its limit: `[sensors.NAME]`."""
+
+    node: Node = key(_NODE)
+    angle_deg: Turn = key("direction, with the rotation from x", default=0.0)
+    limit: Size = key(
+        "largest amplitude allowed",
+        "limit_um_pp limit_mm_s_rms",
+        units=units.VIBRATION,
+        expected="the limit of the sensor",
+    )
+
+
+class UnbalanceKeys(Settings):
+    """What is drawn at a node: `[unbalance.STATION]`."""
+
+    size: Size = key(
+        "size, drawn by Rayleigh: x and y are normal, any angle is as likely",
+        "rms_g_mm median_g_mm",
+        units=units.UNBALANCE,
+        expected="how large the unbalance is",
+    )
+
+
+class ReadingKeys(Settings):
+    """Errors of readings, one standard deviation: `[readings]`."""
+
+    amplitude_percent: Percent = key("standard deviation of a reading's amplitude", default=0.0)
+    phase_deg: Annotated[NotNegative, Field(le=180)] = key("standard deviation of its phase", default=0.0)
+    floor_percent: Percent = key("besides in each direction, percent of the sensor's limit", default=0.0)
+    run_percent: Percent = key("from run to run; half of its variance common to a run", default=0.0)
+
+
+class StudyKeys(Settings):
+    """A study file."""
+
+    kind: Literal["balance"] = key("what a sample is", default="balance")
+    rotor: Text = key("rotor table or file, relative to this file", expected="the rotor's file")
+    samples: Whole = key("how many, default 1000", default=1000, ge=1, le=10**9)
+    seed: Whole = key("of all that is drawn, default 1", default=1, ge=0, le=2**31)
+    speeds: listed(Positive) = key(  # type: ignore[valid-type]
+        "speeds at which limits hold and runs are made",
+        "speeds_rpm",
+        units=units.SPEED,
+        example="speeds_rpm = [1500, 3000]",
+    )
+    corrections: Whole = key("most corrections, default none", default=0, ge=0, le=20)
+    planes: dict[str, PlaneKeys] = key("correction planes", default={})
+    sensors: dict[str, SensorKeys] = key("sensors with their limits", min_length=1)
+    unbalance: dict[str, UnbalanceKeys] = key("drawn unbalance, by node or station", min_length=1)
+    scatter: by_name(NotNegative) = key(  # type: ignore[valid-type]
+        f"log-normal, {_SCATTER}", default={}, example='"bearing[*].stiffness.scale" = 20'
+    )
+    readings: ReadingKeys = key("errors of readings, which are stated, too", default=ReadingKeys())
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Corrections without planes, a speed twice."""
+        if self.corrections and not self.planes:
+            yield "planes", "the planes of the corrections; corrections = 0: as built only"
+        if len({*self.speeds}) < len(self.speeds):
+            yield "speeds", "each speed once"
+
+
+@dataclass(frozen=True, eq=False)
+class MachineStudy:
+    """What is drawn of a machine, in SI; readings are in shares of their limits.
+
+    Attributes
+    ----------
+    rotor, speeds
+        As built, and rad/s, (S,).
+    planes, sensors
+        Nodes and places by name.
+    trials
+        Unbalance of each plane's trial run, kg·m, (P,); 0: by the rule.
+    gains
+        Shares of the limits per metre of deflection, (S, C).
+    unbalance
+        Standard deviation of x and y by node, kg·m.
+    scatter
+        Numbers of the rotor by path, and standard deviations of their logarithms.
+    errors, run_error, corrections
+        Of readings, None where they have none; from run to run, relative; at most so many.
+    """
+
+    rotor: Rotor
+    speeds: FloatArray
+    planes: Mapping[str, int]
+    sensors: Mapping[str, Sensor]
+    trials: FloatArray
+    gains: ComplexArray
+    unbalance: Mapping[int, float]
+    scatter: Mapping[str, tuple[float, float]]
+    errors: ReadingErrors | None
+    run_error: float
+    corrections: int
+
+
+@dataclass(frozen=True, eq=False)
+class StudyFile:
+    """A study as it is read."""
+
+    samples: int
+    seed: int
+    files: tuple[Path, ...]
+    machine: MachineStudy
+
+
+def read_study(path: str | Path) -> StudyFile:
+    """Read a study file with its rotor.
+
+    Raises
+    ------
+    InputError
+        With all problems of both.
+    """
+    path, problems = Path(path), Problems()
+    data = problems.need(read_toml(path, problems))
+    values = problems.need(read_settings(StudyKeys, data, str(path), problems))
+    file = path.parent / getattr(values, "rotor", "")
+    try:
+        rotor = read_rotor(file) if values.has("rotor") else None
+    except InputError as error:
+        problems.extend(error.problems)
+    problems.stop()
+    machine = _machine(values, problems.need(rotor), problems)
+    problems.stop()
+    return StudyFile(values.samples, values.seed, (path, *rotor_files(file)), machine)
+
+
+def _machine(values: StudyKeys, rotor: Rotor, problems: Problems) -> MachineStudy:
+    """What is drawn; nodes and numbers that the rotor does not have are noted."""
+    speeds = np.array(values.speeds)
+
+    def node(section: Settings, field: str, place: int | str) -> int:
+        try:
+            return rotor.node(place)
+        except ValueError as error:
+            problems.extend([section.problem(field, f"a node or station of the rotor: {error}")])
+            return 0
+
+    limits = [sensor.limit for sensor in values.sensors.values()]
+    velocity = [limit.unit.kind == "velocity" for limit in limits]
+    unbalance: dict[int, float] = {}
+    for place, drawn in values.unbalance.items():
+        rayleigh = np.sqrt(2 * np.log(2) if drawn.written("size").startswith("median") else 2)
+        at = node(values, "unbalance", place)
+        unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), drawn.size.si / rayleigh))
+    readings = values.readings
+    sizes = (
+        readings.amplitude_percent / 100,
+        float(np.radians(readings.phase_deg)),
+        readings.floor_percent / 100,
+    )
+    return MachineStudy(
+        rotor=rotor,
+        speeds=speeds,
+        planes={name: node(plane, "node", plane.node) for name, plane in values.planes.items()},
+        sensors={
+            name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
+            for name, sensor in values.sensors.items()
+        },
+        trials=np.array([plane.trial for plane in values.planes.values()]),
+        gains=np.where(velocity, 1j * speeds[:, None], 1.0) / np.array([limit.si for limit in limits]),
+        unbalance=unbalance,
+        scatter=_scatter(values, rotor, problems),
+        errors=ReadingErrors(*sizes) if any(sizes) else None,
+        run_error=readings.run_percent / 100,
+        corrections=values.corrections,
+    )
+
+
+def _scatter(values: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tuple[float, float]]:
+    """Numbers of the rotor by path, each once, with the standard deviation of its logarithm."""
+    scatter: dict[str, tuple[float, float]] = {}
+    taken: set[object] = set()
+    for pattern, share in values.scatter.items():
+        try:
+            paths = expand(rotor, pattern)
+            for path in paths:
+                numbers = numbers_of(rotor, path)
+                if not numbers or numbers & taken:
+                    raise ValueError(f"{pattern}: each number of the rotor once")
+                scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
+                taken |= numbers
+            if not any(scatter[path][0] for path in paths):
+                raise ValueError(f"{pattern} is 0, and so is any share of it")
+        except ValueError as error:
+            problems.extend([values.problem("scatter", f"numbers of the rotor: {error}")])
+    return scatter

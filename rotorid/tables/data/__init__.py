@@ -1,1 +1,0 @@
-"""What was measured: harmonic tests, records, natural frequencies with shapes, compliances."""

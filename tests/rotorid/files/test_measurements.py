@@ -1,0 +1,273 @@
+"""Measurement tables and model files for identification: what they mean, and every complaint."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rotorid import InputError, read_harmonic_model, read_measurements
+from rotorid.identify.equations import harmonic_model
+from rotorid.tables import TableWarning
+
+MODEL = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+TWO = harmonic_model(
+    ["(m*p**2 + c)*X - k*Y = F", "(m*p**2 + c)*Y - k*X = 0"], known={"m": 1.0}, estimate=["c", "k"]
+)
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text, model=MODEL, name="data.csv"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return read_measurements(path, model)
+
+    return write
+
+
+@pytest.fixture
+def model_file(tmp_path):
+    def write(text):
+        path = tmp_path / "harmonic.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_harmonic_model(path)
+
+    return write
+
+
+def test_real_and_imaginary_parts_and_amplitude_with_phase_are_the_same(table):
+    a = table("frequency_rad_s,F_re,X_re,X_im\n10,10,0,-0.1\n20,10,-3,4\n")
+    degrees = math.degrees(math.atan2(4, -3))
+    b = table(f"frequency_rad_s,F_amplitude,F_phase_deg,X_amplitude,X_phase_deg\n10,10,0,0.1,-90\n20,10,0,5,{degrees!r}\n")  # fmt: skip  # noqa: E501
+    np.testing.assert_allclose(a.signals["X"], [-0.1j, -3 + 4j])
+    np.testing.assert_allclose(b.signals["X"], a.signals["X"], rtol=1e-14, atol=0)
+    np.testing.assert_array_equal(a.signals["F"], [10, 10])
+    assert a.names == ("1", "2")
+    assert not a.free.any()
+    assert a.errors is None
+
+
+def test_a_positive_phase_leads(table):
+    z = table("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,90\n").signals["X"]
+    assert z[0] == 2j
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "omega"),
+    [("frequency_rad_s", "5", 5.0), ("frequency_Hz", "5", 10 * math.pi), ("speed_rpm", "60", 2 * math.pi)],
+)
+def test_units_of_frequency(table, column, value, omega):
+    assert table(f"{column},F_re,X_re,X_im\n{value},1,1,1\n").frequencies == pytest.approx([omega], rel=1e-15)
+
+
+def test_amplitudes_may_have_a_unit_of_vibration(table):
+    z = table("frequency_Hz,F_re,X_amplitude_um_pp,X_phase_deg\n5,1,30,0\n").signals["X"]
+    assert z == pytest.approx([15e-6])
+
+
+def test_excel_with_decimal_commas(table):
+    rows = table("sep=;\nexperiment;frequency_rad_s;F_re;X_re;X_im;note\nA;10;10;0;-0,1;x\n")
+    assert rows.signals["X"] == pytest.approx([-0.1j])
+    assert rows.names == ("A",)
+
+
+def test_blank_amplitudes_were_not_measured(table):
+    rows = table("frequency_rad_s,F_re,X_amplitude,X_phase_deg,Y_re,Y_im\n1,1,,,2,3\n2,1,0,,,\n", TWO)
+    np.testing.assert_array_equal(np.isnan(rows.signals["X"]), [True, False])
+    np.testing.assert_array_equal(np.isnan(rows.signals["Y"]), [False, True])
+    assert rows.signals["X"][1] == 0
+
+
+@pytest.mark.parametrize(
+    "text", ["frequency_rad_s,X_re,Y_re\n1,1,2\n", "frequency_rad_s,F_re,X_re,Y_re\n1,0,1,2\n"]
+)
+def test_without_a_force_it_is_a_free_vibration(table, text):
+    rows = table(text, TWO)
+    assert rows.free.all()
+    np.testing.assert_array_equal(rows.signals["F"], [0])
+
+
+def test_a_model_with_its_own_excitation_is_never_free(table):
+    rotor = harmonic_model(["(m*p**2 + c)*Z = -U*p**2"], known={"m": 1.0, "U": 2.0}, estimate=["c"])
+    assert not table("speed_rpm,Z_re\n60,1\n", rotor).free.any()
+
+
+def test_an_absent_output_is_named(table):
+    with pytest.warns(TableWarning, match="no Y"):
+        rows = table("frequency_rad_s,F_re,X_re,X_im\n1,1,2,3\n", TWO)
+    assert np.isnan(rows.signals["Y"]).all()
+
+
+HEAD = "frequency_rad_s,F_re,X_re,X_im\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("frequency_rad_s,F_re,X_re,X_imag\n1,1,2,3\n", ["X_imag", "did you mean 'X_im'"]),
+        ("frequency_rad_s,F_re,Z_re,X_re\n1,1,2,3\n", ["Z_re", "did you mean"]),
+        ("frequency_rad_s,F_re\n1,1\n", ["measured amplitudes", "X_amplitude and X_phase_deg, or X_re"]),
+        ("F_re,X_re,X_im\n1,2,3\n", ["one column frequency_rad_s, frequency_Hz or speed_rpm"]),
+        ("frequency_Hz,speed_rpm,F_re,X_re\n1,60,2,3\n", ["speed_rpm", "one column frequency"]),
+        (HEAD + "1,1,x,3\n", ["row 2", "X_re", "'x'"]),
+        (HEAD + "1,1,2,\n", ["row 2", "X_im", "0 for a real amplitude"]),
+        (HEAD + "1,1,,3\n", ["row 2", "X_re", "not measured"]),
+        (HEAD + "-1,1,2,3\n", ["frequency_rad_s", "0 or more"]),
+        (HEAD + "1,0,2,3\n", ["row 2", "X_im", "nothing excites"]),
+        ("frequency_rad_s,X_re,X_im\n1,2,3\n", ["F_re", "nothing excites"]),
+        (HEAD + "1,1,,\n", ["in at least one row"]),
+        ("frequency_rad_s,F_re,X_amplitude\n1,1,2\n", ["X_phase_deg"]),
+        ("frequency_rad_s,F_re,X_phase_deg\n1,1,2\n", ["X_amplitude"]),
+        ("frequency_rad_s,F_re,X_im\n1,1,2\n", ["X_re"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg,X_re\n1,1,2,3,4\n", ["not some of both"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,-2,3\n", ["0 or more"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,400\n", ["-360 to 360"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as its amplitude is given"]),
+        ("frequency_rad_s,F_re,X_re_furlong\n1,1,2\n", ["no unit"]),
+        ("experiment,frequency_rad_s,F_re,X_re,X_im\na,1,1,2,3\na,2,1,2,3\n", ["row 3", "repeat"]),
+        ("repeat,frequency_rad_s,F_re,X_re,X_im\n1,1,1,2,3\n1,1,1,2,3\n", ["row 3", "another repeat"]),
+        (
+            "experiment,repeat,frequency_rad_s,F_re,X_re,X_im\na,1,1,1,2,3\na,2,2,1,2,3\na,3,1,4,2,3\n",
+            ["row 3", "row 4", "the frequency and the excitation of row 2"],
+        ),
+        ("", ["empty"]),
+    ],
+)
+def test_complaints_name_file_row_and_column(table, text, messages):
+    with pytest.raises(InputError) as caught:
+        table(text)
+    for message in ("data.csv", *messages):
+        assert message in str(caught.value)
+
+
+def test_repeats_become_their_mean_and_tell_the_errors(table):
+    rng = np.random.default_rng(4)
+    truth = {1.0: 3 - 4j, 2.0: 0.02 + 0.01j}
+    lines = ["frequency_rad_s,repeat,F_re,X_re,X_im"]
+    readings = {w: [] for w in truth}
+    for k in range(200):
+        for w, z in truth.items():
+            noisy = z * (1 + 0.02 * rng.standard_normal() + 0.01j * rng.standard_normal())
+            readings[w].append(noisy)
+            lines.append(f"{w},{k},1,{noisy.real!r},{noisy.imag!r}")
+    rows = table("\n".join(lines) + "\n")
+    assert len(rows) == 2
+    np.testing.assert_allclose(
+        rows.signals["X"], [np.mean(readings[1.0]), np.mean(readings[2.0])], rtol=1e-12
+    )
+    for i, w in enumerate(truth):
+        unit = rows.signals["X"][i] / abs(rows.signals["X"][i])
+        turn = np.array([[unit.real, unit.imag], [-unit.imag, unit.real]])
+        own = turn @ rows.covariances["X"][i] @ turn.T / abs(truth[w]) ** 2
+        np.testing.assert_allclose(np.sqrt(np.diag(own) * 200), [0.02, 0.01], rtol=0.09)
+        assert abs(own[0, 1]) < 1e-12
+
+
+def test_few_repeats_are_named(table):
+    with pytest.warns(TableWarning, match="1 repeated reading only"):
+        rows = table("frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,3\n1,b,1,2.1,3\n2,a,1,2,3\n")
+    assert (rows.covariances["X"][:, 0, 0] > 0).all()
+
+
+def test_stated_errors_hold_for_one_reading_and_means_are_better(tmp_path, model_file):
+    file = model_file(SMALL + "[errors]\namplitude_percent = 2\nphase_deg = 1\n")
+    path = tmp_path / "data.csv"
+    path.write_text(
+        "frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,0\n1,b,1,4,0\n2,a,1,5,0\n", encoding="utf-8"
+    )
+    rows = read_measurements(path, file)
+    covariance = rows.covariance("X")
+    np.testing.assert_allclose(covariance[0], np.diag([0.06**2, (3 * math.radians(1)) ** 2]) / 2, atol=1e-18)
+    np.testing.assert_allclose(covariance[1], np.diag([0.1**2, (5 * math.radians(1)) ** 2]), atol=1e-18)
+
+
+def test_without_names_other_forces_are_other_experiments(table):
+    rows = table("frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,3\n1,a,2,4,6\n1,b,2,4,6\n")
+    assert len(rows) == 2
+
+
+SMALL = 'equations = ["(m*p**2 + b*p + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c", "b"]\n'
+
+
+def test_a_model_file(model_file):
+    file = model_file(
+        SMALL
+        + 'inputs = ["F"]\n[bounds]\nc = [0, 2e6]\nb = [0, inf]\n[start]\nc = 900\n'
+        + "[errors]\namplitude_percent = 2\nphase_deg = 1\nfloor = 1e-6\n"
+    )
+    assert file.model.parameters == ("c", "b")
+    assert file.model.known == {"m": 10.0}
+    assert file.model.inputs == ("F",)
+    assert file.bounds == {"c": (0.0, 2e6), "b": (0.0, math.inf)}
+    assert file.start == {"c": 900.0}
+    assert (file.errors.relative, file.errors.floor) == (0.02, 1e-6)
+    assert file.errors.phase == pytest.approx(math.radians(1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "messages"),
+    [
+        ("equations", "equation", ["key equation", "did you mean 'equations'"]),
+        ("estimate =", "estimates =", ["key estimates", "did you mean 'estimate'"]),
+        ("X = F", "X == F", ["equation 1", "character"]),
+        ("X = F", "X", ["needs one ="]),
+        ('["(m', '["n = 1", "(n', ["equation 2", "n"]),
+        ("X = F", "X*X = F", ["equation 1", "linear"]),
+        ('["c", "b"]', '["c", "k"]', ["k", "stands in no equation"]),
+        ('["c", "b"]', "[]", ["key estimate", "a list of different names"]),
+        ('["c", "b"]', '["c", "c"]', ["key estimate", "a list of different names"]),
+        ('["c", "b"]', '["c", "p"]', ["p is d/dt"]),
+        ('["c", "b"]', '["c", "b", "m"]', ["m is both known and to be estimated"]),
+        ("10.0", '"ten"', ["key known.m", "a number"]),
+        ("m = 10.0", "m = 10.0, sin = 1.0", ["key known.sin", "no function"]),
+        ('b"]\n', 'b"]\ninputs = ["G"]\n', ["G", "no signal"]),
+        ('b"]\n', 'b"]\n[bounds]\nd = [0, 1]\n', ["key bounds", "names of estimate; d is none"]),
+        ('b"]\n', 'b"]\n[bounds]\nc = [2, 1]\n', ["key bounds", "[lowest, highest] of c"]),
+        ('b"]\n', 'b"]\n[bounds]\nc = [1, 1]\n', ["key bounds", "[lowest, highest] of c"]),
+        ('b"]\n', f'b"]\n[bounds]\nc = [0, 1{"0" * 400}]\n', ["key bounds.c"]),
+        (
+            'b"]\n',
+            'b"]\n[bounds]\nc = [0, 1]\n[start]\nc = 2\n',
+            ["key bounds", "with its starting value between"],
+        ),
+        ('b"]\n', 'b"]\n[start]\ncc = 2\n', ["key start", "cc is none"]),
+        ('b"]\n', 'b"]\n[errors]\n', ["state at least one error"]),
+        ('b"]\n', 'b"]\n[errors]\nphase_deg = -1\n', ["key errors.phase_deg"]),
+        ("equations = [", "equations = [3, ", ["key equations", "a text in quotes"]),
+    ],
+)
+def test_complaints_about_a_model_file_name_the_key(model_file, old, new, messages):
+    assert old in SMALL
+    with pytest.raises(InputError) as caught:
+        model_file(SMALL.replace(old, new, 1))
+    for message in ("harmonic.toml", *messages):
+        assert message in str(caught.value)
+
+
+EVIL = "__import__('pathlib').Path('{}').touch()"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'equations = ["EVIL = F"]\nestimate = ["c"]\n',
+        'equations = ["c*X = EVIL"]\nestimate = ["c"]\n',
+        'equations = ["c*X = F"]\nestimate = ["EVIL"]\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\ninputs = ["EVIL"]\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[known]\n"EVIL" = 1\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[known]\nm = "EVIL"\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[bounds]\nc = ["EVIL", 1]\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[bounds]\n"EVIL" = [0, 1]\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[start]\nc = "EVIL"\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[start]\n"EVIL" = 1\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n[errors]\nfloor = "EVIL"\n',
+        'equations = ["c*X = F"]\nestimate = ["c"]\n"EVIL" = 1\n',
+        'equations = "EVIL"\nestimate = ["c"]\n',
+        'equations = ["c*X = F"]\nestimate = "EVIL"\n',
+    ],
+)
+def test_no_text_of_a_model_file_runs_code(model_file, tmp_path, text):
+    mark = tmp_path / "mark"
+    with pytest.raises(InputError, match=r"harmonic\.toml"):
+        model_file(text.replace("EVIL", EVIL.format(mark)))
+    assert not mark.exists()

@@ -1,0 +1,292 @@
+"""Each format as its library writes it: the same samples and the same rate come back."""
+
+import sys
+
+import numpy as np
+import pytest
+from cases import each_of
+from scipy.io import savemat, wavfile
+from waveform_files import RATE, SUFFIXES, drawn, write, write_tdms, write_uff
+
+from rotorid.files.instruments import read_samples
+from rotorid.files.problems import InputError
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_channels_and_rate_come_back(suffix, tmp_path):
+    channels = drawn()
+    found = read_samples(write(tmp_path / f"a{suffix}", channels))
+    names = ["1", "2", "3"] if suffix == ".wav" else list(channels)
+    assert list(found.channels) == names
+    assert found.scale == 1.0
+    # UFF58 has six digits of the step
+    assert found.rate == pytest.approx(RATE, rel=3e-6 if suffix == ".uff" else 1e-9)
+    digits = {".csv": 1e-8, ".wav": 1e-6}.get(suffix, 0.0)
+    for name, samples in zip(names, channels.values(), strict=True):
+        np.testing.assert_allclose(found.channels[name], samples, atol=digits, rtol=digits)
+
+
+def refused(path, *words):
+    """The complaint, one line, which has these words."""
+    with pytest.raises(InputError) as raised:
+        read_samples(path)
+    message = str(raised.value)
+    assert message.count("\n") == 0, message
+    for word in words:
+        assert word in message, message
+    return message
+
+
+def csv(tmp_path, text, encoding="utf-8"):
+    path = tmp_path / "r.csv"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+TABLES = {
+    "decimal commas": "t_s;KEY;B\n0,0;5,5;1\n0,1;0;-2,5\n0,2;0;3e-1\n",
+    "tabs": "t_s\tKEY\tB\n0.0\t5.5\t1\n0.1\t0\t-2.5\n0.2\t0\t0.3\n",
+    "ms and spaces": "Time (ms), KEY, B\n0, 5.5, 1\n100, 0, -2.5\n200, 0, .3\n",
+    "a preamble": "Recorder 3\nDate,2024-05-01\nGain;4;1,5\n\nt_s,KEY,B\n0,5.5,1\n0.1,0,-2.5\n0.2,0,0.3\n",
+    "a comment": '# "5 V supply\n# t_s,KEY,B\n0,5.5,1\n0.1,0,-2.5\n0.2,0,0.3',
+    "units below": "Time,KEY,B\n(ms),(V),\n\n0,5.5,1\n100,0,-2.5\n200,0,0.3\n",
+    "clock and remarks": "clock,t_s,KEY,B,remark\n12:00,0,5.5,1,\n12:00,0.1,0,-2.5,x\n12:00,0.2,0,0.3,\n",
+    "empty column and lines": "t_s,KEY,B,\n0,5.5,1,\n0.1,0,-2.5,\n0.2,0,0.3,\n\n\n",
+    "quotes": '"t_s";"KEY";"B"\n"0,0";"5,5";"1"\n"0,1";"0,0";"-2,5"\n"0,2";"0";"0,3"\n',
+    "carriage returns": "t_s,KEY,B\r0,5.5,1\r0.1,0,-2.5\r0.2,0,0.3\r",
+}
+
+
+@each_of("kind", TABLES)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_text_as_loggers_write_it(kind, encoding, tmp_path):
+    found = read_samples(csv(tmp_path, TABLES[kind], encoding))
+    key, other = found.channels
+    assert (key, other) == (("KEY_V", "B") if kind == "units below" else ("KEY", "B"))
+    np.testing.assert_allclose(found.channels[key], [5.5, 0.0, 0.0])
+    np.testing.assert_allclose(found.channels["B"], [1.0, -2.5, 0.3])
+    assert found.rate == pytest.approx(10.0)
+
+
+ROWS = [f"{i / 100:.2f},{i % 5},{i}.5" for i in range(600)]
+TIME_NAMES = {
+    "t": 1.0,
+    "time": 1.0,
+    "t_ms": 1e3,
+    "Time [µs]": 1e6,
+    "TIME (s)": 1.0,
+    "T": None,
+    "time_h": None,
+}
+
+
+@each_of("name", TIME_NAMES)
+def test_times_are_known_by_their_name(name, tmp_path):
+    step = TIME_NAMES[name] or 1.0
+    found = read_samples(csv(tmp_path, f"{name},KEY\n" + "".join(f"{i * step},{i}\n" for i in range(5))))
+    assert found.rate == (None if TIME_NAMES[name] is None else pytest.approx(1.0))
+    assert list(found.channels) == ([name, "KEY"] if found.rate is None else ["KEY"])
+
+
+BAD_CELLS = {
+    "a word": (400, "4.00,x1,3", ["row 402, column KEY: found 'x1', expected a number"]),
+    "a unit": (400, "4.00,1,3 V", ["row 402, column B: found '3 V', expected a number alone"]),
+    "many cells": (400, "4.00,1,3,4,5", ["Expected 3 fields in line 402, saw 5"]),
+    "few cells": (300, "3.00", ["row 302, column KEY: found nothing", "expected a number in each sample"]),
+    "a blank": (300, "3.00,1,", ["row 302, column B: found nothing", "expected a number in each sample"]),
+    "not finite": (300, "3.00,inf,1", ["row 302, column KEY: found 'inf'"]),
+    "a quote": (300, '3.00,"1,1', ["inside string starting at line 302"]),
+    "a jump": (300, "3.05,1,1", ["row 302, column t_s: found '3.05', expected times in even steps, 0.01 s"]),
+    "a time that is blank": (300, ",1,1", ["row 302, column t_s: found nothing"]),
+    "the same time": (300, "2.99,1,1", ["row 302, column t_s: found '2.99'"]),
+}
+
+
+@each_of("kind", BAD_CELLS)
+def test_a_bad_cell_is_named_with_its_row(kind, tmp_path):
+    from rotorid.files.waveforms import read_waveforms
+
+    at, row, words = BAD_CELLS[kind]
+    path = csv(tmp_path, "\n".join(["t_s,KEY,B", *ROWS[:at], row, *ROWS[at + 1 :]]))
+    with pytest.raises(InputError) as raised:
+        read_waveforms([path], {"tacho": "KEY"})
+    for word in words:
+        assert word in str(raised.value)
+
+
+def test_a_sample_that_is_missing_is_found_and_rounded_times_are_even(tmp_path):
+    t = np.arange(2000) / 5120.0
+    rows = [f"{time:.4f},{i % 7}" for i, time in enumerate(t)]  # half a step of rounding is 0.26 of a step
+    assert read_samples(csv(tmp_path, "\n".join(["t_s,KEY", *rows]))).rate == pytest.approx(5120.0, rel=3e-4)
+    for at in (1, 700, 1998):
+        refused(csv(tmp_path, "\n".join(["t_s,KEY", *rows[:at], *rows[at + 1 :]])), "times in even steps")
+
+
+NO_TABLES = {
+    "": "the file is empty",
+    "a,b\nc,d\n": "a table: a column a channel, a row a sample",
+    "0,1\n1,2\n": "row 1: expected a row with a name for each column",
+    "t_s,KEY,KEY\n0,1,1\n1,2,2\n": "row 1: found 'KEY', expected a name for each column of numbers",
+    "t_s,KEY,\n0,1,1\n1,2,2\n": "row 1: found nothing (a blank), expected a name for each column",
+    "t_s,KEY\n0,1\n": "2 samples or more",
+    "t_s,KEY\n0,1\n0,1\n": "times in even steps",
+    "\x00\x01\x02": "neither",
+}
+
+
+@each_of("text", NO_TABLES)
+def test_what_is_no_table_is_explained(text, tmp_path):
+    refused(csv(tmp_path, text), NO_TABLES[text])
+
+
+@pytest.mark.parametrize(("dtype", "bits"), [(np.int16, 16), (np.int32, 32), (np.uint8, 8)])
+def test_full_scale_of_integers_is_one(dtype, bits, tmp_path):
+    values = np.array([[0.5, -1.0], [0.25, 0.0], [-0.5, 0.125]])
+    stored = values * 2 ** (bits - 1) + (128 if bits == 8 else 0)
+    wavfile.write(tmp_path / "a.wav", 44100, stored.astype(dtype))
+    found = read_samples(tmp_path / "a.wav")
+    assert found.rate == 44100.0
+    np.testing.assert_array_equal(found.channels["2"] * found.scale, values[:, 1])
+    assert isinstance(found.channels["1"], np.memmap) == (bits > 8)
+
+
+def wav_24(path, values, cut=0):
+    """A WAV file of 24 bits, two channels, as the format is described (no library here writes it)."""
+    import struct
+
+    data = b"".join(int(v * 2**23).to_bytes(3, "little", signed=True) for v in np.ravel(values))
+    form = struct.pack("<HHIIHH", 1, 2, 48000, 48000 * 6, 6, 24)
+    body = b"WAVEfmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", len(data)) + data
+    path.write_bytes((b"RIFF" + struct.pack("<I", len(body)) + body)[: -cut or None])
+    return path
+
+
+def test_24_bits(tmp_path):
+    values = np.array([[0.5, -1.0], [0.25, 0.0], [-0.5, 0.125], [2.0**-23, -(2.0**-23)]])
+    found = read_samples(wav_24(tmp_path / "a.wav", values))
+    np.testing.assert_array_equal(found.channels["1"] * found.scale, values[:, 0])
+    np.testing.assert_array_equal(found.channels["2"] * found.scale, values[:, 1])
+    refused(wav_24(tmp_path / "b.wav", values, cut=6), "a whole WAV file")
+
+
+def test_one_channel_of_a_wav(tmp_path):
+    wavfile.write(tmp_path / "a.wav", 8000, np.array([0.5, 0.25], dtype=np.float32))
+    found = read_samples(tmp_path / "a.wav")
+    np.testing.assert_array_equal(found.channels["1"], [0.5, 0.25])
+
+
+MATRIX = np.arange(12.0).reshape(6, 2)
+ARRAYS = {
+    "names and dt": {"data": MATRIX, "names": ["a", "b"], "dt": 0.01},
+    "channels and times": {"x": MATRIX, "channels": ["a", "b"], "time": np.arange(6) / 100},
+    "vectors in rows": {"a": MATRIX[:, :1].T, "b": MATRIX[:, 1:].T, "Fs": 100},
+    "several that agree": {"a": MATRIX[:, 0], "b": MATRIX[:, 1], "fs": 100.0, "dt": 0.01, "note": "x"},
+}
+
+
+def saved(path, arrays):
+    (np.savez if path.suffix == ".npz" else lambda file, **more: savemat(file, more))(path, **arrays)
+    return path
+
+
+@each_of("kind", ARRAYS)
+@pytest.mark.parametrize("suffix", [".mat", ".npz"])
+def test_arrays_as_people_save_them(kind, suffix, tmp_path):
+    found = read_samples(saved(tmp_path / f"a{suffix}", ARRAYS[kind]))
+    assert list(found.channels) == ["a", "b"]
+    np.testing.assert_array_equal(found.channels["b"], MATRIX[:, 1])
+    assert found.rate == pytest.approx(100.0)
+
+
+WRONG_ARRAYS = {
+    "two rates": ({"a": MATRIX[:, 0], "fs": 100.0, "dt": 0.02}, "one rate, not 100 Hz and 50 Hz"),
+    "lengths": ({"a": np.arange(5), "b": np.arange(6), "fs": 1}, "the numbers of samples: a 5 and b 6"),
+    "names": ({"x": MATRIX, "names": ["a", "b", "c"]}, "it is 6 × 2 with the names a, b and c"),
+    "turned": ({"x": MATRIX.T, "fs": 1.0}, "a matrix with a row a sample, a column a channel"),
+    "nothing": ({"fs": 100.0}, "it has fs ()"),
+    "matrix and vector": ({"x": MATRIX, "y": np.arange(6), "fs": 1}, "it has x (6, 2), y (6,) and fs ()"),
+    "no rate at all": ({"a": MATRIX[:, 0], "fs": -5.0}, "a rate above 0, not -5"),
+    "a jump": (
+        {"a": np.arange(5), "t": np.array([0, 1, 2, 4, 5])},
+        "row 4, column t: found '4', expected times",
+    ),
+}
+
+
+@each_of("kind", WRONG_ARRAYS)
+@pytest.mark.parametrize("suffix", [".mat", ".npz"])
+def test_arrays_that_are_no_record_are_explained(kind, suffix, tmp_path):
+    arrays, words = WRONG_ARRAYS[kind]
+    refused(saved(tmp_path / f"a{suffix}", arrays), words)
+
+
+def test_pickles_are_not_read_and_new_mat_files_are_explained(tmp_path):
+    np.savez(tmp_path / "a.npz", a=np.array([{}], dtype=object), allow_pickle=True)
+    refused(tmp_path / "a.npz", "a whole npz file")
+    header = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+    (tmp_path / "a.mat").write_bytes(header.ljust(512, b"\x00"))
+    refused(tmp_path / "a.mat", "a MAT file before version 7.3", "'-v7'")
+
+
+def test_a_small_archive_of_huge_arrays_is_not_unpacked(tmp_path, monkeypatch):
+    monkeypatch.setattr("rotorid.files.instruments.LARGEST", 10_000_000)
+    arrays = {"a": np.zeros(2_000_000), "fs": 1.0}
+    np.savez_compressed(tmp_path / "a.npz", **arrays)
+    savemat(tmp_path / "a.mat", arrays, do_compression=True)
+    for name in ("a.npz", "a.mat"):
+        assert (tmp_path / name).stat().st_size < 100_000
+        refused(tmp_path / name, "at most 0 GB, not 0.016 GB")
+
+
+def test_sets_of_uff_are_named_by_line_node_or_number(tmp_path):
+    channels = drawn()
+    for binary in (0, 1):
+        path = write_uff(tmp_path / "a.uff", channels, binary=binary)
+        np.testing.assert_allclose(read_samples(path).channels["B1X"], channels["B1X"], rtol=1e-11)
+    same = write_uff(tmp_path / "b.uff", channels, id1="NONE")
+    assert list(read_samples(same).channels) == ["1", "2", "3"]
+    one = write_uff(tmp_path / "c.unv", {"x": channels["B1X"]}, id1="NONE", rsp_node=12, rsp_dir=-2)
+    assert list(read_samples(one).channels) == ["12-Y"]
+    refused(write_uff(tmp_path / "d.uff", channels, func_type=4), "a time response")
+    refused(write_uff(tmp_path / "e.uff", channels, abscissa_spacing=0), "in even steps (abscissa spacing 1)")
+    (tmp_path / "f.uff").write_bytes(path.read_bytes()[:-100])
+    refused(tmp_path / "f.uff", "a whole UFF58 file")
+
+
+def test_channels_of_tdms_groups(tmp_path):
+    channels, step = drawn(), {"wf_increment": 1 / RATE}
+    two = write_tdms(tmp_path / "a.tdms", channels, step, {"KEY": "tacho"})
+    assert set(read_samples(two).channels) == {"KEY", "B1X", "B1Y"}
+    nptdms = pytest.importorskip("nptdms")
+    other = [
+        nptdms.ChannelObject(
+            group, "x", channels["B1X"], properties={"wf_increment": dt, "wf_start_offset": at}
+        )
+        for group, dt, at in (("a", 0.01, 0.0), ("b", 0.01, 0.0), ("c", 0.01, 0.02), ("d", 0.02, 0.0))
+    ]
+
+    def of(*chosen):
+        with nptdms.TdmsWriter(str(tmp_path / "d.tdms")) as writer:
+            writer.write_segment([other[i] for i in chosen])
+        return tmp_path / "d.tdms"
+
+    assert list(read_samples(of(0, 1)).channels) == ["a/x", "b/x"]
+    refused(of(0, 2), "channels that begin together")
+    refused(of(0, 3), "channels of one rate; the steps are 0.01 s and 0.02 s")
+
+
+@pytest.mark.parametrize(("suffix", "name"), [(".uff", "pyuff"), (".tdms", "nptdms")])
+def test_without_the_extra_it_is_said_how_to_install_it(suffix, name, tmp_path, monkeypatch):
+    (tmp_path / f"a{suffix}").write_bytes(b"x")
+    monkeypatch.setitem(sys.modules, name, None)
+    refused(tmp_path / f"a{suffix}", f"pip install {name}")
+
+
+def test_files_that_are_none(tmp_path):
+    (tmp_path / "base.wav").write_bytes(b"")
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "a.xlsx").write_bytes(b"PK")
+    refused(tmp_path / "bas.wav", "a file that exists (did you mean 'base.wav'?)")
+    refused(tmp_path / "folder.csv", "a file, not a folder")
+    refused(tmp_path / "a.xlsx", "waveforms in a file .csv, .txt, .wav")
+    refused(tmp_path / "base.wav", "a whole WAV file")

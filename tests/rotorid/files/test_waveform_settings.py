@@ -1,0 +1,265 @@
+"""A waveforms file or options: runs, channels with units and scales, conventions, refusals."""
+
+import hashlib
+import math
+
+import numpy as np
+import pytest
+from cases import each_of
+from waveform_files import RATE, drawn, write
+
+from balancing import Labels
+from rotorid.files.input_file import each_file_once, sha256
+from rotorid.files.problems import InputError
+from rotorid.files.waveforms import read_waveforms
+from rotorid.waveforms.record import SignalPath, TachoSettings
+
+FILE = """
+tacho = "KEY"
+pulses = 2
+edge = "falling"
+tacho_level = 2.5
+phase = "lag"
+amplitude = "um_pp"
+orders = [1, 2]
+speeds_rpm = [900, 1200]
+[records]
+BASE = "base.npz"
+T1 = "t1.csv"
+[channels.probe]
+channel = "B1X"
+unit = "mil"
+scale = 5.0
+high_pass_Hz = 2
+high_pass_order = 2
+delay_ms = 0.5
+[channels.B1Y]
+unit = "mm/s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path / "base.npz", drawn(seed=1))
+    write(tmp_path / "t1.csv", drawn(seed=2))
+    return tmp_path
+
+
+def settings(folder, text=FILE):
+    (folder / "w.toml").write_text(text, encoding="utf-8")
+    return folder / "w.toml"
+
+
+def test_a_waveforms_file_says_everything(folder):
+    found = read_waveforms([settings(folder)])
+    assert [record.run for record in found.records] == ["BASE", "T1"]
+    assert found.tacho == TachoSettings(2, "falling", 2.5)
+    assert found.labels == Labels("um_pp", 2e6, phase="lag")
+    assert found.orders == (1.0, 2.0)
+    assert found.speeds == pytest.approx((30 * math.pi, 40 * math.pi))
+    assert found.files == (folder / "w.toml", folder / "base.npz", folder / "t1.csv")
+    assert not found.unstated
+    for record, seed in zip(found.records, (1, 2), strict=True):
+        probe, velocity = record.sensors
+        assert record.rate == pytest.approx(RATE)
+        assert (probe.name, probe.derivative, probe.factor) == ("probe", 0, pytest.approx(5 * 25.4e-6))
+        assert probe.path == SignalPath(pytest.approx(4 * math.pi), 2, pytest.approx(0.5e-3))
+        assert (velocity.name, velocity.derivative, velocity.factor) == ("B1Y", 1, 1e-3)
+        assert velocity.path == SignalPath()
+        np.testing.assert_allclose(probe.samples, drawn(seed=seed)["B1X"], rtol=1e-8)
+        np.testing.assert_array_equal(record.tacho.samples, drawn()["KEY"])
+
+
+def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_names(tmp_path):
+    channels = drawn()
+    named = {
+        "KEY": channels["KEY"],
+        "B1X_um": channels["B1X"],
+        "B1Y [mm/s]": channels["B1Y"],
+        "T_degC": channels["B1X"],
+    }
+    wishes = {"tacho": "KEY", "sensors": ["B1X", "B1Y"]}
+    found = read_waveforms([write(tmp_path / "base.csv", named)], wishes)
+    (record,) = found.records
+    assert [(s.name, s.derivative, s.factor) for s in record.sensors] == [("B1X", 0, 1e-6), ("B1Y", 1, 1e-3)]
+    assert found.labels == Labels("um", 1e6)
+    assert (found.orders, found.speeds, found.unstated) == ((1.0,), None, True)
+    del named["T_degC"], named["B1Y [mm/s]"]
+    named["B2 (µm)"] = channels["B1Y"]
+    named["B2_mil"] = channels["B1X"]
+    (record,) = read_waveforms([write(tmp_path / "base.npz", named)], {"tacho": "KEY"}).records
+    assert [(s.name, s.factor) for s in record.sensors] == [
+        ("B1X", 1e-6),
+        ("B2", 1e-6),
+        ("B2_mil", 25.4e-6),
+    ]
+
+
+def test_numbers_without_a_unit_or_with_a_label_stay_numbers(tmp_path):
+    path = write(tmp_path / "base.npz")
+    for unit in (None, "V"):
+        found = read_waveforms([path], {"tacho": "KEY", "unit": unit})
+        assert found.labels == Labels(unit or "", 1.0)
+        assert [(s.factor, s.derivative) for s in found.records[0].sensors] == [(1.0, None)] * 2
+
+
+def test_integers_of_a_wav_are_shares_of_full_scale_and_so_is_the_level_of_the_tacho(tmp_path):
+    from scipy.io import wavfile
+
+    values = np.array([[0.5, 0.25], [0.0, -0.5], [0.0, 0.125]])
+    wavfile.write(tmp_path / "a.wav", 5120, (values * 2**15).astype(np.int16))
+    text = 'tacho = "1"\nrecords = ["a.wav"]\n[channels.A]\nchannel = "2"\nunit = "g"\nscale = 20\n'
+    (record,) = read_waveforms([settings(tmp_path, text)]).records
+    np.testing.assert_array_equal(record.tacho.samples, values[:, 0])
+    (sensor,) = record.sensors
+    assert sensor.samples.dtype == np.int16
+    assert sensor.derivative == 2
+    np.testing.assert_allclose(sensor.samples * sensor.factor, 20 * 9.80665 * values[:, 1])
+
+
+def test_the_command_line_replaces_what_the_file_says(folder):
+    wishes = {
+        "tacho": "B1Y",
+        "sensors": ("probe", "KEY"),
+        "unit": "um",
+        "amplitude": "mm_s_rms",
+        "pulses": 3,
+        "edge": "centre",
+        "phase": "lead",
+        "orders": [1],
+        "rate_Hz": 5120.5,
+        "speeds_rad_s": [100.0],
+    }
+    found = read_waveforms([settings(folder)], wishes)
+    record = found.records[0]
+    assert (record.rate, record.tacho.name) == (5120.5, "B1Y")
+    assert [(s.name, s.factor) for s in record.sensors] == [("probe", pytest.approx(1.27e-4)), ("KEY", 1e-6)]
+    assert found.tacho == TachoSettings(3, "centre", 2.5)
+    assert (found.labels.vibration_unit, found.labels.phase) == ("mm_s_rms", "lead")
+    assert (found.orders, found.speeds) == ((1.0,), (100.0,))
+
+
+def test_a_rate_that_is_stated_serves_a_file_without_one(tmp_path):
+    np.savez(tmp_path / "a.npz", **drawn())
+    (record,) = read_waveforms([tmp_path / "a.npz"], {"tacho": "KEY", "rate_Hz": 2560.0}).records
+    assert record.rate == 2560.0
+
+
+def complaint(files, wishes=None):
+    with pytest.raises(InputError) as raised:
+        read_waveforms(files, wishes)
+    return str(raised.value)
+
+
+OPTIONS = {
+    "no tacho": (
+        {},
+        "expected a tacho channel, without which there is no phase: --tacho NAME "
+        "(tacho in a file); the channels are KEY, B1X and B1Y",
+    ),
+    "another tacho": (
+        {"tacho": "KEI"},
+        "column KEI: expected a channel of this name (did you mean 'KEY'?)",
+    ),
+    "another sensor": (
+        {"tacho": "KEY", "sensors": ("B1YY",)},
+        "B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
+    ),
+    "another rate": (
+        {"tacho": "KEY", "rate_Hz": 5200.0},
+        "the rate that the file has, 5120 Hz, not 5200 Hz",
+    ),
+    "a unit": (
+        {"tacho": "KEY", "unit": "MM"},
+        "column unit: found 'MM', expected the unit written mm",
+    ),
+    "pp": ({"tacho": "KEY", "unit": "um_pp"}, "expected the unit of a sample, um, not um_pp"),
+    "kinds": (
+        {"tacho": "KEY", "unit": "V", "amplitude": "um"},
+        "column B1X: found 'V', expected a unit that can become that of the amplitudes, um",
+    ),
+    "none": (
+        {"tacho": "KEY", "amplitude": "um"},
+        "column B1X: found nothing (a blank), expected a unit that can become that of the amplitudes, um",
+    ),
+    "orders": ({"tacho": "KEY", "orders": [0]}, "column orders"),
+    "pulses": (
+        {"tacho": "KEY", "pulses": 0},
+        "column pulses: found '0', expected a number of 1 or more: pulses a turn",
+    ),
+}
+
+
+@each_of("kind", OPTIONS)
+def test_options_that_cannot_be_are_explained(kind, folder):
+    wishes, words = OPTIONS[kind]
+    message = complaint([folder / "base.npz"], wishes)
+    assert words in message, message
+
+
+FILES = {
+    'tacho = "KEY"\n': "key records: expected a file for each run",
+    'tacho = "KEY"\nrecords = []\n': "expected a table, [records]: a file for each run",
+    'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
+    'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
+    'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",
+    'tacho = "KEY"\nrecords = ["bas.npz"]\n': "bas.npz: expected a file that exists (did you mean",
+    FILE + 'uni = "um"\n': "key channels.B1Y.uni: found 'um', expected a known key (did you mean 'unit'?)",
+    FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
+    FILE.replace("mm/s", "mm_s_pk"): "key channels.B1Y.unit",
+    FILE.replace("high_pass_Hz", "high_pass_rpm"): "key channels.probe.high_pass_rpm",
+    "records = 5\nchannels = 3\n": "key channels: found '3', expected a table, [channels]",
+}
+
+
+@each_of("text", FILES)
+def test_settings_that_cannot_be_are_explained(text, folder):
+    message = complaint([settings(folder, text)])
+    assert FILES[text] in message, message
+
+
+def test_units_in_names_and_settings_agree(tmp_path):
+    channels = {"KEY": drawn()["KEY"], "A_um": drawn()["B1X"]}
+    path = write(tmp_path / "a.npz", channels)
+    for unit in ("um", "mil", None):  # those of channels that state none
+        assert read_waveforms([path], {"tacho": "KEY", "unit": unit}).labels.vibration_unit == "um"
+    text = 'tacho = "KEY"\nrecords = ["a.npz"]\n[channels.A]\nunit = "mil"\n'
+    assert "column A_um: expected the unit um of its name, not mil" in complaint([settings(tmp_path, text)])
+    twice = write(tmp_path / "b.npz", {**channels, "A_mil": drawn()["B1Y"]})
+    assert "the channels are A_um and A_mil" in complaint([twice], {"tacho": "KEY", "sensors": ["A"]})
+    only = write(tmp_path / "c.npz", {"KEY": drawn()["KEY"]})
+    assert "a channel besides that of the tacho" in complaint([only], {"tacho": "KEY"})
+
+
+def test_several_files(folder):
+    wishes = {"tacho": "KEY"}
+    found = read_waveforms([folder / "base.npz", folder / "t1.csv"], wishes)
+    assert [record.run for record in found.records] == ["base", "t1"]
+    assert "one waveforms file alone" in complaint([settings(folder), folder / "base.npz"], wishes)
+    write(folder / "base.csv")
+    assert "files of different names" in complaint([folder / "base.npz", folder / "base.csv"], wishes)
+    both = complaint([folder / "x.csv", folder / "y.csv"], wishes)
+    assert both.count("a file that exists") == 2
+
+
+def test_a_gap_in_a_channel_that_nobody_wants_is_no_problem(tmp_path):
+    channels = drawn()
+    channels["B1Y"][7] = np.nan
+    path = write(tmp_path / "a.npz", channels)
+    read_waveforms([path], {"tacho": "KEY", "sensors": ["B1X"]})
+    words = complaint([path], {"tacho": "KEY"})
+    assert "row 8, column B1Y: found nothing (a blank), expected a number in each sample" in words
+
+
+def test_a_tacho_of_true_and_false_is_one_of_numbers(tmp_path):
+    path = write(tmp_path / "a.npz", {"KEY": drawn()["KEY"] > 1, "A": drawn()["B1X"]})
+    (record,) = read_waveforms([path], {"tacho": "KEY"}).records
+    assert record.tacho.samples.dtype.kind == "i"
+
+
+def test_a_hash_is_that_of_what_was_read_or_of_a_file_of_any_size(tmp_path):
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"abc" * 1_000_000)
+    expected = hashlib.sha256(path.read_bytes()).hexdigest()
+    with each_file_once():
+        assert sha256(path) == expected

@@ -1,0 +1,46 @@
+"""Records that a job names: what is to be known of them is said, and run-ups want speeds."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from rotorid.files.job import read_job
+from rotorid.tables import InputError, TableWarning
+
+SAMPLE = Path(__file__).parents[3] / "sample_data" / "waveforms"
+
+
+@pytest.fixture
+def job(tmp_path):
+    shutil.copytree(SAMPLE, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "job.toml"
+
+
+def test_neighbouring_speeds_of_sound_records_need_no_word(job):
+    assert read_job(job).trials.warnings == ()
+
+
+def test_what_vectors_say_of_records_is_said_of_a_job(job):
+    rate, counts = wavfile.read(job.with_name("as_found.wav"))
+    wavfile.write(
+        job.with_name("as_found.wav"),
+        rate,
+        np.minimum(counts, [[2**15 - 1, int(counts[:, 1].mean()) + 400, 2**15 - 1, 2**15 - 1]]).astype(
+            np.int16
+        ),
+    )
+    with pytest.warns(TableWarning, match="run 'as_found': sensor 'A' is clipped"):
+        read_job(job)
+
+
+def test_a_run_up_in_a_job_wants_speeds(job):
+    settings = job.with_name("slow_roll.toml")
+    settings.write_text(settings.read_text().replace("speeds_rpm = [620]\n", ""))
+    with pytest.raises(InputError) as caught:
+        read_job(job)
+    (problem,) = caught.value.problems
+    assert problem.column == "speeds_rpm"
+    assert "speeds at which 'slow' are read, whose speed is not steady" in problem.expected
