@@ -58,8 +58,9 @@ def _name(value: str) -> str:
 
 
 def _expression(value: object) -> object:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if number or (isinstance(value, str) and value.strip()):
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= expressions.LARGEST:
+        return float(value)
+    if isinstance(value, str) and value.strip():
         return value
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
 

@@ -28,7 +28,7 @@ _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
 def _numbers(value: object) -> FloatArray:
-    with suppress(TypeError, ValueError):
+    with suppress(TypeError, ValueError, OverflowError):
         array = np.array(value, dtype=float)
         if array.size and np.isfinite(array).all() and array.ndim:
             return array
