@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from rotorid import read_rotor, reduction
-from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.files.small_model import equations_of
+from rotorid.files.toml_writing import toml_bytes
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "rotor23.csv"
 NODES = (7, 12, 18)
@@ -48,7 +49,7 @@ def main(model: str | None = None) -> dict[str, float]:
     if model is not None:
         motion = small.equations_of_motion
         dampers = dict.fromkeys(motion.coordinates, 1000.0)
-        Path(model).write_bytes(ode_model_bytes(motion, dampers))
+        Path(model).write_bytes(toml_bytes(equations_of(motion, dampers)))
     return {
         "m7_kg": float(small.masses.solution[0]),
         "m12_kg": float(small.masses.solution[1]),

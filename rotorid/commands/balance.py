@@ -18,7 +18,6 @@ from rotorid.commands.balance_solution import (
     read_source,
     solve,
     source_of,
-    with_limits_of,
     with_other_conventions,
 )
 from rotorid.commands.coefficients import KINDS
@@ -99,7 +98,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     from balancing import compare_check, mount
-    from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.files.job import JobSource
 
     options = options or BalanceOptions()
     _check(options)
@@ -138,15 +137,15 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     }
     made = provenance(read.files if solved.of_type is None else solved.of_type.files_beside(read), options)
 
-    def workbook(path: Path) -> Written:
-        from rotorid.tables.job.workbook_writing import job_workbook_bytes
+    def workbook(_: Path) -> Written:
+        from rotorid.files.job_excel import job_workbook_bytes
 
         if files is None:
             raise ValueError("a workbook is made of the files of a job: give these, not what was read")
-        return job_workbook_bytes(read, with_limits_of(files, read, options), path, outcome, made)
+        return job_workbook_bytes(files.files, outcome, made)
 
     def coefficients(path: Path) -> Written:
-        from rotorid.tables.runs.influence_table import influence_bytes
+        from rotorid.files.influence import influence_bytes
 
         return influence_bytes(path, influence)
 

@@ -65,7 +65,7 @@ class BalanceOptions:
     service_speed : SPEED
         For --grade, such as 3000rpm.
     save_influence : FILE
-        Write the coefficients, .csv or .xlsx.
+        Write the coefficients: .json keeps their errors; .csv or .xlsx.
     template : FILE.xlsx
         Write an empty workbook to fill in.
     """
@@ -97,7 +97,7 @@ class BalanceOptions:
         "Output": "save_influence template",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    writes: ClassVar[Mapping[str, Sequence[str]]] = {"save_influence": (".csv", ".xlsx")}
+    writes: ClassVar[Mapping[str, Sequence[str]]] = {"save_influence": (".json", ".csv", ".xlsx")}
 
     def before(self, job: Sequence[Path] | None) -> str | None:
         """Write the empty workbook where it is asked for, and say so.
@@ -108,8 +108,8 @@ class BalanceOptions:
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
         from rotorid.commands.app import check_targets
+        from rotorid.files.job_excel import template_bytes
         from rotorid.files.table_writing import write_bytes
-        from rotorid.tables.job.workbook_template import template_bytes
 
         if self.template is None:
             if not job:

@@ -11,16 +11,16 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.option_quantities import largest_amplitudes, largest_weights, limited
+from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import names, speeds
 from rotorid.report.options import file_of
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
     from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.files.job import JobSource
     from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.tables import Job
-    from rotorid.tables.job.job_as_written import JobSource
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
 
 def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
+    from rotorid.files.job import JobSource, Overrides
     from rotorid.tables import Job
-    from rotorid.tables.job.job_as_written import JobSource
-    from rotorid.tables.job.job_data import Overrides
 
     stored = None if options.influence is None else Path(options.influence)
     stated = (options.phase, options.angles, options.amplitude_error, options.phase_error)
@@ -44,8 +43,8 @@ def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
 
 def read_source(source: Job | JobSource, options: BalanceOptions) -> Job:
     """The job, with the limits of the options."""
+    from rotorid.files.job import JobSource
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.job_as_written import JobSource
 
     if isinstance(source, JobSource):
         files, overrides = source.files, asdict(source.overrides)
@@ -55,15 +54,6 @@ def read_source(source: Job | JobSource, options: BalanceOptions) -> Job:
         else:
             source = job_from_files(files, influence=source.influence, **overrides)
     return limited(source, options.max_mass, options.limit)
-
-
-def with_limits_of(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
-    """What the job was read from, with the limits put in place of its own."""
-    return replace(
-        source,
-        max_weights=largest_weights(job, options.max_mass),
-        limits=largest_amplitudes(job, options.limit),
-    )
 
 
 class Solved(NamedTuple):
@@ -134,7 +124,7 @@ def correct_job(
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,
         strength=options.ridge,
-        remove=sorted(job.remove),
+        remove=job.removed,
     )
 
 

@@ -122,8 +122,8 @@ class BearingEquilibria:
             For one speed, which would hold at all.
         """
         from fem import Rotor
-        from rotorid.tables.models.small_model_file import small_model_files
-        from rotorid.tables.rotor.rotor_writing import rotor_file_bytes
+        from rotorid.files.rotor_writing import rotor_file_bytes
+        from rotorid.files.small_model import small_model_files
 
         if len(self.found) < 2:
             raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")

@@ -88,9 +88,9 @@ def moving(
     ValueError
         For files that cannot be read.
     """
+    from rotorid.files.small_model import is_small_model
     from rotorid.reduction import SmallModel
     from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
-    from rotorid.tables.models.small_model_file import is_small_model
 
     model: Rotor | SmallModel
     files: tuple[Path, ...] = ()

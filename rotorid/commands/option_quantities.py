@@ -20,7 +20,7 @@ from rotorid.files.units import Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:
     from balancing import Labels
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
     from rotorid.tables import Job
 
 Amount = str | float
@@ -118,7 +118,7 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
     from rotorid.files.weights_with_units import in_job_units
 
     unit = labels.weight_unit
@@ -195,7 +195,7 @@ def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -
             f"{what} {given!r}: give one value for all planes, or each plane once (a decimal sign is a point)"
         )
     example = "5g or left=5g,right=3g; to use no weight at all, leave the plane out"
-    return {} if given is None else _limits(given, what, read, example, "plane", job.planes, job.used)
+    return {} if given is None else _limits(given, what, read, example, "plane", list(job.planes), job.used)
 
 
 def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> dict[str, Quantity]:
@@ -235,7 +235,7 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
     """The job with these limits in place of its own."""
-    from rotorid.tables.job.job_limits import with_limits
+    from rotorid.files.job import with_limits
 
     return with_limits(job, largest_weights(job, max_mass), largest_amplitudes(job, limits))
 
@@ -250,7 +250,7 @@ def _limits(
     every: Sequence[str],
 ) -> dict[str, Quantity]:
     """Limits above 0 of known planes or sensors, or one of every."""
-    from rotorid.files.settings_keys import Quantity
+    from rotorid.files.units import Quantity
 
     texts: dict[str, Amount]
     if isinstance(given, int | float):

@@ -156,7 +156,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
 
 def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """Vectors of each run in a table, and the files that were read."""
-    from rotorid.tables.runs.vectors_table import read_vectors
+    from rotorid.files.vectors_table import read_vectors
 
     return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
 
@@ -164,8 +164,8 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
     from rotorid.files.problems import Problems
+    from rotorid.files.vectors_table import read_vectors
     from rotorid.files.waveforms import read_vectors_grid
-    from rotorid.tables.runs.vectors_table import read_vectors
 
     given = {
         "tacho": options.tacho,
@@ -242,8 +242,8 @@ def _slow_roll(
     sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
 ) -> SlowRoll:
     """Run-out: of the fit, the mean at slow speeds, or of a file."""
+    from rotorid.files.vectors_table import read_slow_roll
     from rotorid.identify.modes import constant_vectors, slow_vectors
-    from rotorid.tables.runs.vectors_table import read_slow_roll
 
     if isinstance(given, str) and given == "fit":
         if modes is None or modes.undetermined:

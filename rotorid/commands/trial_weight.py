@@ -188,7 +188,7 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
     for name in names(options.plane) or used_planes(job, influence):
         limit, radius = inf, None if unbalances else (job.radii.get(name) or stated)
         if job.limits is not None and name in job.planes:
-            limit = float(job.limits.max_weight[job.planes.index(name)])
+            limit = float(job.limits.max_weight[list(job.planes).index(name)])
         weights.append(
             trial_from_coefficients(
                 today,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import SupportsIndex
 
@@ -14,6 +16,20 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
+from rotorid.files.cells import (
+    BadCell,
+    Cell,
+    Finder,
+    Grid,
+    Shown,
+    below_title,
+    decode,
+    is_spreadsheet_error,
+    make_grid,
+    parse_text,
+    read_bytes,
+    show,
+)
 from rotorid.files.decimal_numbers import (
     NotANumber,
     check_size,
@@ -21,14 +37,13 @@ from rotorid.files.decimal_numbers import (
     parse_number,
     thousands_or_decimals,
 )
-from rotorid.files.digits import written_steps
 from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
-from rotorid.files.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import decode, parse_text, read_bytes
 from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
+TOP = 10_000
+"""Bytes of a file in which its headings stand."""
 KINDS = {
     "a runs table": ("run", "speed", "sensor", "amplitude", "phase"),
     "an influence table": ("speed", "sensor", "plane", "influence"),
@@ -39,7 +54,9 @@ KINDS = {
     "an unbalance table": ("unbalance", "angle"),
 }
 """Columns by which a table is known that is taken for another kind."""
-_UNCLEAR = Unit("?", "unclear")
+_SURE = 15
+"""A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
+UNCLEAR = Unit("?", "unclear")
 Source = str | Path | Grid | tuple[Path, ...]
 """A table: a file, the cells of a sheet, or, of runs, files with one run each."""
 
@@ -78,7 +95,7 @@ class Column:
 class Field:
     """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
 
-    Where its cells stood in several columns of the file, `names` has the one of each.
+    `names` has the column of the file that each cell is from, where they are several.
     """
 
     name: str
@@ -180,7 +197,8 @@ class Table:
         if stem not in self:
             return
         bad = ~np.fromiter(allowed, dtype=bool, count=len(self)) & ~np.isnan(self.numbers(stem))
-        self.complain_where(bad, stem, expected)
+        for index in np.flatnonzero(bad):
+            self.complain(index, stem, expected)
 
     def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
         """The one column that there is of several; else None and a problem, if none is only misspelt.
@@ -254,21 +272,25 @@ def read_grid(
     *,
     first: bool = False,
     may_be_empty: bool = False,
+    find: Finder | None = None,
+    top: bool = False,
 ) -> Grid | None:
-    """The cells of a text file or of a sheet."""
+    """The cells of a text file or of a sheet: those from the header on that `find` finds, or only the top."""
     if isinstance(source, Grid):
         return source
-    path = Path(source_name(source))
+    path = Path(str(source))
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
             return None
-        title, rows = chosen
-        return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
+        rows = chosen[1] if find is None else below_title(chosen[1], find)
+        return make_grid(sheet_source(path, chosen[0]), rows, "", problems, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
-    text = None if data is None else decode(str(path), data, problems)
-    return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
+    text = None if data is None else decode(str(path), data[:TOP] if top else data, problems)
+    if text is None:
+        return None
+    return parse_text(str(path), text, problems, may_be_empty=may_be_empty, find=find)
 
 
 def source_name(source: Source) -> str:
@@ -285,90 +307,47 @@ def sheet_source(path: Path, title: str) -> str:
 
 def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
     """Give the columns of a grid their meaning; every complaint goes to `problems`."""
-    if not any(column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
-        _complain_about_header(grid, columns, problems)
-        return None
-    misspelt = _misspelt(grid, columns)
-    if not _has_columns(grid, columns, misspelt, problems):
-        return None
-    found = _match(grid, columns, problems)
-    comma = decimal_comma(
-        (
-            cell
-            for index, column, _ in found.values()
-            if column.unit is not None
-            for cell in (cells[index] for _, cells in grid.rows)
-            if isinstance(cell, str) and "," in cell
-        ),
-        grid.separator,
-    )
-    fields = {
-        stem: _field(grid, index, column, unit, problems, comma=comma)
-        for stem, (index, column, unit) in found.items()
+    names = {
+        k: name for k, name in enumerate(grid.header) if name and not name.casefold().startswith(REMARKS)
     }
-    if any(column.required and column.stem not in found for column in columns):
+    meant = {k: column_of(name, columns) for k, name in names.items()}
+    near = {k: nearest(names[k], columns) for k, column in meant.items() if column is None}
+    misspelt = frozenset(c.stem for name in near.values() if name and (c := column_of(name, columns)))
+    stems = {column.stem for column in meant.values() if column is not None}
+    missing = [c for c in columns if c.required and c.stem not in stems | misspelt]
+    unknown = [names[k] for k, name in near.items() if name is None]
+    if not _has_columns(grid, columns, stems | misspelt, missing, unknown, problems):
+        return None
+    places: dict[str, tuple[int, Unit | None]] = {}
+    for k, column in meant.items():
+        wrong, unit = "", None
+        if column is None:
+            wrong = f"a known column (did you mean {near[k]!r}?)" if near[k] else ""
+        elif column.stem in places:
+            other = grid.header[places[column.stem][0]]
+            one = f"one unit for {column.stem}, not also {other}"
+            wrong = "the column once" if other == names[k] else one
+        else:
+            try:
+                unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else None
+            except UnitError as error:
+                wrong, unit = str(error), UNCLEAR
+            places[column.stem] = k, unit
+        if wrong:
+            name = grid.named[0][k] if grid.named else names[k]
+            problems.add(grid.source, grid.header_row, name, name, wrong)
+    of_numbers = [k for k, unit in places.values() if unit is not None]
+    commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
+    comma = decimal_comma(commas, grid.separator)
+    by_stem = {column.stem: column for column in columns}
+    fields = {
+        stem: _field(grid, k, unit, problems, comma=comma, blank=by_stem[stem].blank)
+        for stem, (k, unit) in places.items()
+    }
+    if missing or any(column.required and column.stem not in places for column in columns):
         return None
     rows = tuple(number for number, _ in grid.rows)
     return Table(grid.source, grid.header_row, rows, fields, problems, misspelt, grid.comments, grid.complete)
-
-
-_Match = tuple[int, Column, Unit | None]
-
-
-def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[str, _Match]:
-    """Which column of the grid is which; problems for unknown, repeated and wrongly named ones."""
-    found: dict[str, _Match] = {}
-    for index, name in enumerate(grid.header):
-        if not name or name.casefold().startswith(REMARKS):
-            continue
-        column = column_of(name, columns)
-        if column is None:
-            near = nearest(name, columns)
-            if near:  # the others have been reported
-                problems.add(
-                    grid.source, grid.header_row, name, name, f"a known column (did you mean {near!r}?)"
-                )
-            continue
-        unit: Unit | None = None
-        if column.unit is not None:
-            try:
-                unit = column.unit(name[len(column.stem) + 1 :])
-            except UnitError as error:
-                problems.add(grid.source, grid.header_row, name, name, str(error))
-                # Marked as found, so that it is not reported as missing too.
-                unit = _UNCLEAR
-        if column.stem in found:
-            other = grid.header[found[column.stem][0]]
-            what = "the column once" if other == name else f"one unit for {column.stem}, not also {other}"
-            problems.add(grid.source, grid.header_row, name, name, what)
-            continue
-        found[column.stem] = (index, column, unit)
-    return found
-
-
-def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
-    expected = "a header row with the names of columns, separated by , or ; or tabs: "
-    expected += _known(columns) + _seems(grid)
-    shown = None  # who knows what stands in a file that is no table
-    later = _header_below(grid, columns)
-    problems.withdraw(grid.source)  # that rows are longer than a title is no news
-    if later is not None:
-        shown = (grid.separator or " ").join(name for name in grid.header if name)
-        expected = (
-            f"the header in the first row, and it seems to be row {later}: "
-            "delete what stands above it, or begin those rows with #"
-        )
-    problems.add(grid.source, grid.header_row, None, shown, expected)
-
-
-def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
-    """The row that names most of the required columns, if it is not the first one."""
-    needed = {column.stem for column in columns if column.required}
-    for number, cells in grid.first_rows[1:]:
-        names = [column_of(show(cell), columns) for cell in cells]
-        if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
-            return number
-    return None
 
 
 def column_of(name: str, columns: Sequence[Column]) -> Column | None:
@@ -387,115 +366,95 @@ def nearest(name: str, columns: Sequence[Column]) -> str | None:
     for column in sorted(columns, key=lambda column: -len(column.stem)):
         head, tail = plain[: len(column.stem)], plain[len(column.stem) :]
         if head.casefold() == column.stem and column.unit is not None and tail.startswith("_"):
-            try:
+            with suppress(UnitError):
                 return f"{column.stem}_{column.unit(tail[1:]).name}"
-            except UnitError:
-                break
     return suggest(name, [example for column in columns for example in column.names])
 
 
-def _known(columns: Sequence[Column]) -> str:
-    return listing([example for column in columns for example in column.names], "and")
-
-
-def _misspelt(grid: Grid, columns: Sequence[Column]) -> frozenset[str]:
-    """Stems of the columns that unknown ones were probably meant to be."""
-    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
-    near = [nearest(name, columns) for name in names if column_of(name, columns) is None]
-    close = [column_of(name, columns) for name in near if name]
-    return frozenset(column.stem for column in close if column is not None)
-
-
 def _has_columns(
-    grid: Grid, columns: Sequence[Column], misspelt: Collection[str], problems: Problems
+    grid: Grid,
+    columns: Sequence[Column],
+    stems: Collection[str],
+    missing: Sequence[Column],
+    unknown: Sequence[str],
+    problems: Problems,
 ) -> bool:
-    """Whether it may be a table of this kind; one problem each with unknown and with missing columns."""
-    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
-    known = [column.stem for name in names if (column := column_of(name, columns)) is not None]
-    unknown = [name for name in names if column_of(name, columns) is None and nearest(name, columns) is None]
-    missing = [c for c in columns if c.required and c.stem not in known and c.stem not in misspelt]
-    present = listing([name for name in grid.named or grid.header if name], "and")
-    if (len(missing) > 1 and unknown) or len(unknown) > max(2, len(known)):
-        seems = _seems(grid) or "; remarks go into 'note'"
-        expected = f"a table with the columns {_known(columns)}; its columns are {present}{seems}"
-        problems.add(grid.source, grid.header_row, unknown[0], None, expected)
-        return False
-    if unknown:
-        one = unknown[0] if len(unknown) == 1 else None
-        expected = (
-            f"{'a known column' if one else 'known columns'}: {_known(columns)}; remarks go into 'note'"
-        )
-        problems.add(grid.source, grid.header_row, one, listing(unknown, "and"), expected)
-    if missing:
-        needed = (
-            listing(missing[0].names) if len(missing) == 1 else listing([c.names[0] for c in missing], "and")
-        )
+    """Whether it may be a table of this kind; at most one problem of unknown and missing columns."""
+    known = listing([example for column in columns for example in column.names], "and")
+    there = [name for row in grid.named or (grid.header,) for name in row if name]
+    present = listing(dict.fromkeys(there), "and")
+    kinds = (
+        kind
+        for kind, needed in KINDS.items()
+        if all(any(name == stem or name.startswith(f"{stem}_") for name in there) for stem in needed)
+    )
+    seems = next((f": it seems to be {kind}" for kind in kinds), "")
+    fits, column, value, expected = True, unknown[0] if unknown else None, None, ""
+    if not stems:
+        fits, column = False, None
+        expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
+        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+    elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
+        fits, end = False, seems or "; remarks go into 'note'"
+        expected = f"a table with the columns {known}; its columns are {present}{end}"
+    elif missing:
+        needed = listing(missing[0].names if len(missing) == 1 else [c.names[0] for c in missing], "and")
+        needed = needed.replace(" and ", " or ") if len(missing) == 1 else needed
+        column, value = missing[0].names[0], listing(unknown, "and") or None
         expected = f"{'a column' if len(missing) == 1 else 'columns'} {needed}; the columns are {present}"
-        problems.add(grid.source, grid.header_row, missing[0].names[0], None, expected)
-    return True
-
-
-def _seems(grid: Grid) -> str:
-    """The kind of table that it is by its columns, as a clause; nothing where it is none that is known."""
-    names = [name for name in grid.named or grid.header if name]
-    for kind, stems in KINDS.items():
-        if all(any(name == stem or name.startswith(f"{stem}_") for name in names) for stem in stems):
-            return f": it seems to be {kind}"
-    return ""
+    elif unknown:
+        what = "a known column" if len(unknown) == 1 else "known columns"
+        column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
+        expected = f"{what}: {known}; remarks go into 'note'"
+    if expected and not ("" in grid.header and missing and problems.of(grid.source)):
+        problems.add(grid.source, grid.header_row, column, value, expected)
+    return fits
 
 
 def _field(
-    grid: Grid, index: int, column: Column, unit: Unit | None, problems: Problems, *, comma: bool
+    grid: Grid, index: int, unit: Unit | None, problems: Problems, *, comma: bool, blank: bool
 ) -> Field:
     cells = tuple(row[index] for _, row in grid.rows)
-    names = tuple(grid.named[columns[index]] for columns in grid.taken)
+    names = tuple(row[index] for row in grid.named)
     name = names[0] if len(set(names)) == 1 else grid.header[index]
-    numbers = np.full(len(cells), math.nan)
-    texts = [""] * len(cells)
     # most cells of a long table say what another one has said
-    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    known: dict[Cell, str | float] = {"": ""} if blank else {}
     doubtful: set[str] = set()
     if unit is not None and not comma and grid.separator in (";", "\t"):
-        doubtful = thousands_or_decimals(
-            (cell for cell in cells if isinstance(cell, str)), grid.header[index]
-        )
+        doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), grid.header[index])
     for place, cell in enumerate(cells):
-        if cell not in known:
-            try:
-                if isinstance(cell, BadCell):
-                    raise NotANumber(cell.expected)
-                if cell in doubtful:
-                    raise NotANumber(
-                        "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
-                        "in the whole file, 1,350"
-                    )
-                known[cell] = (
-                    _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
-                )
-            except NotANumber as error:
-                own = names[place] if names else name
-                problems.add(grid.source, grid.rows[place][0], own, show(cell), str(error))
-                continue
-        value = known[cell]
-        if isinstance(value, str):
-            texts[place] = value
-        else:
-            numbers[place] = value
-    return Field(name, unit, cells, numbers, tuple(texts), names)
+        try:
+            if cell not in known:
+                known[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
+        except NotANumber as error:
+            where = names[place] if names else name
+            problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
+    values = [known.get(cell, "") for cell in cells]
+    numbers = np.array([math.nan if isinstance(value, str) else value for value in values], dtype=float)
+    texts = tuple(value if isinstance(value, str) else "" for value in values)
+    return Field(name, unit, cells, numbers, texts, names)
 
 
-def _number(cell: str | float, unit: Unit, separator: str, *, comma: bool) -> float:
+def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *, comma: bool) -> str | float:
+    """A name, or a number in SI; NotANumber says what is expected."""
+    if isinstance(cell, BadCell):
+        raise NotANumber(cell.expected)
+    if unit is None:
+        return _named(show(cell))
+    if cell in doubtful:
+        raise NotANumber(
+            "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
+            "in the whole file, 1,350"
+        )
     written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
     check_size(written)
-    value = unit.to_si(written)
-    if unit is _UNCLEAR:
-        return math.nan
-    if not math.isfinite(value):
+    value = math.nan if unit is UNCLEAR else unit.to_si(written)
+    if math.isinf(value):
         raise NotANumber("a finite number")
     return value
 
 
-def _name(text: str) -> str:
+def _named(text: str) -> str:
     if not text:
         raise NotANumber("a name")
     if text[0] in "=@":
@@ -505,3 +464,48 @@ def _name(text: str) -> str:
     if not text.isprintable():
         raise NotANumber("a name without line breaks and control characters")
     return text
+
+
+def written_steps(cells: Sequence[Cell]) -> FloatArray:
+    """Steps in which the numbers of a column are written, in its unit: 98 in 1, 0.3 in 0.1, 1.2e-3 in 1e-4.
+
+    Spreadsheets drop zeros at the end: beside 12.75 a cell with 13 means 13.00. With D the most decimals and
+    m the most significant digits of any number of the column, a number whose first digit stands at 10^e and
+    that has d decimals counts as written with max(d, min(D, m − 1 − e)) of them, 0 with D. So columns with
+    a fixed number of decimals and columns with a fixed number of significant digits both come out right as
+    soon as one number shows all its digits, and a step is never smaller than that of the instrument. Zeros
+    at the end of whole numbers are not counted as significant. A number with more than 15 digits comes from
+    a computation, and counts as it is to 12.
+
+    Parameters
+    ----------
+    cells
+        Of one column; all hold numbers. Those of a workbook have the digits that their format shows, or as
+        many as they need.
+
+    Returns
+    -------
+    ndarray
+        Shape (rows,), 10 to the power of minus the decimals.
+    """
+    texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
+    digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
+    found = np.array([digits[text] for text in texts], dtype=np.int64).reshape(-1, 3)
+    decimals, significant, first = found.T
+    most = decimals.max(initial=-99)
+    fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
+    return np.asarray(10.0 ** -np.where(significant > 0, np.maximum(decimals, fixed), most))
+
+
+def _digits(text: str) -> tuple[int, int, int]:
+    """Decimals, significant digits (none of 0), and at which power of ten the first one stands."""
+    if float(text) == 0:  # also 1e-999
+        return max(0, -int(Decimal(re.sub("[eE].*", "", text)).as_tuple().exponent)), 0, 0
+    number = Decimal(text)
+    _, digits, exponent = number.as_tuple()
+    if len(digits) > _SURE:
+        number = Decimal(f"{float(text):.12g}")
+        _, digits, exponent = number.as_tuple()
+    if int(exponent) >= 0:
+        digits = number.normalize().as_tuple().digits
+    return -int(exponent), len(digits), number.adjusted()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from rotorid.base.words import Angles as Angles
 from rotorid.base.words import Phase as Phase
 from rotorid.base.words import Rotation as Rotation
 from rotorid.base.words import View as View
-from rotorid.files.settings_keys import Said
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 ANGLES: tuple[Angles, ...] = get_args(Angles)
@@ -52,7 +51,7 @@ class Conventions:
     unstated
         Which of "phase" and "angles" neither the job nor the caller states.
     columns
-        Names that the columns of the runs tables have in the files, by their own names; None: these.
+        `job_models.Columns`: names that the columns of the runs tables have in the files; None: their own.
     speed
         Unit and number of the only speed, for runs tables without a column of speeds.
     holes
@@ -69,7 +68,7 @@ class Conventions:
     labels: Labels = field(default_factory=Labels)
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
-    columns: Said | None = None
+    columns: Any = None  # Columns of a job, which know where they stand
     speed: tuple[str, float] | None = None
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()

@@ -89,21 +89,16 @@ def parse_number(text: str, *, comma: bool = False, separator: str = "") -> floa
     NotANumber
         For everything that is not plainly a finite number; nothing is guessed.
     """
-    if _POINT.fullmatch(text):
-        if comma and "." in text:
-            raise NotANumber(
-                "a number with a decimal comma, as elsewhere in this file (a point could separate thousands)"
-            )
-        return _finite(text)
-    if has_decimal_comma(text):
-        if comma:
-            return _finite(text.replace(",", "."))
+    comma_there = has_decimal_comma(text)
+    if comma_there and not comma:
         raise NotANumber(_why_no_comma(separator))
-    raise NotANumber(_reason(text))
-
-
-def _finite(text: str) -> float:
-    value = float(text)
+    if not comma_there and _POINT.fullmatch(text) is None:
+        raise NotANumber(_reason(text))
+    if comma and "." in text:
+        raise NotANumber(
+            "a number with a decimal comma, as elsewhere in this file (a point could separate thousands)"
+        )
+    value = float(text.replace(",", "."))
     if not math.isfinite(value):
         raise NotANumber("a finite number")
     return value
@@ -135,3 +130,16 @@ def _reason(text: str) -> str:
     if _WITH_UNIT.fullmatch(text):
         return "a number alone; write the unit in the header"
     return "a number"
+
+
+def plain_number(value: object, *, comma: bool = False) -> float | None:
+    """A finite number of a size that occurs, from a number or its text (`comma`: or with one); else None."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        return None
+    try:
+        own = comma and isinstance(value, str) and has_decimal_comma(value)
+        read = parse_number(value, comma=own) if isinstance(value, str) else float(value)
+        check_size(read)
+    except (NotANumber, OverflowError):
+        return None
+    return read

@@ -10,7 +10,7 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.files.grid import BadCell, Cell, Shown, show
+from rotorid.files.cells import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576

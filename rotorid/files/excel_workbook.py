@@ -12,9 +12,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rotorid.files.grid import MOST_CELLS, BadCell, Cell, Row, Shown, clean
+from rotorid.files.cells import MOST_CELLS, BadCell, Cell, Row, Shown, clean, read_bytes
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import read_bytes
 
 SUFFIXES = (".xlsx", ".xlsm")
 MOST_UNPACKED = 200_000_000

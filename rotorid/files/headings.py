@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 from rotorid.base.suggestions import suggest
 from rotorid.files import units
+from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
-from rotorid.files.grid import MOST_ABOVE
 from rotorid.files.units import UnitError, UnitReader, one_of
 
 READING = ("amplitude", "phase")
@@ -218,7 +218,7 @@ def read_headings(
     return headings
 
 
-def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
+def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None) -> bool:
     """Whether cells are surely the header of a runs table: most of its columns, or run and speed."""
     stems = {heading.stem for heading in read_headings(cells, named)}
     stems |= set(READING) if "vector" in stems else set()
@@ -226,7 +226,7 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str]) -> bool:
 
 
 def find_header(
-    rows: Sequence[Sequence[str]], named: Mapping[str, str], *, weights: bool = False
+    rows: Sequence[Sequence[str]], named: Mapping[str, str] | None = None, *, weights: bool = False
 ) -> tuple[int, int, Sequence[str]] | None:
     """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 

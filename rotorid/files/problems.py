@@ -133,21 +133,18 @@ def _message(problems: tuple[Problem, ...]) -> str:
     for problem in problems:
         groups.setdefault((problem.file, problem.column, problem.expected), []).append(problem)
     lines: list[str] = []
-    told = 0
+    left = len(problems)
     for group in groups.values():
-        if len(lines) >= MOST_LINES:
-            break
-        if len(group) <= FEW or any(problem.row is None for problem in group):
-            shown = group[: MOST_LINES - len(lines)]
-            lines += map(str, shown)
-            told += len(shown)
-            continue
-        values = tuple(dict.fromkeys(quote(p.value) for p in group if p.value is not None))
-        lines.append(_line(group[0], _ranges([p.row for p in group if p.row is not None]), values))
-        told += len(group)
-    if told < len(problems):
-        lines.append(f"and {len(problems) - told} more problems")
-    return "\n".join(lines)
+        together = len(group) > FEW and all(problem.row is not None for problem in group)
+        for problem in () if len(lines) >= MOST_LINES or together else group[: MOST_LINES - len(lines)]:
+            lines.append(str(problem))
+            left -= 1
+        if together and len(lines) < MOST_LINES:
+            values = tuple(dict.fromkeys(quote(p.value) for p in group if p.value is not None))
+            rows = ", ".join(dict.fromkeys(str(problem.row) for problem in group[:FEW]))
+            lines.append(_line(group[0], f"rows {rows} and others ({len(group)} in all)", values))
+            left -= len(group)
+    return "\n".join([*lines, *([f"and {left} more problems"] if left else [])])
 
 
 def _line(problem: Problem, rows: str, values: tuple[str, ...]) -> str:
@@ -160,19 +157,6 @@ def _line(problem: Problem, rows: str, values: tuple[str, ...]) -> str:
     if values:
         found = f"found {', '.join(values[:FEW])}{' and so on' if len(values) > FEW else ''}, "
     return f"{', '.join(place)}: {found}expected {problem.expected}"
-
-
-def _ranges(rows: list[int]) -> str:
-    """`rows 2–5, 8`, where there are many of them their number and the first few."""
-    spans: list[list[int]] = []
-    for row in sorted(set(rows)):
-        if spans and row == spans[-1][1] + 1:
-            spans[-1][1] = row
-        else:
-            spans.append([row, row])
-    words = [f"{a}" if a == b else f"{a}–{b}" for a, b in spans[: FEW + 1]]
-    more = f" and others ({len(rows)} in all)" if len(spans) > FEW + 1 else ""
-    return f"rows {', '.join(words)}{more}"
 
 
 def printable(text: str) -> str:

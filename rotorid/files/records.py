@@ -13,8 +13,8 @@ import numpy as np
 from rotorid.base import result
 from rotorid.base.text import counted, listing
 from rotorid.base.unit_words import Shown
+from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, make_table, read_grid
-from rotorid.files.grid import Grid
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import TIME, Unit, UnitError, one_of
 

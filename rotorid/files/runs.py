@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.base.text import listing
 from rotorid.files import units
+from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
 from rotorid.files.conventions import (
     DEFAULT_TOLERANCE,
@@ -27,11 +32,9 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
-from rotorid.files.grid import Grid
 from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
-from rotorid.files.problems import Problems
-from rotorid.files.speeds import merge_speeds, same_speed, show_speed
-from rotorid.files.units import one_of
+from rotorid.files.problems import MOST_LINES, Problems
+from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
@@ -47,8 +50,30 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
-_RUNS_NAMED, _SPEEDS_NAMED = 20, 10
-"""Of runs with gaps, and of speeds that one run lacks, so many are named."""
+ROUNDING = 1e-12
+UNSAID = 0.1
+"""Per cent within which no machine keeps its speed from run to run, so that nothing need be said."""
+
+
+def same_speed(a: float, b: float, tolerance_percent: float) -> bool:
+    """Whether two speeds count as one."""
+    return abs(a - b) <= (tolerance_percent / 100.0 + ROUNDING) * max(a, b)
+
+
+def nearest_speed(speeds: FloatArray, speed: float, tolerance_percent: float) -> int | None:
+    """Which of some speeds counts as one with this one; None: none of them does."""
+    near = int(np.argmin(np.abs(speeds - speed)))
+    return near if same_speed(float(speeds[near]), speed, tolerance_percent) else None
+
+
+def show_speed(speed: float, unit: Unit) -> str:
+    """A speed in the unit of the table, for messages."""
+    return f"{speed * unit.scale:.6g} {unit.name.replace('rad_s', 'rad/s')}"
+
+
+def show_speeds(speeds: FloatArray, unit: Unit) -> str:
+    """All of some speeds in the unit of a table, for messages."""
+    return listing((show_speed(float(speed), unit) for speed in speeds), "and")
 
 
 def read_trials(
@@ -145,54 +170,122 @@ def read_runs(
     table = None if grid is None else readings_table(grid, problems)
     if table is None:
         return None, None
-    amplitude, phase = table.numbers("amplitude"), table.numbers("phase")
-    run, sensor = table.texts("run"), table.texts("sensor")
-    speed = table.numbers("speed")
+    run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start = len(problems)
     speeds, index, words = merge_speeds(table, usable, conventions.speed_tolerance_percent)
-    runs = tuple(dict.fromkeys(name for name in run if name))
-    sensors = tuple(dict.fromkeys(name for name in sensor if name))
-    run_at = {name: r for r, name in enumerate(runs)}
-    sensor_at = {name: c for c, name in enumerate(sensors)}
+    runs, sensors = (tuple(name for name in dict.fromkeys(names) if name) for names in (run, sensor))
+    run_at, sensor_at = ({name: k for k, name in enumerate(names)} for names in (runs, sensors))
     cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
     for i in usable:
         cells[run_at[run[i]], index[i], sensor_at[sensor[i]]].append(i)
     if len(problems) == start:  # with unclear speeds all the rest would be noise
-        for rows in cells.values():
-            _complain_about_repeats(table, rows)
+        _complain_about_repeats(table)
     if table.complete and len(usable) == len(table) and len(problems) == start:
-        _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions.speed_tolerance_percent)
+        _complain_about_gaps(table, (runs, speeds, sensors), cells, conventions.speed_tolerance_percent)
     if not len(problems):
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
-    words += _which_mm_s(table)
-    values = conventions.labels.vibration_from(amplitude, phase)
     repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
     order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
-    most = max((len(rows) for rows in cells.values()), default=1)
     rows = [row for own in cells.values() for row in sorted(own, key=lambda i: order[repeat[i]])]
     at = np.array([(k, *place) for place, own in cells.items() for k in range(len(own))], dtype=int).T
-    readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
-    steps = np.full((2, *readings.shape), np.nan)
-    readings[*at] = values[rows]
-    steps[:, *at] = np.array([table.steps("amplitude"), table.steps("phase")])[:, rows]
+    shape = max(map(len, cells.values()), default=1), len(runs), len(speeds), len(sensors)
+    vectors = conventions.labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    steps = np.array([table.steps("amplitude"), table.steps("phase")])
+    unit = table.unit("amplitude")
     labels = replace(
         conventions.labels,
-        vibration_unit=table.unit("amplitude").name,
-        vibration_scale=table.unit("amplitude").scale,
+        vibration_unit=unit.name,
+        vibration_scale=unit.scale,
         weight_unit="g",
         weight_scale=1e3,
         speed_unit=table.unit("speed").name,
     )
-    nothing = np.zeros((len(runs), 0), dtype=complex)
-    trials = Trials(runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=words, steps=steps)
-    if "phase_std" not in table:
-        return runs, trials
-    covariance = np.full((2, 2, *readings.shape), np.nan)
-    covariance[:, :, *at] = np.moveaxis(covariances(table, values), 0, -1)[..., rows]
-    return runs, replace(trials, covariance=covariance)
+    covariance = None
+    if "phase_std" in table:
+        covariance = _placed(np.moveaxis(covariances(table, vectors), 0, -1)[..., rows], at, shape)
+    return runs, Trials(
+        runs,
+        speeds,
+        sensors,
+        (),
+        _placed(vectors[rows], at, shape),
+        np.zeros((len(runs), 0), dtype=complex),
+        labels=labels,
+        warnings=words + _which_mm_s(table),
+        steps=_placed(steps[:, rows], at, shape),
+        covariance=covariance,
+    )
+
+
+def _placed(values: NDArray[Any], at: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Values (…, n) of rows at their places (4, n) among repeats, runs, speeds, sensors; NaN elsewhere."""
+    out = np.full((*values.shape[:-1], *shape), np.nan, dtype=values.dtype)
+    if np.iscomplexobj(out):
+        out[:] = complex(np.nan, np.nan)
+    out[..., *at] = values
+    return out
+
+
+def merge_speeds(
+    table: Table, usable: Sequence[int], tolerance_percent: float
+) -> tuple[FloatArray, dict[int, int], tuple[str, ...]]:
+    """Merge the speeds that lie within the tolerance; a merged speed is their mean.
+
+    They are those of different runs, or of the sensors of one steady run. Two such speeds of one sensor of
+    one run, and a chain of speeds whose ends are not within the tolerance, are noted as problems.
+
+    Parameters
+    ----------
+    table
+        The runs table.
+    usable
+        Indices of its rows whose run and speed can be read.
+    tolerance_percent
+        Largest difference.
+
+    Returns
+    -------
+    speeds, index, words
+        rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
+    """
+    values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
+    run, *others = (table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table)
+    distinct = sorted({float(values[row]) for row in usable})
+    breaks = [not k or not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
+    place = dict(zip(distinct, (np.cumsum(breaks) - 1).tolist(), strict=True))
+    index = {row: place[float(values[row])] for row in usable}
+    remedy = f"within the tolerance of {band:g} %; write the nominal speed, or set "
+    remedy += "speed_tolerance_percent smaller"
+    first: dict[tuple[object, ...], int] = {}
+    read: list[dict[tuple[str, float], None]] = [{} for _ in range(sum(breaks))]
+    unclear = set[tuple[int, str]]()
+    for row in usable:
+        g, one = index[row], first.setdefault((index[row], run[row], *(each[row] for each in others)), row)
+        read[g][run[row], float(values[row])] = None
+        if values[one] != values[row] and (g, run[row]) not in unclear:
+            other = table.shown("speed", one)
+            table.complain(row, "speed", f"one speed: run {run[row]!r} has {other} as well, {remedy}")
+            unclear.add((g, run[row]))
+    merged, alike = [], []
+    for g, pairs in enumerate(read):
+        speeds = sorted({speed for _, speed in pairs})
+        merged.append(float(np.mean([speed for _, speed in pairs])) if len(speeds) > 1 else speeds[0])
+        if g not in {k for k, _ in unclear} and not same_speed(speeds[0], speeds[-1], band):
+            shown = [show_speed(speed, unit) for speed in speeds]
+            chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
+            expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
+            table.as_whole(table.fields["speed"].name, expected)
+        if not same_speed(speeds[0], speeds[-1], UNSAID):
+            numbers = ", ".join(f"{speed * unit.scale:.6g}" for speed in speeds)
+            alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
+    steady = any(len(pairs) > len({name for name, _ in pairs}) for pairs in read)
+    more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
+    of = "of one run, or of different ones," if steady else "of different runs"
+    words = f"speeds {of} within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
+    return np.array(merged), index, (words,) if alike else ()
 
 
 def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
@@ -249,16 +342,19 @@ def _which_mm_s(table: Table) -> tuple[str, ...]:
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
     """Amplitudes that look like angles beside phases that look like amplitudes, unless the job names both."""
     stated = conventions.columns
-    named = {} if stated is None else {key for key, value in stated.items() if value is not None}
-    if "amplitude" in named or table.unit("phase").name != "deg" or len(table) < 4:
+    if (
+        (stated is not None and stated.has("amplitude"))
+        or table.unit("phase").name != "deg"
+        or len(table) < 4
+    ):
         return
-    amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
-    phase, written = np.degrees(table.numbers("phase")), table.steps("phase")
-    whole = np.abs(amplitude - np.round(amplitude)) < 1e-9
-    like_angles = bool(np.all(whole & (amplitude <= 360))) and np.ptp(amplitude) > 90
-    if like_angles and np.all(np.abs(phase) < 30) and np.any(written < np.radians(0.5)):
-        one, other, unit = _heading_of(table), table.fields["phase"].name, table.unit("amplitude").name
-        key = f"amplitude_{unit}" if unit else "amplitude"
+    unit = table.unit("amplitude")
+    amplitude, phase = table.numbers("amplitude") * unit.scale, np.degrees(table.numbers("phase"))
+    like_angles = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
+    small = np.all(np.abs(phase) < 30) and np.any(table.steps("phase") < np.radians(0.5))
+    if like_angles and np.ptp(amplitude) > 90 and small:
+        one, other = _heading_of(table), table.fields["phase"].name
+        key = f"amplitude_{unit.name}" if unit.name else "amplitude"
         expected = (
             "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, and "
             f'all amplitudes look like angles. If they are, state [columns] {key} = "{other}", phase_deg = '
@@ -267,59 +363,40 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
         table.as_whole(one, expected)
 
 
-def _complain_about_repeats(table: Table, rows: list[int]) -> None:
+def _complain_about_repeats(table: Table) -> None:
     """Two readings of one run, speed and sensor must say that they are repeats."""
-    first: dict[str, int] = {}
-    for row in rows if len(rows) > 1 else ():
-        label = table.texts("repeat")[row] if "repeat" in table else "the only one"
-        if label and first.setdefault(label, row) != row:
-            same = table.rows[first[label]]
-            if "repeat" in table:
-                table.complain(row, "repeat", f"another repeat than in row {same}, the same reading")
-                continue
-            expected = (
-                f"one reading per run, speed and sensor (row {same} has the same); "
-                "repeated readings need a column repeat"
-            )
-            table.complain(row, "sensor", expected)
+    stem = "repeat" if "repeat" in table else "sensor"
+    expected = "one reading per run, speed and sensor (row {} has the same); "
+    expected += "repeated readings need a column repeat"
+    if stem == "repeat":
+        expected = "another repeat than in row {}, the same reading"
+    speed = table.numbers("speed").tolist()
+    names = {s: table.texts(s) for s in ("run", "sensor", stem)}.values()
+    keys = zip(speed, *names, strict=True)
+    table.once(stem, (key if all(key) else None for key in keys), expected)
 
 
 def _complain_about_gaps(
     table: Table,
-    runs: tuple[str, ...],
-    speeds: FloatArray,
-    sensors: tuple[str, ...],
-    present: set[tuple[int, int, int]],
+    names: tuple[Sequence[str], FloatArray, Sequence[str]],
+    present: Collection[tuple[int, int, int]],
     tolerance_percent: float,
 ) -> None:
     """Every run needs every sensor at every speed: influence coefficients compare runs."""
+    runs, speeds, sensors = names
+    unit, column = table.unit("speed"), table.fields["speed"].name
+    read = {(r, s) for r, s, _ in present}
+    anywhere = {(s, c) for _, s, c in present}
+    gaps = (key for key in np.ndindex(len(runs), len(speeds), len(sensors)) if key not in present)
     if len(present) == len(runs) * len(speeds) * len(sensors):
         return
-    unit, column = table.unit("speed"), table.fields["speed"].name
-    read: list[dict[int, set[int]]] = [defaultdict(set) for _ in runs]
-    for r, s, c in present:
-        read[r][s].add(c)
-    anywhere = {(s, c) for _, s, c in present}
-    wanting = [r for r in range(len(runs)) if sum(map(len, read[r].values())) < len(speeds) * len(sensors)]
-    for r in wanting[:_RUNS_NAMED]:
-        run, at = runs[r], sorted(read[r])
-        if len(speeds) - len(at) > _SPEEDS_NAMED:
-            expected = f"readings of run {run!r} at all {len(speeds)} speeds of the runs; it has {len(at)}"
-            table.as_whole(column, expected)
-            continue
-        for s, speed in enumerate(speeds):
-            shown = show_speed(speed, unit)
-            if s not in read[r]:
-                near = min(at, key=lambda k: abs(speeds[k] - speed))
-                hint = f"; its nearest speed is {show_speed(speeds[near], unit)}"
-                if same_speed(speed, speeds[near], 10.0):
-                    hint += f", speeds count as one within {tolerance_percent:g} %"
-                table.as_whole(column, f"readings of run {run!r} at {shown}, as other runs have{hint}")
-                continue
-            for c in sorted(set(range(len(sensors))) - read[r][s]):
-                why = ", as other runs have"
-                if (s, c) not in anywhere:
-                    why = ": every run needs every sensor at every speed"
-                table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in run {run!r} at {shown}{why}")
-    if len(wanting) > _RUNS_NAMED:
-        table.as_whole(None, f"as many readings of {len(wanting) - _RUNS_NAMED} further runs")
+    for r, s, c in islice(gaps, MOST_LINES):
+        place = f"run {runs[r]!r} at {show_speed(float(speeds[s]), unit)}"
+        if (r, s) in read:
+            why = "as other runs have" if (s, c) in anywhere else "as every run needs at every speed"
+            table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in {place}, {why}")
+        elif c == 0:
+            near = min((speeds[k] for q, k in read if q == r), key=lambda speed: abs(speed - speeds[s]))
+            hint = f"as other runs have; its nearest speed is {show_speed(near, unit)}"
+            hint += f", speeds count as one within {tolerance_percent:g} %"
+            table.as_whole(column, f"readings of {place}, {hint}")

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -36,7 +38,7 @@ from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files.decimal_numbers import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.problems import Problem, Problems
-from rotorid.files.units import Unit, UnitError, UnitReader
+from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Where = Mapping[str, tuple[str, int, str]]
@@ -63,21 +65,6 @@ _WORDS = {
     "too_long": "at most {max_length:,}, not {actual_length:,}",
 }
 """What is expected, by the beginning of the type of pydantic's error."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number (or several) with the key that holds it and its unit, see `of`."""
-
-    key: str
-    value: Any
-    unit: Unit
-    wrong: str = ""
-
-    @property
-    def si(self) -> float:
-        """In SI."""
-        return self.unit.to_si(self.value)
 
 
 class of:
@@ -174,7 +161,7 @@ def key(
     )
 
 
-@dataclass
+@dataclass(eq=False)
 class _Table:
     """A table as it is written: its dotted name, keys and values, and each key by its usual name.
 
@@ -188,14 +175,18 @@ class _Table:
     model: type[Settings] | None = None
     written: dict[str, str] = field(default_factory=dict)
 
+    def __eq__(self, other: object) -> bool:
+        """Where settings stand makes no difference."""
+        return isinstance(other, _Table)
+
     def problem(self, key: str, expected: str, value: object = None) -> Problem:
         dotted = at = f"{self.name}.{key}".strip(".")
         while at and at not in self.where:
             at = at.rpartition(".")[0]
         source, row, column = self.where.get(at, (self.source, None, dotted or None))
         shown = str(value).lower() if isinstance(value, bool) else str(value)
-        hidden = value is None or isinstance(value, (dict, list, tuple))
-        return Problem(source, row, column, None if hidden else shown, expected)
+        shown = "a table" if isinstance(value, dict) else shown
+        return Problem(source, row, column, None if value is None else shown, expected)
 
     def key(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
@@ -243,6 +234,10 @@ class Settings(BaseModel):
         key = self.written(field)
         return self._table.problem(key, expected, self._table.data.get(key))
 
+    def complain(self, problems: Problems, field: str, expected: str) -> None:
+        """Note a problem with a field."""
+        problems.extend([self.problem(field, expected)])
+
     def written(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
         return self._table.key(field) or field
@@ -253,7 +248,7 @@ class Settings(BaseModel):
 
     @classmethod
     @cache
-    def keys(cls) -> dict[str, Key]:
+    def known_keys(cls) -> dict[str, Key]:
         """What is said about its fields, by the names of their keys."""
         out = {}
         for name, one in cls.model_fields.items():
@@ -265,7 +260,7 @@ class Settings(BaseModel):
     @cache
     def usual(cls, written: str) -> str:
         """The usual name of a key; of one that is not known the name itself."""
-        for usual, key in cls.keys().items():
+        for usual, key in cls.known_keys().items():
             if written in key.variants or (callable(key.units) and written.startswith(f"{usual}_")):
                 return usual
         return written
@@ -279,7 +274,7 @@ class Settings(BaseModel):
         table.model, values = cls, dict[str, Any]()
         for name, value in data.items():
             usual = cls.usual(name)
-            key = cls.keys().get(usual)
+            key = cls.known_keys().get(usual)
             read = value if key is None else key.read(name, value)
             if usual in values and isinstance(read, Quantity):
                 read = replace(read, wrong=f"one key of them; {table.written[usual]} says it already")
@@ -310,7 +305,7 @@ class Settings(BaseModel):
         schema = handler.resolve_ref_schema(handler(core))
         plain, required = schema.pop("properties", {}), schema.pop("required", [])
         schema["properties"] = properties = dict[str, Any]()
-        for usual, key in cls.keys().items():
+        for usual, key in cls.known_keys().items():
             names = list(key.variants)
             properties |= dict.fromkeys(names, plain[usual])
             if callable(key.units):
@@ -370,14 +365,13 @@ def _problems(
     """The keys that are wrong, each with the table that holds it, and the problems in our words."""
     trail: list[tuple[_Table, str, Key]] = []
     for step in error["loc"]:
-        if (table := tables.get(id(node))) is not None:
-            known = {} if table.model is None else table.model.keys()
-            trail.append((table, table.written.get(str(step), str(step)), known.get(str(step), Key())))
-            step = trail[-1][1]
-        try:
-            node = node[step]
-        except (LookupError, TypeError):
-            break
+        table = tables.get(id(node), _Table())
+        name = table.written.get(str(step), step)
+        if name in table.data or (error["type"] == "missing" and table.model):
+            known = {str(step): trail[-1][2]} if table.model is None else table.model.known_keys()
+            trail.append((table, str(name), known.get(str(step), Key())))
+        with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
+            node = node[name]
     wrong = error.get("ctx", {}).get("error")
     if isinstance(wrong, _DoNotFit):
         table = wrong.table
@@ -399,7 +393,7 @@ def _problems(
 def _expected(error: ErrorDetails, table: _Table, name: str, key: Key) -> str:
     kind = error["type"]
     if kind == "extra_forbidden" and table.model is not None:
-        known = [one for key in table.model.keys().values() for one in key.names]
+        known = [one for key in table.model.known_keys().values() for one in key.names]
         return f"a known key{did_you_mean(name, known)}; known are {listing(known, 'and') or 'none yet'}"
     if kind == "value_error":
         words = str(error["ctx"]["error"])
@@ -438,7 +432,7 @@ def _parts(value: object) -> object:
     return tuple(value) if isinstance(value, list) else (value,)
 
 
-def _entries(value: object) -> object:
+def entries(value: object) -> object:
     """A table, or a text such as `3: 10; 5: 20`."""
     if not isinstance(value, str):
         return value
@@ -477,17 +471,18 @@ Label = Annotated[
 Date = Annotated[datetime.date, BeforeValidator(_day, json_schema_input_type=datetime.date)]
 
 
-def listed(inner: Any) -> Any:  # noqa: ANN401  an annotation
-    """The type of a list that may also be one value, or a text of values with semicolons."""
+def listed(inner: Any, check: Callable[[Any], Any] = tuple) -> Any:  # noqa: ANN401  an annotation
+    """The type of a list, checked, that may also be one value, or a text of values with semicolons."""
     several = Field(min_length=1)
     written = inner | Annotated[list[inner], several] | str
-    return Annotated[tuple[inner, ...], BeforeValidator(_parts, json_schema_input_type=written), several]
+    parts = BeforeValidator(_parts, json_schema_input_type=written)
+    return Annotated[tuple[inner, ...], parts, several, AfterValidator(check)]
 
 
 def by_name(inner: Any) -> Any:  # noqa: ANN401
     """The type of a table of values by name that may also be a text, such as `3: 10; 5: 20`."""
     table = Annotated[dict[str, inner], Field(min_length=1)]
-    return Annotated[table, BeforeValidator(_entries, json_schema_input_type=table | str)]
+    return Annotated[table, BeforeValidator(entries, json_schema_input_type=table | str)]
 
 
 def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:

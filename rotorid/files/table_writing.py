@@ -6,9 +6,9 @@ import errno
 import math
 import os
 import stat
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rotorid.base import logs
 from rotorid.base.tables import Value, csv_bytes, one_line
@@ -40,21 +40,19 @@ def write_table(path: str | Path, frame: pd.DataFrame) -> None:
     write_bytes(Path(path), table_bytes(path, frame))
 
 
-def table_bytes(
-    path: str | Path, frame: pd.DataFrame, *, comments: Sequence[str] = (), sheet: str = "table"
-) -> bytes:
-    """What `write_table` writes to a file of this name, with comment lines above the header."""
+def table_bytes(path: str | Path, frame: pd.DataFrame, *, sheet: str = "table") -> bytes:
+    """What `write_table` writes to a file of this name."""
     path = Path(path)
     kind = path.suffix.lower()
-    names = [str(name) for name in frame.columns]
+    names = [*map(str, frame.columns)]
     plain = frame.astype(object).where(frame.notna(), None)  # the blanks of all kinds of columns
-    columns = [plain.iloc[:, index].tolist() for index in range(len(names))]
-    rows = [[_plain(value) for value in row] for row in zip(*columns, strict=True)]
+    cells: list[list[Any]] = plain.to_numpy().tolist()
+    rows = [[_plain(value) for value in row] for row in cells]
     if kind == ".csv":
-        return csv_bytes(comments, names, rows)
+        return csv_bytes((), names, rows)
     if kind == ".xlsx":
-        lines = [*((f"# {comment}",) for comment in comments), names, *rows]
-        page = [tuple(one_line(cell) if isinstance(cell, str) else cell for cell in line) for line in lines]
+        lines: list[list[Value]] = [[*names], *rows]
+        page = [tuple(one_line(c) if isinstance(c, str) else c for c in line) for line in lines]
         return book_bytes([Page(sheet, page)], sheet)
     raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 

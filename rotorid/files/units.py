@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi, sqrt
+from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -39,6 +40,22 @@ class Unit:
     def to_si(self, value: float) -> float:
         """A number written in this unit, in SI."""
         return value * self.multiply / self.divide
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number (or several) with the key or option that holds it and its unit."""
+
+    key: str
+    value: Any
+    unit: Unit
+    wrong: str = ""
+    """What is expected of the unit where it is none."""
+
+    @property
+    def si(self) -> float:
+        """In SI."""
+        return self.unit.to_si(self.value)
 
 
 class UnitError(ValueError):
@@ -100,7 +117,10 @@ FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (_POUND_FORCE
 TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "min": (60.0, 1.0)})
 VELOCITY = _table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)})
 VISCOSITY = _table("viscosity", {"Pa_s": (1.0, 1.0), "mPa_s": (1.0, 1e3), "cP": (1.0, 1e3)})
-CUBIC_STIFFNESS = _table("cubic stiffness", {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0)})
+CUBIC_STIFFNESS = _table(
+    "cubic stiffness",
+    {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0), "lbf_per_in3": (_POUND_FORCE * 1e12, 254.0**3)},
+)
 
 _PEAK = {
     **LENGTH,

@@ -21,8 +21,8 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.words import Phase
 from rotorid.files import units
+from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase
-from rotorid.files.grid import Grid
 from rotorid.files.instruments import Sampled, read_samples, refusal
 from rotorid.files.problems import InputError, Problems, TableWarning
 from rotorid.files.settings import (

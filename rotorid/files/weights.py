@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import REMARKS, Column, Source, make_table
-from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.grid import Cell, Grid, show
-from rotorid.files.headings import Heading, read_headings, read_unit, readable
-from rotorid.files.layout import NUMBER, Unclear, open_table, vector_in
+from rotorid.files.cells import Grid, show
+from rotorid.files.columns import Column, Source, Table, make_table, read_grid
+from rotorid.files.conventions import Conventions
+from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.headings import find_header, read_headings
+from rotorid.files.layout import NUMBER, WEIGHT, explained, is_long, long_rows
 from rotorid.files.problems import Problems
-from rotorid.files.units import Unit, one_of
+from rotorid.files.units import Unit, UnitError, one_of
 
 COLUMNS = (
     Column("run"),
@@ -35,7 +37,10 @@ COLUMNS = (
     Column("unbalance", one_of(units.UNBALANCE), ("unbalance_g_mm", "unbalance_oz_in"), required=False),
     Column("angle", one_of(units.ANGLE), ("angle_deg",)),
 )
-_SIZE = re.compile(rf"({NUMBER})\s*([^\W\d_].*)?")
+_PLACES = ("angle", "hole", "clock")
+"""Columns that say where a weight is; the first that is filled in counts."""
+_BESIDE = (*_PLACES[1:], "action", "unit", "pieces")
+_PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
@@ -67,247 +72,166 @@ def read_weights(
     problems
         Collects the complaints.
     """
-    grid = open_table(source, {}, problems, weights=True)
+    find = partial(find_header, weights=True)
+    grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     if grid is None:
         return None
-    try:
-        grid = _tidied(grid, runs, conventions)
-    except Unclear as reason:
-        problems.add(grid.source, reason.row or grid.header_row, reason.column, reason.value, str(reason))
-        return None
-    table = make_table(grid, COLUMNS, problems)
+    before, angle_unit = len(problems), ""
+    with explained(grid, problems):
+        grid, angle_unit = _long(grid, conventions)
+    one = runs is not None and len(runs) == 1  # whose name need not stand there
+    there = {name.partition("_")[0] for name in grid.header}
+    columns = [
+        replace(c, unit=None, blank=True, required=there.isdisjoint(_PLACES)) if c.stem == "angle" else c
+        for c in COLUMNS
+    ]
+    columns[0] = replace(columns[0], required=not one)
+    columns[2] = replace(columns[2], required=there.isdisjoint(("mass", "unbalance")))
+    columns += [Column(stem, required=False, blank=True) for stem in _BESIDE if stem in there]
+    table = make_table(grid, columns, problems) if len(problems) == before else None
     if table is None:
         return None
-    missing = "one column of weights, mass_<unit> or unbalance_<unit>, such as mass_g or unbalance_g_mm"
     several = "one column of weights, mass_<unit> or unbalance_<unit>, not both"
-    what = table.only(("mass", "unbalance"), "mass_g", missing, several)
+    what = table.only(("mass", "unbalance"), "mass_g", several)
     if what is None:
         return None
-    size, angle = table.numbers(what), table.numbers("angle")
+    size, plane = table.numbers(what), table.texts("plane")
     table.must_be(
         what,
         size > 0,
         "a weight above 0 (a run without weights has no row here; what was removed is a weight 180° away)",
     )
-    table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
-    run, plane = table.texts("run"), table.texts("plane")
+    known = {name.casefold(): name for name in runs or ()} | {name: name for name in runs or ()}
+    names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
+    run = [known.get(name, known.get(name.casefold(), name)) for name in names]
+    try:
+        unit = one_of(units.ANGLE)(angle_unit) if angle_unit else None
+    except UnitError as error:
+        name = table.fields["angle"].name
+        problems.add(table.source, table.header_row, name, name, str(error))
+        return None
+    angle = _angles(table, conventions, unit)
     planes = tuple(dict.fromkeys(name for name in plane if name))
     values = conventions.labels.weight_from(size, angle)
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
     seen: dict[tuple[str, str, complex], int] = {}
     for i in range(len(table)):
         if runs is not None and run[i] and run[i] not in runs:
-            expected = (
-                f"a run of the runs table{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
-            )
-            table.complain(i, "run", expected)
+            hint = f"{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
+            table.complain(i, "run", f"a run of the runs table{hint}")
         elif run[i] and plane[i] and size[i] > 0 and np.isfinite(angle[i]):
             first = seen.setdefault((run[i], plane[i], complex(values[i])), i)
             if first != i:
-                table.complain(i, "run", f"each weight once (row {table.rows[first]} says the same)")
+                stem = "run" if "run" in table else "plane"
+                table.complain(i, stem, f"each weight once (row {table.rows[first]} says the same)")
             elif runs is not None:
                 total[runs.index(run[i]), planes.index(plane[i])] += values[i]
     return Weights(planes, total, table.unit(what), tuple(seen))
 
 
-def _tidied(grid: Grid, runs: Sequence[str] | None, conventions: Conventions) -> Grid:
-    """The table with the columns run, plane, mass or unbalance with its unit, and angle_deg."""
-    grid = _by_row(grid, read_headings(grid.header, weights=True))
+def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
+    """The table with one row a weight, as far as its columns are clear, and the unit of its angles."""
     headings = read_headings(grid.header, weights=True)
-    by = {heading.stem: heading for heading in headings if heading.stem not in ("", "note")}
-    known = [heading for heading in headings if heading.stem not in ("", "note")]
-    size = by.get("mass") or by.get("unbalance")
-    if len(by) < len(known) or "plane" not in by or size is None or {"mass", "unbalance"} <= set(by):
-        return grid
-    columns: dict[str, tuple[Heading, list[Cell]]] = {}
-    grid, size = _filled(grid, by, size)
-
-    def cells(heading: Heading) -> list[Cell]:
-        return [row[heading.index] for _, row in grid.rows]
-
-    if "run" in by:
-        folded = {name.casefold(): name for name in runs or ()}
-        names = [show(cell) for cell in cells(by["run"])]
-        columns["run"] = by["run"], [n if n in (runs or ()) else folded.get(n.casefold(), n) for n in names]
-    elif runs is not None and len(runs) == 1:
-        columns["run"] = by["plane"], [runs[0]] * len(grid.rows)
-    columns["plane"] = by["plane"], cells(by["plane"])
-    name, sizes, beside = _sizes(grid, size, by.get("unit"))
-    columns[name] = size, sizes
-    if {"angle", "hole", "clock"} & set(by) or any(beside):
-        place = by.get("angle") or by.get("hole") or by.get("clock") or size
-        unit, angles = _angles(grid, by, beside, conventions)
-        columns[f"angle_{unit}" if unit else "angle"] = place, angles
-    for heading in headings:
-        if heading.stem in ("", "note") and heading.name:
-            remark = heading.stem == "note" and not heading.name.casefold().startswith(REMARKS)
-            columns[f"note {heading.name}" if remark else heading.name] = heading, cells(heading)
-    places = [heading.index for heading, _ in columns.values()]
-    rows, width = zip(*(column for _, column in columns.values()), strict=True), len(grid.header)
-    return replace(
+    stems = [heading.stem for heading in headings if heading.stem not in ("", "note")]
+    sizes = {"mass", "unbalance"} & {*stems}
+    wide = "plane" not in stems and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
+    if len(sizes) == 1 and (wide or ("plane" in stems and len({*stems}) == len(stems))):
+        [size] = sizes
+        headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
+        if "unit" in stems:
+            grid = _with_units(grid, {h.stem: h.index for h in headings})
+        if not is_long(grid, headings, {"plane", "mass"}) or "unit" in stems:
+            headings = headings if wide else [replace(h, sensor="") for h in headings]
+            grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
+            grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
+    header = [name.partition("_") for name in grid.header]
+    places = {k for k, (stem, *_) in enumerate(header) if stem in _PLACES}
+    told = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
+    filled = [k for k, (stem, *_) in enumerate(header) if stem in told]
+    kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in filled)]
+    rows = ((n, tuple(show(c) if k in places else c for k, c in enumerate(r))) for n, r in grid.rows)
+    every = tuple(rows)
+    names = ("angle" if part[0] == "angle" else name for name, part in zip(grid.header, header, strict=True))
+    named = grid.named or (grid.header,) * len(every)
+    grid = replace(
         grid,
-        header=tuple(columns),
-        rows=tuple((number, row) for (number, _), row in zip(grid.rows, rows, strict=True)),
-        named=grid.named or grid.header,
-        taken=tuple(tuple(row[k] for k in places) for row in grid.taken or [range(width)] * len(grid.rows)),
+        header=tuple(names),
+        rows=tuple(every[k] for k in kept),
+        named=tuple(named[k] for k in kept),
     )
+    return grid, next((unit for stem, _, unit in header if stem == "angle"), "")
 
 
-def _by_row(grid: Grid, headings: Sequence[Heading]) -> Grid:
-    """A table with columns for each plane, `P1 weight (g), P1 angle (deg), …`, as one row a weight."""
-    planes: dict[str, dict[str, Heading]] = {}
-    for heading in headings:
-        if heading.stem in ("mass", "unbalance", "angle") and heading.sensor and heading.unit:
-            planes.setdefault(heading.sensor, {})[heading.stem] = heading
-    kinds = {tuple(sorted((stem, own.unit) for stem, own in each.items())) for each in planes.values()}
-    if len(planes) < 2 or len(kinds) > 1 or "plane" in {heading.stem for heading in headings}:
-        return grid
-    used = {own.index for each in planes.values() for own in each.values()}
-    others = [heading for heading in headings if heading.index not in used]
-    [kind] = kinds
-    rows, taken = [], []
-    for number, cells in grid.rows:
-        for plane, own in planes.items():
-            places = [own[stem].index for stem, _ in kind]
-            if any(show(cells[place]) for place in places):
-                rows.append((number, (*(cells[h.index] for h in others), plane, *(cells[k] for k in places))))
-                taken.append((*(h.index for h in others), places[0], *places))
-    header = (*(h.name for h in others), "plane", *(f"{stem} ({unit})" for stem, unit in kind))
-    return replace(grid, header=header, rows=tuple(rows), named=grid.header, taken=tuple(taken))
+def _with_units(grid: Grid, at: Mapping[str, int]) -> Grid:
+    """The table with the units of a column `unit` behind its weights."""
+    rows = []
+    for number, row in grid.rows:
+        cell = f"{show(row[at['mass']])} {show(row[at['unit']])}".strip()
+        rows.append((number, (*row[: at["mass"]], cell, *row[at["mass"] + 1 :])))
+    return replace(grid, rows=tuple(rows))
 
 
-def _filled(grid: Grid, by: Mapping[str, Heading], size: Heading) -> tuple[Grid, Heading]:
-    """The table without a row of units below the header, and without rows of runs that had no weight."""
-    filled = [
-        k for k, (_, row) in enumerate(grid.rows) if any(show(row[by[s].index]) for s in by if s != "run")
-    ]
-    top = grid.rows[filled[0]][1] if filled else ()
-    unit = show(top[size.index]).strip("()[] ") if filled else ""
-    named = any(show(top[by[stem].index]) for stem in ("run", "plane") if filled and stem in by)
-    if unit and not named and not size.unit and readable("mass", unit):
-        size, filled = replace(size, unit=unit, tidy=False), filled[1:]
-    rows = tuple(grid.rows[k] for k in filled)
-    return replace(grid, rows=rows, taken=tuple(grid.taken[k] for k in filled if grid.taken)), size
+def _size_name(name: str, size: str) -> str:
+    """The name of the column of weights: mass or unbalance, as its unit says."""
+    stem, _, unit = name.partition("_")
+    if stem != "mass":
+        return name
+    kind = units.WEIGHT[unit].kind if unit in units.WEIGHT else size
+    return f"{kind}_{unit}" if unit else kind
 
 
-def _sizes(grid: Grid, size: Heading, unit_column: Heading | None) -> tuple[str, list[Cell], list[str]]:
-    """The name of the column of weights, its numbers, and angles that stand in the same cells."""
-    heading_unit = size.unit
-    if not size.tidy and heading_unit:
-        if not readable("mass", heading_unit):
-            raise Unclear(f"a unit of weight ({listing(units.MASS)}, g_mm, oz_in …)", size)
-        heading_unit = read_unit("mass", heading_unit)[0]
-    out: list[Cell] = []
-    angles: list[str] = []
-    own: list[str] = []
-    for _, row in grid.rows:
-        cell = row[size.index]
-        vector = vector_in(cell)
-        text, angle = (vector[0].strip(), vector[1]) if vector and vector[2] else (cell, "")
-        angles.append(angle)
-        match = _SIZE.fullmatch(text) if isinstance(text, str) else None
-        unit = "" if unit_column is None else show(row[unit_column.index])
-        unit = (match[2] if match else None) or unit
-        sure = bool(unit) and readable("mass", unit)
-        out.append(match[1] if match and sure else text)
-        own.append(read_unit("mass", unit)[0] if sure else "")
-    usual = heading_unit or next(filter(None, own), "")
-    for k, (number, row) in enumerate(grid.rows):
-        if own[k] not in ("", usual):
-            ours, theirs = units.weight(usual), units.weight(own[k])
-            text = show(out[k]).replace(",", ".") if grid.separator != "," else show(out[k])
-            if ours.kind != theirs.kind or not re.fullmatch(r"[0-9]+\.?[0-9]*", text):
-                raise Unclear(
-                    f"a weight in {usual}, as the others, or in a unit that converts to it",
-                    size,
-                    number,
-                    row[size.index],
-                )
-            out[k] = theirs.to_si(float(text)) * ours.scale
-        elif not own[k] and not heading_unit and usual and out[k] != "":
-            raise Unclear(f"a weight with its unit, as {usual} in other cells", size, number, row[size.index])
-    try:
-        stem = units.weight(usual).kind if usual else size.stem
-    except units.UnitError:
-        stem = size.stem
-    return (f"{stem}_{usual}" if usual else stem), out, angles
+def _angles(table: Table, conventions: Conventions, unit: Unit | None) -> FloatArray:
+    """Angle of each weight, rad; NaN and a problem where there is none."""
+    angle, plain = np.full(len(table), math.nan), np.zeros(len(table), dtype=bool)
+    places = [stem for stem in _PLACES if stem in table]
+    for i in range(len(table)):
+        stem = next((stem for stem in places if table.texts(stem)[i]), places[0])
+        written = table.texts(stem)[i]
+        try:
+            degrees = _by_name(table, i, stem, written, conventions)
+            plain[i] = degrees is None
+            if degrees is None:
+                degrees = parse_number(written.replace(",", ".") if _PLAIN.fullmatch(written) else written)
+            angle[i] = degrees
+        except NotANumber as error:
+            table.complain(i, stem, str(error))
+    largest = np.abs(angle[plain]).max(initial=0.0, where=np.isfinite(angle[plain]))
+    if unit is None and 0 < largest <= math.tau:
+        name = table.fields["angle"].name
+        table.problems.add(
+            table.source, table.header_row, name, name, f"its unit too, such as '{name} (deg)'"
+        )
+    half = np.where(plain & (unit == units.ANGLE["rad"]), math.pi, 180.0)
+    wrong = np.abs(angle) > 2 * half
+    table.complain_where(wrong, places[0], "an angle from -360 to 360 degrees")
+    for i, action in enumerate(table.texts("action") if "action" in table else ()):
+        if action.casefold() in ("remove", "removed"):
+            angle[i] = (angle[i] + half[i]) % (2 * half[i])
+        elif action.casefold() not in ("", "add", "added"):
+            table.complain(i, "action", "add or remove")
+    return np.where(wrong, math.nan, angle * math.pi / half)
 
 
-def _angles(
-    grid: Grid, by: Mapping[str, Heading], beside: Sequence[str], conventions: Conventions
-) -> tuple[str, list[Cell]]:
-    """The unit of the angles, and their cells."""
-    column = by.get("angle")
-    unit = "" if column is None else column.unit
-    if column is not None and not column.tidy and unit and readable("phase", unit):
-        unit = read_unit("phase", unit)[0]
-    out: list[Cell] = []
-    plain, told = [], False
-    for (number, row), text in zip(grid.rows, beside, strict=True):
-        heading, cell = column, (row[column.index] if column is not None else text)
-        angle: Cell | None = None
-        if show(cell) == "":
-            heading = next((by[stem] for stem in ("hole", "clock") if stem in by), column)
-            cell = "" if heading is None else row[heading.index]
-        written = show(cell)
-        match = _ANGLE.fullmatch(written)
-        if match:
-            angle, told = match[1], True
-        elif heading is not None and written:
-            angle = _by_name(written, heading, row, by, conventions, number)
-            told = told or angle is not None
-        if angle is None:
-            angle = cell
-            plain.append(written.replace(",", "."))
-        if "action" in by:
-            angle = _turned(angle, row[by["action"].index], by["action"], number)
-        out.append(angle)
-    if not unit and (column is None or not column.tidy or told):
-        numbers = [abs(float(text)) for text in plain if re.fullmatch(r"[+-]?[0-9]+\.?[0-9]*", text)]
-        if any(number > math.tau for number in numbers) or not any(numbers):
-            unit = "deg"
-        elif column is not None:
-            raise Unclear(f"its unit too, such as '{column.name} (deg)'", column)
-    return unit or ("" if column is not None else "deg"), out
-
-
-def _by_name(
-    written: str,
-    heading: Heading,
-    row: Sequence[Cell],
-    by: Mapping[str, Heading],
-    conventions: Conventions,
-    number: int,
-) -> float | None:
-    """The angle in degrees of a clock, a hole, a blade or a position; None: it is a number of the angle."""
+def _by_name(table: Table, i: int, stem: str, written: str, conventions: Conventions) -> float | None:
+    """The angle in degrees of 90°, a clock, a hole, a blade or a position; None: a number of the angle."""
+    if match := _ANGLE.fullmatch(written):
+        return parse_number(match[1].replace(",", "."))
     clock = _CLOCK.fullmatch(written)
-    if clock and (heading.stem == "clock" or ":" in written or not written[-1:].isdigit()):
+    if clock and (stem == "clock" or ":" in written or not written[-1:].isdigit()):
         return (30.0 * int(clock[1]) + int(clock[2] or 0) / 2.0) % 360.0
     match = _HOLE.fullmatch(written)
-    if heading.stem == "clock":
-        raise Unclear("a time of the clock face, such as 10:20", heading, number, written)
-    if heading.stem != "hole" and match is None:
+    if stem == "clock" and written:
+        raise NotANumber("a time of the clock face, such as 10:20")
+    if not written or (stem != "hole" and match is None):
         return None
-    hole, plane = match[1] if match else written, show(row[by["plane"].index])
+    hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:
         keys = f"[planes.{plane}] holes = 12 or holes_deg = [0, 30, 75]"
-        raise Unclear(f"an angle, or the holes of the plane in the job, {keys}", heading, number, written)
+        raise NotANumber(f"an angle, or the holes of the plane in the job, {keys}")
     if hole not in holes:
-        expected = f"a hole of plane {plane!r}{did_you_mean(hole, holes)}; it has {listing(holes, 'and')}"
-        raise Unclear(expected, heading, number, written)
-    if plane in conventions.removed and "action" not in by:
-        expected = f"a column action with add or remove: material is taken away from plane {plane!r}"
-        raise Unclear(expected, heading, number, written)
+        hint = f"{did_you_mean(hole, holes)}; it has {listing(holes, 'and')}"
+        raise NotANumber(f"a hole of plane {plane!r}{hint}")
+    if plane in conventions.removed and "action" not in table:
+        raise NotANumber(f"a column action with add or remove: material is taken away from plane {plane!r}")
     return holes[hole]
-
-
-def _turned(angle: Cell, action: Cell, heading: Heading, number: int) -> Cell:
-    """An angle, 180° away where material was removed there."""
-    word = show(action).casefold()
-    if word in ("", "add", "added"):
-        return angle
-    if word not in ("remove", "removed"):
-        raise Unclear("add or remove", heading, number, action)
-    text = show(angle)
-    return (float(text) + 180.0) % 360.0 if re.fullmatch(r"[+-]?[0-9]+\.?[0-9]*", text) else angle

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rotorid.files import units
-from rotorid.files.settings_keys import Quantity
+from rotorid.files.units import Quantity
 
 
 def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:

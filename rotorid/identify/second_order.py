@@ -49,7 +49,8 @@ def second_order(  # noqa: PLR0913
         What is measured; by default the displacements.
     names
         Names of the displacements, y1, y2, … by default; the velocity of y1 is v_y1. The states are
-        y1, v_y1, y2, v_y2, …
+        y1, v_y1, y2, v_y2, …; a displacement of which row and column of M are 0 is a state alone, of which
+        C holds the rate.
 
     Raises
     ------
@@ -86,12 +87,14 @@ def second_order(  # noqa: PLR0913
     if len(dofs) != n:
         raise ValueError(f"{n} names of displacements are needed, not {len(dofs)}")
     check_known("force", force, "displacement", dofs)
-    rates = [f"v_{dof}" for dof in dofs]
+    light = {i for i in range(n) if {*m[i], *(row[i] for row in m)} == {"0"}}
+    rates = {i: f"v_{dof}" for i, dof in enumerate(dofs) if i not in light}
     states: dict[str, str] = {}
-    for dof, *row in zip(dofs, c, k, strict=True):
-        terms = zip([*row[0], *row[1]], [*rates, *dofs], strict=True)
+    for i, dof in enumerate(dofs):
+        terms = [*((c[i][j], rate) for j, rate in rates.items()), *zip(k[i], dofs, strict=True)]
         products = [f"({value})*{name}" for value, name in terms if value != "0"]
-        states |= {dof: f"v_{dof}", f"v_{dof}": " - ".join([f"({force.get(dof, 0)})", *products])}
+        rate = " - ".join([f"({force.get(dof, 0)})", *products])
+        states |= {dof: rate} if i in light else {dof: rates[i], rates[i]: rate}
     plain = ode_model(
         states,
         estimate=estimate,
@@ -102,12 +105,19 @@ def second_order(  # noqa: PLR0913
         bounds=bounds,
         per_record=per_record,
     )
-    inertia = sympy.eye(2 * n)
+    places = [*states]
+    inertia = sympy.eye(len(states))
     for i, j in np.ndindex(n, n):
-        where = f"mass matrix, row {i + 1}"
-        inertia[2 * i + 1, 2 * j + 1] = read_expression(m[i][j], where, estimate, plain.known)
+        # forces of the rates of what has a mass stand on the right, those of the others here
+        entries, what = (c, "damping") if j in light else (m, "mass")
+        if i not in light or j in light:
+            row, column = (
+                places.index(x if at in light else f"v_{x}") for at, x in ((i, dofs[i]), (j, dofs[j]))
+            )
+            where = f"{what} matrix, row {i + 1}"
+            inertia[row, column] = read_expression(entries[i][j], where, estimate, plain.known)
     model = replace(plain, inertia=tuple(inertia))
-    model.augmented(0.0, np.zeros((2 * n, 1)), model.start, np.zeros(len(inputs)))  # a singular mass matrix
+    model.augmented(0.0, np.zeros((len(states), 1)), model.start, np.zeros(len(inputs)))  # a singular mass matrix
     return model
 
 

@@ -15,10 +15,10 @@ from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.files import units
 from rotorid.files.problems import InputError, Problems
+from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings import (
     NotNegative,
     Positive,
-    Quantity,
     Settings,
     Text,
     Turn,
@@ -30,7 +30,7 @@ from rotorid.files.settings import (
     read_settings,
 )
 from rotorid.files.toml_file import read_toml
-from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
+from rotorid.files.units import Quantity
 
 if TYPE_CHECKING:
     from fem import Rotor

@@ -13,7 +13,16 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
     from rotorid.files.conventions import StatedErrors as StatedErrors
+    from rotorid.files.influence import influence_frame as influence_frame
+    from rotorid.files.influence import read_influence as read_influence
+    from rotorid.files.influence import write_influence as write_influence
+    from rotorid.files.job import Job as Job
+    from rotorid.files.job import job_from_files as job_from_files
+    from rotorid.files.job import read_job as read_job
     from rotorid.files.measurements import read_measurements as read_measurements
+    from rotorid.files.model import HarmonicFile as HarmonicFile
+    from rotorid.files.model import read_harmonic_model as read_harmonic_model
+    from rotorid.files.model import read_ode_model as read_ode_model
     from rotorid.files.modes import MeasuredModes as MeasuredModes
     from rotorid.files.modes import read_compliance as read_compliance
     from rotorid.files.modes import read_modes as read_modes
@@ -21,23 +30,14 @@ if TYPE_CHECKING:
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
     from rotorid.files.records import read_record as read_record
+    from rotorid.files.rotor import read_rotor as read_rotor
+    from rotorid.files.rotor import rotor_files as rotor_files
+    from rotorid.files.rotor_writing import write_rotor as write_rotor
     from rotorid.files.runs import read_trials as read_trials
+    from rotorid.files.small_model import read_small_model as read_small_model
     from rotorid.files.table_writing import write_table as write_table
-    from rotorid.tables.job.job_file import Job as Job
-    from rotorid.tables.job.job_file import job_from_files as job_from_files
-    from rotorid.tables.job.job_file import read_job as read_job
-    from rotorid.tables.models.harmonic_file import HarmonicFile as HarmonicFile
-    from rotorid.tables.models.harmonic_file import read_harmonic_model as read_harmonic_model
-    from rotorid.tables.models.ode_file import read_ode_model as read_ode_model
-    from rotorid.tables.models.small_model_file import read_small_model as read_small_model
-    from rotorid.tables.rotor.bow_table import read_bow as read_bow
-    from rotorid.tables.rotor.rotor_file import read_rotor as read_rotor
-    from rotorid.tables.rotor.rotor_file import rotor_files as rotor_files
-    from rotorid.tables.rotor.rotor_writing import write_rotor as write_rotor
-    from rotorid.tables.rotor.unbalance_table import read_unbalance as read_unbalance
-    from rotorid.tables.runs.influence_table import influence_frame as influence_frame
-    from rotorid.tables.runs.influence_table import read_influence as read_influence
-    from rotorid.tables.runs.influence_table import write_influence as write_influence
+    from rotorid.files.unbalance import read_bow as read_bow
+    from rotorid.files.unbalance import read_unbalance as read_unbalance
 
 _HOME = {
     "read_measurements": ".files.measurements",
@@ -45,25 +45,25 @@ _HOME = {
     "read_compliance": ".files.modes",
     "read_modes": ".files.modes",
     "read_record": ".files.records",
-    "Job": "job.job_file",
-    "job_from_files": "job.job_file",
-    "read_job": "job.job_file",
-    "HarmonicFile": "models.harmonic_file",
-    "read_harmonic_model": "models.harmonic_file",
-    "read_ode_model": "models.ode_file",
-    "read_small_model": "models.small_model_file",
+    "Job": ".files.job",
+    "job_from_files": ".files.job",
+    "read_job": ".files.job",
+    "HarmonicFile": ".files.model",
+    "read_harmonic_model": ".files.model",
+    "read_ode_model": ".files.model",
+    "read_small_model": ".files.small_model",
     "InputError": ".files.problems",
     "Problem": ".files.problems",
     "TableWarning": ".files.problems",
     "write_table": ".files.table_writing",
-    "read_bow": "rotor.bow_table",
-    "read_rotor": "rotor.rotor_file",
-    "rotor_files": "rotor.rotor_file",
-    "write_rotor": "rotor.rotor_writing",
-    "read_unbalance": "rotor.unbalance_table",
-    "influence_frame": "runs.influence_table",
-    "read_influence": "runs.influence_table",
-    "write_influence": "runs.influence_table",
+    "read_bow": ".files.unbalance",
+    "read_rotor": ".files.rotor",
+    "rotor_files": ".files.rotor",
+    "write_rotor": ".files.rotor_writing",
+    "read_unbalance": ".files.unbalance",
+    "influence_frame": ".files.influence",
+    "read_influence": ".files.influence",
+    "write_influence": ".files.influence",
     "Conventions": ".files.conventions",
     "StatedErrors": ".files.conventions",
     "read_trials": ".files.runs",

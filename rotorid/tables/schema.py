@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
+from rotorid.files.job_models import JobSettings
+from rotorid.files.rotor import RotorFile
 from rotorid.files.settings import Settings, settings_schema
-from rotorid.files.settings_keys import Key, file_schema
+from rotorid.files.small_model import SmallModelFile
 from rotorid.files.waveforms import WaveformsFile
-from rotorid.tables.job.job_keys import JOB
-from rotorid.tables.models.small_model_file import SMALL_MODEL
-from rotorid.tables.rotor.rotor_file import ROTOR
 
-FILES: dict[str, tuple[str, Sequence[Key] | type[Settings]]] = {
-    "job": ("Job file of rotorid", JOB),
-    "rotor": ("Rotor file of rotorid", ROTOR),
-    "small": ("Small model for motion of rotorid", SMALL_MODEL),
+FILES: dict[str, tuple[str, type[Settings]]] = {
+    "job": ("Job file of rotorid", JobSettings),
+    "rotor": ("Rotor file of rotorid", RotorFile),
+    "small": ("Small model for motion of rotorid", SmallModelFile),
     "waveforms": ("Waveforms file of rotorid", WaveformsFile),
 }
 """What the file is, and its keys, by the names that `rotorid schema` takes."""
@@ -36,4 +34,4 @@ def schema(kind: str) -> dict[str, Any]:
         For another kind.
     """
     title, keys = FILES[one_of(kind, "schema", list(FILES))]
-    return settings_schema(keys, title) if isinstance(keys, type) else file_schema(keys, title)
+    return settings_schema(keys, title)

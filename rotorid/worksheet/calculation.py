@@ -87,17 +87,16 @@ def _balance(job: str, version: int, kind: str) -> Balance:
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run."""
+    from rotorid.files.job import Overrides, job_of
+    from rotorid.files.job_excel import open_job
     from rotorid.files.problems import Problems
-    from rotorid.tables.job.job_data import Overrides
-    from rotorid.tables.job.job_from_excel import open_job
-    from rotorid.tables.job.job_reading import job_of
 
     problems = Problems()
     written = open_job(path, problems)
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
-    return job_of(path, written.top(problems), written.tables, Overrides(), problems)
+    return job_of(written, Overrides(), problems)
 
 
 def told(outcome: Outcome) -> dict[str, Any]:
@@ -183,8 +182,8 @@ def rows(name: str, data: str, phase: str) -> dict[str, Any]:
     A file that says that its phases are others than the job's, `phase`, is refused.
     """
     from balancing import Labels
+    from rotorid.files.cells import show
     from rotorid.files.conventions import Conventions, as_phase
-    from rotorid.files.grid import show
     from rotorid.files.input_file import each_file_once
     from rotorid.files.layout import read_runs_grid
     from rotorid.files.problems import Problems

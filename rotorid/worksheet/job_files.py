@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorid.base.text import listing
+from rotorid.files.cells import clean
 from rotorid.files.excel_workbook import SUFFIXES, is_workbook
-from rotorid.files.grid import clean
 from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
+from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError
 from rotorid.files.table_writing import write_files
-from rotorid.tables.job.job_keys import named_tables
 from rotorid.worksheet.settings_cells import changed, setting, settings_in
 from rotorid.worksheet.text_cells import KEYS, Cells, TextCells, kept_ids
 from rotorid.worksheet.workbook_cells import WorkbookVersion

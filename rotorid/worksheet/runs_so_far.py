@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     from balancing import Trials
     from rotorid.base.arrays import FloatArray
+    from rotorid.files.cells import Grid
     from rotorid.files.columns import Source, Table
     from rotorid.files.conventions import Conventions
-    from rotorid.files.grid import Grid
-    from rotorid.files.settings_keys import Said
+    from rotorid.files.job_models import JobSettings, Vector
 
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?")
 LEVELS = ("none", "weak", "good")
@@ -151,36 +151,33 @@ def runs_so_far(job: Path) -> RunsSoFar:
         If there is no job with a runs table.
     """
     from rotorid.files.columns import make_table, read_grid
+    from rotorid.files.job import Overrides, conventions_of, tables_of
+    from rotorid.files.job_excel import open_job
     from rotorid.files.layout import read_runs_grid
     from rotorid.files.problems import Problems
     from rotorid.files.runs import COLUMNS
-    from rotorid.files.settings_keys import take
-    from rotorid.tables.job.job_data import Overrides
-    from rotorid.tables.job.job_from_excel import open_job
-    from rotorid.tables.job.job_keys import JOB
-    from rotorid.tables.job.readings import conventions_of
 
     problems = Problems()
     written = open_job(job, problems)
-    said = take(written.top(Problems()), JOB)
-    conventions = conventions_of(said, Overrides(), {})
-    sources = {key: written.tables.get(key) or _path(job, said, key) for key in ("runs", "weights")}
-    grid = None if sources["runs"] is None else read_grid(sources["runs"], "runs", problems)
+    settings = written.read(Problems())
+    conventions = conventions_of(settings, Overrides())
+    sources, _ = tables_of(written, settings)
+    grid = None if "runs" not in sources else read_grid(sources["runs"], "runs", problems)
     grid = None if grid is None else read_runs_grid(_finished(grid), conventions, problems)
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
         problems.stop()
         return RunsSoFar(None, (), ())
-    weights, mounted = sources["weights"], set[str]()
+    weights, mounted = sources.get("weights"), set[str]()
     mounting = None if weights is None else read_grid(weights, "weights", Problems(), may_be_empty=True)
     if mounting is not None and "run" in mounting.header:
         at = mounting.header.index("run")
         mounted = {str(cells[at]) for _, cells in mounting.rows}
-    slow = written.tables.get("slow_roll") or _path(job, said, "slow_roll") or said["slow_roll"]
+    slow = sources.get("slow_roll", settings.slow_roll)
     runs = tuple(dict.fromkeys(run for run in table.texts("run") if run))
     baseline = next((run for run in runs if run not in mounted), None)
     trials = tuple(run for run in runs if run in mounted)
-    return RunsSoFar(baseline, trials, tuple(_channels(grid, table, conventions, said, slow)))
+    return RunsSoFar(baseline, trials, tuple(_channels(grid, table, conventions, settings, slow)))
 
 
 def _finished(grid: Grid) -> Grid:
@@ -196,25 +193,30 @@ def _finished(grid: Grid) -> Grid:
     return replace(grid, rows=tuple(rows))
 
 
-def _path(job: Path, said: Mapping[str, Any], key: str) -> Path | None:
-    return job.parent / said[key] if isinstance(said[key], str) else None
-
-
 def _channels(
-    grid: Grid, table: Table, conventions: Conventions, said: Said, slow: Source | Mapping[str, Said] | None
+    grid: Grid,
+    table: Table,
+    conventions: Conventions,
+    settings: JobSettings,
+    slow: Source | Mapping[str, Vector] | None,
 ) -> Iterator[Channel]:
     """Each sensor at each speed that can be read by itself."""
     from balancing import reading_of
     from rotorid.files.problems import Problems
     from rotorid.files.runs import make_trials
-    from rotorid.tables.runs.slow_roll import make_slow_roll, subtract_slow_roll
+    from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
+
+    stated = None if settings.errors is None else settings.errors.stated
 
     def read(part: Grid) -> Trials | None:
-        trials = make_trials(part, None, conventions, said["errors"], Problems())
+        trials = make_trials(part, None, conventions, stated, Problems())
         if trials is None:
             return None
         trials = replace(trials, labels=conventions.on(trials.labels))
-        roll = None if slow is None else make_slow_roll(slow, trials, conventions, Problems())
+        its = slow
+        if isinstance(slow, Mapping):
+            its = {sensor: vector for sensor, vector in slow.items() if sensor in trials.sensors}
+        roll = None if its is None else make_slow_roll(its, trials, conventions, Problems())
         return trials if roll is None else subtract_slow_roll(trials, roll)
 
     whole = read(grid)
@@ -227,7 +229,7 @@ def _channels(
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> Sequence[list[int]]:
     """Indices of the finished rows of each speed and sensor."""
-    from rotorid.files.speeds import same_speed
+    from rotorid.files.runs import same_speed
 
     found: dict[tuple[float, str], list[int]] = {}
     speed, run, sensor = table.numbers("speed"), table.texts("run"), table.texts("sensor")

@@ -12,14 +12,13 @@ from pathlib import Path
 from rotorid.base.tables import guarded
 from rotorid.files import runs as runs_table
 from rotorid.files import weights as weights_table
+from rotorid.files.cells import SEP_LINE, Grid, clean, decode_as, parse_text, show
 from rotorid.files.columns import REMARKS, column_of
 from rotorid.files.decimal_numbers import decimal_comma, has_decimal_comma
-from rotorid.files.grid import Grid, clean, show
-from rotorid.files.layout import text_from_header
+from rotorid.files.headings import find_header
+from rotorid.files.job_excel import TEXT_COLUMNS
+from rotorid.files.job_models import READINGS
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.text_file import SEP_LINE, decode_as, parse_text
-from rotorid.tables.job.job_keys import READINGS
-from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""
@@ -129,8 +128,8 @@ class TextCells(Cells):
         parts = re.split(r"(\r\n|\n|\r)", text)
         self.lines, self._ends = parts[::2], [*parts[1::2], ""]
         first = 1 if SEP_LINE.fullmatch(self.lines[0].strip(" \ufeff")) else 0
-        shaped = text_from_header(text, {}) if table in READINGS else text
-        grid = None if len(problems) else parse_text(path.name, shaped, problems, may_be_empty=True)
+        find = find_header if table in READINGS else None
+        grid = None if len(problems) else parse_text(path.name, text, problems, may_be_empty=True, find=find)
         self.separator = "," if grid is None else grid.separator
         self._width = 0 if grid is None else len(self._split(grid.header_row + first - 1))
         self.fill(table, grid, problems, first)

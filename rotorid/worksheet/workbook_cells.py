@@ -15,16 +15,24 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import now
+from rotorid.files.cells import Cell, Row, clean, make_grid, show
 from rotorid.files.columns import sheet_source
 from rotorid.files.decimal_numbers import NotANumber, decimal_comma
 from rotorid.files.excel_pages import Line, header_row, keep_cells, put
 from rotorid.files.excel_workbook import find_sheet, sheets_in
-from rotorid.files.grid import Cell, Row, clean, make_grid, show
+from rotorid.files.job_excel import (
+    NAMED,
+    OPTIONAL,
+    SETTINGS,
+    dotted_key,
+    job_in_sheets,
+    key_parts,
+    number_cell,
+    setting_cell,
+)
+from rotorid.files.job_models import READINGS
 from rotorid.files.layout import rows_from_header
 from rotorid.files.problems import InputError, Problems
-from rotorid.tables.job.job_from_excel import NAMED, OPTIONAL, SETTINGS, job_in_sheets, key_parts
-from rotorid.tables.job.job_keys import CELLS, READINGS
-from rotorid.tables.job.workbook_sheets import dotted_key, number_cell, setting_cell
 from rotorid.worksheet.settings_cells import setting, with_setting
 from rotorid.worksheet.text_cells import KEYS, Cells, is_text
 
@@ -146,8 +154,7 @@ class WorkbookVersion:
                 _put(sheet.cell(top, len(names)), name)
                 sheet.cell(top, len(names))._style = copy(sheet.cell(top, at + 1)._style)
             cell = "" if value is None else setting_cell(name, value)
-            words = CELLS.get(parts[-1] if title == "settings" else name) in ("name", "words", "date")
-            _put(sheet.cell(row, names.index(name) + 1), show(cell) if words else cell)
+            _put(sheet.cell(row, names.index(name) + 1), cell)
 
     def _lines(self, title: str, header: Sequence[str]) -> tuple[Any, list[Line]]:
         """A sheet, made with this header where there is none, and its cells as text."""

@@ -172,7 +172,7 @@ def test_a_plane_that_only_the_model_has():
               np.vstack((np.zeros(2), np.eye(2))) * GRAM, errors=ERRORS, speeds=made.speeds)  # fmt: skip
     measured = estimate_influence(two)
     found = combine(measured, model(W[..., [2, 0]], 0.1, "CA"))
-    assert found.planes == ("A", "B", "C")
+    assert tuple(found.planes) == ("A", "B", "C")
     np.testing.assert_allclose(found.W, W, rtol=1e-9)
     np.testing.assert_allclose(found.channels()[..., 6, 6], (0.1 * np.abs(W[..., 2])) ** 2, rtol=1e-9)
     assert (found.channels()[..., 2, 2] < measured.channels()[..., 2, 2]).all()

@@ -424,13 +424,11 @@ def _all() -> list[Case]:
         Case(f"fit-{name}", f"fit {FIT}/{name}/model.toml {FIT}/{name}/record.csv", "models")
         for name in RECORDS
     ]
-    stored = "balance sample_data/model_job/runs.csv --influence w.csv --amplitude-error 2 --phase-error 2"
+    stored = "balance sample_data/model_job/runs.csv --influence w.json --amplitude-error 2 --phase-error 2"
     saved = f"balance {TURBO}/job.toml --save-influence w"
     cases += [
-        Case("turbo-stored", stored, "balance", before=(f"{saved}.csv",)),
-        Case(
-            "turbo-stored-xlsx", stored.replace(".csv --a", ".xlsx --a"), "balance", before=(f"{saved}.xlsx",)
-        ),
+        Case("turbo-stored", stored, "balance", before=(f"{saved}.json",)),
+        Case("turbo-stored-xlsx", stored.replace("w.json", "w.xlsx"), "balance", before=(f"{saved}.xlsx",)),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
     fitted = "fleet fit sample_data/fleet"

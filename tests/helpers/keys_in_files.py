@@ -1,40 +1,38 @@
 """Tables of keys in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
 
 import re
+import typing
 from pathlib import Path
 
-from rotorid.files import waveforms
+from rotorid.files import bearing, forces, job_models, model, rotor, small_model, waveforms
+from rotorid.files.settings import Settings
 from rotorid.study import study_file
-from rotorid.tables.job import job_keys
-from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys, small_model_file
-from rotorid.tables.rotor import bearing, calibration_keys, node_forces, rotor_file
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.md"
 TABLES = {
-    "key": job_keys.JOB,
-    "key of [errors]": job_keys.ERRORS,
-    "key of [key_phasor]": job_keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
-    "key of [columns]": job_keys.COLUMNS,
-    "key of [planes.NAME]": job_keys.PLANE,
-    "key of [sensors.NAME]": job_keys.SENSOR,
-    "key of a model file for harmonic tests": harmonic_file.HARMONIC,
-    "key of a model file with states": ode_file.TIME_STATES,
-    "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),
-    "key of [nuisance]": ode_file.NUISANCE,
-    "key of [errors] of a model file": shared_keys.ERRORS,
-    "key of a rotor file": rotor_file.ROTOR,
-    "key of [material]": rotor_file.MATERIAL,
-    "key of [model]": rotor_file.MODEL,
-    "key of [[station]]": rotor_file.STATION,
-    "key of [[disc]]": rotor_file.DISC,
-    "key of [[bearing]]": bearing.KEYS_OF["bearing"],
-    "key of [calibration]": calibration_keys.CALIBRATION,
-    "key of [[calibration.parameter]]": calibration_keys.PARAMETER,
-    "key of [[calibration.data]]": calibration_keys.DATA,
-    "key of a small model": small_model_file.SMALL_MODEL,
-    "key of [[unbalance]]": small_model_file.UNBALANCE,
-    "key of [[bow]]": small_model_file.BOW,
+    "key": job_models.JobSettings,
+    "key of [errors]": job_models.Errors,
+    "key of [key_phasor]": job_models.KeyPhasor,
+    "key of [slow_roll.SENSOR]": job_models.Vector,
+    "key of [columns]": job_models.Columns,
+    "key of [planes.NAME]": job_models.Plane,
+    "key of [sensors.NAME]": job_models.Sensor,
+    "key of [sheet]": job_models.Sheet,
+    "key of a model file": model.ModelFile,
+    "key of [nuisance]": model.Nuisance,
+    "key of [errors] of a model file": model.AmplitudeErrorKeys,
+    "key of a rotor file": rotor.RotorFile,
+    "key of [material]": rotor.Material,
+    "key of [model]": rotor.Effects,
+    "key of [[station]]": rotor.Station,
+    "key of [[disc]]": rotor.DiscKeys,
+    "key of [[bearing]]": bearing.SupportKeys,
+    "key of [calibration]": rotor.CalibrationKeys,
+    "key of [[calibration.parameter]]": rotor.Parameter,
+    "key of [[calibration.data]]": rotor.DataFile,
+    "key of a small model": small_model.SmallModelFile,
+    "key of [[unbalance]]": small_model.UnbalanceKeys,
+    "key of [[bow]]": small_model.BowKeys,
     "key of a waveforms file": waveforms.WaveformsFile,
     "key of [channels.NAME]": waveforms.ChannelKeys,
     "key of a study file": study_file.StudyKeys,
@@ -42,33 +40,31 @@ TABLES = {
     "key of [sensors.NAME] of a study": study_file.SensorKeys,
     "key of [unbalance.STATION]": study_file.UnbalanceKeys,
     "key of [readings]": study_file.ReadingKeys,
-    **{f"key of [[{kind}]]": keys for kind, keys in node_forces.KEYS_OF_FORCE.items()},
+    **{f"key of [[{kind}]]": keys for kind, keys in forces.KEYS.items()},
 }
 
 
 def key_lines(keys, what="key"):
     """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
     lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
-    if isinstance(keys, type):
-        return lines + [settings_line(name, key, keys) for name, key in keys.keys().items()]
-    for key in keys:
-        names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
-        words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
-        lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
-    return lines
+    return lines + [_line(keys, name, field) for name, field in keys.model_fields.items()]
 
 
-def settings_line(name, key, model):
-    """The same of a key of typed settings."""
-    field = next(one for field, one in model.model_fields.items() if (one.alias or field) == name)
-    kind = str(field.annotation)
-    header = (
-        "[{}.NAME]" if "dict[str, rotorid" in kind else "[{}]" if "dict[" in kind or "Keys" in kind else "{}"
-    )
-    names = ", ".join(f"`{header.format(each)}`" for each in key.names)
-    words = re.findall(r"'(\w+)'", kind) if "Literal" in kind else []
-    shown = [f'"{word}"' for word in words] or field.examples or []
-    return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in shown)} |"
+def _line(settings, name, field):
+    """A field of typed settings."""
+    inner = [one for one in (field.annotation, *typing.get_args(field.annotation)) if isinstance(one, type)]
+    table = any(issubclass(one, Settings) for one in inner)
+    choices = settings.model_json_schema()["properties"].get(field.alias or name, {})
+    several = typing.get_origin(field.annotation) is list
+    key = settings.known_keys()[field.alias or name]
+    header = "[[{}]]" if table and several else "[{}]" if table or dict in inner else "{}"
+    if typing.get_origin(field.annotation) is dict:
+        may_be_text = any(hasattr(mark, "func") for mark in field.metadata)
+        header = "[{}.NAME]" if table else "{}" if may_be_text else "[{}]"
+    names = ", ".join(f"`{header.format(one)}`" for one in key.names)
+    enums = [one.get("enum", ()) for one in (choices, *choices.get("anyOf", ()))]
+    words = [f'"{word}"' for words in enums for word in words] or field.examples or []
+    return f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words)} |"
 
 
 def with_tables(text):

@@ -15,9 +15,9 @@ import numpy as np
 import openpyxl
 from tables_data import RUNS
 
-from rotorid.files.grid import Shown
-from rotorid.tables.job.job_keys import TABLES
-from rotorid.tables.job.workbook_template import template_bytes
+from rotorid.files.cells import Shown
+from rotorid.files.job_excel import template_bytes
+from rotorid.files.job_models import TABLES
 
 SAMPLES = (
     "turbo_job/job",

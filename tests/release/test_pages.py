@@ -10,8 +10,8 @@ from golden.tolerances import TOLERANCES
 
 import rotorid
 from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, instruments, problems, toml_file
+from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import equations, expressions
-from rotorid.tables.job.job_keys import MOST_HOLES
 from rotorid.worksheet import app, server
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

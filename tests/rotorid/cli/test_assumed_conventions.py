@@ -193,7 +193,7 @@ def test_stored_coefficients(cli, tmp_path):
     files = shop(tmp_path, OFF_AXIS, "lag")
     stored = tmp_path / "stored.csv"
     assert cli("balance", *files, *said("lag", "with"), "--save-influence", stored).code == 0
-    assert "# assumed" not in stored.read_text(encoding="utf-8")
+    assert "phase_lag_deg" in stored.read_text(encoding="utf-8")
     document = cli("balance", files[0], "--influence", stored, "--json")
     assert document.code == 2  # three runs that differ, and no weights
     day, _ = shop(tmp_path, [{}], "lag")
@@ -205,7 +205,7 @@ def test_stored_coefficients(cli, tmp_path):
     for row, other in zip(expected, document["other_readings"], strict=True):
         assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
     assert cli("balance", *shop(tmp_path, OFF_AXIS), "--save-influence", stored).code == 0
-    assert "# assumed, stated nowhere: phase and angles" in stored.read_text(encoding="utf-8")
+    assert "phase_lead_deg" in stored.read_text(encoding="utf-8")
     assert cli("balance", shop(tmp_path, [{}])[0], "--influence", stored).code == 0
 
 

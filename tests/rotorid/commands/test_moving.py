@@ -5,9 +5,9 @@ import pytest
 
 from fem import JournalBearing, Rotor
 from rotorid.commands.moving import moving
+from rotorid.files.small_model import small_model_files
 from rotorid.reduction import SmallModel
 from rotorid.tables import InputError
-from rotorid.tables.models.small_model_file import small_model_bytes
 
 FILM = {"length": 0.02, "diameter": 0.05, "clearance": 5e-5, "viscosity": 0.02}
 ROTOR = Rotor(
@@ -38,7 +38,7 @@ def test_a_rotor_with_its_tables(tmp_path):
 
 def test_a_small_model_has_its_own(tmp_path):
     path = tmp_path / "small.toml"
-    path.write_bytes(small_model_bytes(SMALL))
+    path.write_bytes(small_model_files(path, SMALL)[path])
     found = moving(path)
     assert isinstance(found.model, SmallModel)
     assert found.files == (path,)

@@ -13,10 +13,10 @@ import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import ResponseOptions, response
+from rotorid.files.small_model import small_model_files
 from rotorid.reduction import small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_unbalance
-from rotorid.tables.models.small_model_file import small_model_bytes
 
 RPM = np.pi / 30
 OK_SPEEDS = ("--speeds", "100:200:50")
@@ -52,12 +52,12 @@ def test_response_reads_at_angles_and_stations(cli, files, model):
 
 def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_path):
     plain = fem.Rotor([0.3] * 3, 0.05, supports=[fem.Support(1, 1e7, 1e3), fem.Support(4, 1e7, 1e3)])
-    write_rotor(tmp_path / "plain.csv", plain)
+    write_rotor(tmp_path / "plain.toml", plain)
     write_csv(tmp_path / "n.csv", [["node", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
     command = ("--speeds", "60:200:70", "--json")
     by_stations = cli("response", files[0], "--unbalance", files[1], *command).json
     assert by_stations["sensors"] == ["wheel", "probe"]
-    by_supports = cli("response", tmp_path / "plain.csv", "--unbalance", tmp_path / "n.csv", *command).json
+    by_supports = cli("response", tmp_path / "plain.toml", "--unbalance", tmp_path / "n.csv", *command).json
     assert by_supports["sensors"] == [1, 4]
     expected = fem.unbalance_response(plain, {2: 1e-4}, [60.0])
     assert by_supports["amplitude_m"][0][0] == pytest.approx(abs(expected.at(1)[0]), rel=1e-9)
@@ -95,7 +95,7 @@ BAD_UNBALANCE = [
     ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 1, 400]], "an angle from -360 to 360 degrees"),
     ([["plane", "mass_g", "angle_deg"], ["4", 1, 0]], "either a column unbalance_<unit>, or both"),
     ([["plane", "mass_g", "radius_mm", "unbalance_g_mm", "angle_deg"], ["4", 1, 1, 1, 0]], "either a column"),
-    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node: a node or a station"),
+    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node, not both: a node or a station"),
     ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "plane or node, not both"),
     ([["plane", "unbalance_gmm", "angle_deg"], ["4", 1, 0]], "unbalance_gmm"),
 ]  # fmt: skip
@@ -153,7 +153,7 @@ def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
     small, whole = tmp_path / "small.toml", tmp_path / "rotor.toml"
     write_rotor(whole, rotor)
     model = small_model(rotor, (4, 8), (30.0, 20.0))
-    small.write_bytes(small_model_bytes(model))
+    small.write_bytes(small_model_files(small, model)[small])
     table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]])
     how = (
         "--unbalance",
@@ -186,7 +186,7 @@ def test_an_undamped_small_model_has_one_row_for_each_critical_speed(cli, tmp_pa
     """Its peaks are infinite: forward and backward whirl coincide, and all sensors show the same speeds."""
     rotor = read_rotor(sample_data() / "rotor23.csv")
     small = tmp_path / "small.toml"
-    small.write_bytes(small_model_bytes(small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0))))
+    small.write_bytes(small_model_files(small, small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0)))[small])
     table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [12, 1000, 0]])
     outcome = cli(
         "response", small, "--unbalance", table, "--speeds", "500:9000:10rpm", "--sensors", "7,12,18"
@@ -204,10 +204,10 @@ def test_unbalance_of_a_small_model(cli, tmp_path):
     small = tmp_path / "small.toml"
     how = ("response", small, "--speeds", "50:150:10", "--unbalance")
     model = small_model(rotor, (2,), (30.0,))
-    small.write_bytes(small_model_bytes(model))
+    small.write_bytes(small_model_files(small, model)[small])
     assert "no unbalance is given" in cli(*how, "own").err
     assert "journals of a rotor" in cli(*how, "api").err
-    small.write_bytes(small_model_bytes(replace(model, unbalance={2: 1e-4})))
+    small.write_bytes(small_model_files(small, replace(model, unbalance={2: 1e-4}))[small])
     document = cli(*how, "own", "--json").json
     k, m, w = 1 / (1 / 2e7 + 1 / model.stiffness[0, 0]), 30.0, 100.0
     assert document["sensors"] == [2, 1, 3]

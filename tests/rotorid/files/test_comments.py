@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, write_book, write_csv
 
+from rotorid.files.cells import parse_text
 from rotorid.files.problems import Problems
-from rotorid.files.text_file import parse_text
 from rotorid.tables import read_rotor, read_trials
 
 HEADER = ("run", "value", "text")
@@ -79,7 +79,7 @@ def test_a_remark_with_a_separator_below_the_header_says_what_to_do(tmp_path):
     (tmp_path / "runs.csv").write_text(text, encoding="utf-8")
     assert read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv").runs[0] == "initial"
     _, _, found = read("a,b\n# x,y,z\n1,2\n")
-    assert "a comment below the header is a line that begins with # and has no , in it" in str(found[0])
+    assert "a comment below the header begins with # and has no , in it" in str(found[0])
 
 
 SECRET = "root:x:0:0:/hidden"

@@ -107,8 +107,8 @@ def test_what_cannot_be_understood(job, text, key, value, words):
 
 BAD_MARKS = [
     ("[key_phasor]\n", "key_phasor.angle_deg", None, "the direction of the key phasor"),
-    ("[key_phasor]\nangle_deg = 361\n", "key_phasor.angle_deg", "361", "a number from -360 to 360"),
-    ('[key_phasor]\nangle_deg = "x"\n', "key_phasor.angle_deg", "x", "a number, without quotes"),
+    ("[key_phasor]\nangle_deg = 361\n", "key_phasor.angle_deg", "361", "a number up to 360"),
+    ('[key_phasor]\nangle_deg = "x"\n', "key_phasor.angle_deg", "x", "a number"),
     ("[key_phasor]\nangle_deg = 3\nspeed = 2\n", "key_phasor.speed", "2", "a known key"),
 ]
 
@@ -128,13 +128,10 @@ def test_the_key_phasor_counts_as_the_angles_do(folder):
 
 
 def test_stored_coefficients_know_nothing_of_clocks(job, folder):
-    """The table says with or against, which needs no end from which the rotor is seen."""
     influence = estimate_influence(job('angles = "counter-clockwise"\n' + CLOCKWISE).trials)
-    write_influence(folder / "influence.csv", influence)
-    text = (folder / "influence.csv").read_text(encoding="utf-8")
-    assert "# angles = against rotation\n" in text
-    np.testing.assert_allclose(read_influence(folder / "influence.csv").W, influence.W, rtol=1e-9)
-    now = CLOCKWISE + 'angles = "counter-clockwise"\nruns = "runs.csv"\ninfluence = "influence.csv"\n'
+    write_influence(folder / "influence.json", influence)
+    np.testing.assert_allclose(read_influence(folder / "influence.json").W, influence.W, rtol=1e-9)
+    now = CLOCKWISE + 'angles = "counter-clockwise"\nruns = "runs.csv"\ninfluence = "influence.json"\n'
     (folder / "now.toml").write_text(now, encoding="utf-8")
     write_csv(folder / "runs.csv", RUNS[:3])
     found = read_job(folder / "now.toml")

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from balancing import Gaussian, correct, estimate_influence
+from balancing import correct, estimate_influence
 from rotorid.tables import (
     InputError,
     TableWarning,
     influence_frame,
     job_from_files,
-    read_influence,
     read_job,
     read_rotor,
     read_trials,
@@ -38,13 +35,13 @@ def files(tmp_path):
 def test_a_title_above_the_header_is_named(tmp_path, files, title):
     """Runs and weights are found under a title; any other table begins with its header."""
     path = write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": [title, *WEIGHTS]})
-    assert read_job(path).planes == read_trials(*files).planes
+    assert tuple(read_job(path).planes) == read_trials(*files).planes
     text = tmp_path / "titled.csv"
     text.write_text("My rotor\n\n" + csv_text(WEIGHTS), encoding="utf-8")
     assert read_trials(files[0], text).planes == read_trials(*files).planes
     rotor = write_book(tmp_path / "rotor.xlsx", {"rotor": [title, ["length_m", "diameter_m"], [1, 0.1]]})
     [problem] = complaints(read_rotor, rotor)
-    assert "the header in the first row, and it seems to be row 2" in problem.expected
+    assert "a header row with the names of columns" in problem.expected
 
 
 def test_different_values_and_scattered_rows():
@@ -52,7 +49,7 @@ def test_different_values_and_scattered_rows():
 
     problems = [Problem("f.csv", row, "a", str(row), "a number") for row in (2, 3, 5, 7, 9, 11)]
     assert str(InputError(problems)) == (
-        "f.csv, rows 2–3, 5, 7, 9 and others (6 in all), column a: found '2', '3', '5' and so on, "
+        "f.csv, rows 2, 3, 5 and others (6 in all), column a: found '2', '3', '5' and so on, "
         "expected a number"
     )
     many = [Problem("f.csv", row, f"c{row}", None, "x") for row in range(100)]
@@ -64,8 +61,8 @@ def test_many_runs_with_gaps_are_counted(tmp_path):
     with pytest.raises(InputError) as caught:
         read_trials(write_csv(tmp_path / "runs.csv", runs), None)
     problems = caught.value.problems
-    assert "readings of run 'r0' at all 40 speeds of the runs; it has 1" in problems[0].expected
-    assert "as many readings of 180 further runs" in problems[-1].expected
+    assert "readings of run 'r0' at 110 rpm, as other runs have; its nearest speed" in problems[0].expected
+    assert len(problems) == 20
 
 
 @pytest.mark.parametrize("value", ["1e300", "-1e31", "5e-200", "1e-320"])
@@ -79,10 +76,10 @@ def test_sizes_that_no_instrument_shows(tmp_path, files, value):
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
-        ("length_m", 1000, "row 2, column length_m: 1000 means 1000 m; is this in mm?"),
-        ("diameter_m", 110, "column diameter_m: 110 means 110 m; is this in mm?"),
-        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in GPa?"),
-        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in g/cm³?"),
+        ("length_m", 1000, "element 1: length 1000 m; is this in mm?"),
+        ("diameter_m", 110, "element 1: outer_diameter 110 m; is this in mm?"),
+        ("youngs_modulus_Pa", 210, "element 1: youngs_modulus 210 Pa; is this in GPa?"),
+        ("density_kg_per_m3", 7.8, "element 1: density 7.8 kg/m³; is this in g/cm³?"),
     ],
 )
 def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):
@@ -129,13 +126,13 @@ def lag(tmp_path, files):
     """A job with lag and against rotation, its stored coefficients, and a baseline run."""
     trials = read_trials(*files, phase="lag", angles="against rotation")
     influence = estimate_influence(trials)
-    write_influence(tmp_path / "influence.csv", influence)
+    write_influence(tmp_path / "influence.json", influence)
     write_csv(tmp_path / "now.csv", RUNS[:3])
     return correct(influence)
 
 
 def test_stored_conventions_hold_for_the_readings_if_nothing_else_is_said(tmp_path, lag):
-    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json")
     assert (read.trials.labels.phase, read.trials.labels.angles) == ("lag", "against rotation")
     c = correct(read.influence, read.trials)
     np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
@@ -145,60 +142,37 @@ def test_stored_conventions_hold_for_the_readings_if_nothing_else_is_said(tmp_pa
 
 
 def test_stated_conventions_hold_for_the_readings_alone(tmp_path, lag):
-    same = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lag")
+    same = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json", phase="lag")
     np.testing.assert_allclose(correct(same.influence, same.trials).weights, lag.weights, rtol=1e-9)
     assert not any("phase =" in w for w in same.trials.warnings)
     turned = [RUNS[0], *([*row[:4], 360 - row[4]] for row in RUNS[1:3])]
     write_csv(tmp_path / "now.csv", turned)
-    lead = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lead")
+    lead = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json", phase="lead")
     np.testing.assert_allclose(correct(lead.influence, lead.trials).weights, lag.weights, rtol=1e-9)
     [words] = [w for w in lead.trials.warnings if "phase =" in w]
     assert "the readings are taken with phase = lead, as stated" in words
     assert "the coefficients with phase = lag, as" in words
 
 
-@pytest.mark.parametrize(
-    "comment",
-    [
-        *("# Phase: lag", "# PHASE = 'Lag'", "# phase is lag", "# phase lag.", "# phase = lagging"),
-        *("# phases lag behind the mark", "# a lag is positive phase", "# angle: clockwise"),
-    ],
-)
-def test_conventions_in_other_words_are_refused(tmp_path, lag, comment):
-    path = tmp_path / "influence.csv"
-    text = path.read_text(encoding="utf-8").replace("# phase = lag", comment)
-    path.write_text(text, encoding="utf-8")
-    problem = complaints(read_influence, path)[0]
-    assert problem.value == comment
-    assert problem.expected.startswith(("# phase = lead or lag", "# angles = with rotation or against"))
-
-
-def test_other_comments_mean_nothing(tmp_path, lag):
-    path = tmp_path / "influence.csv"
-    text = "# measured with a phase meter, angles read twice\n" + path.read_text(encoding="utf-8")
-    path.write_text(text, encoding="utf-8")
-    assert read_influence(path).labels.phase == "lag"
-
-
 def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
     influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
-    nothing = np.full(influence.baseline.shape, np.nan)
-    plain = replace(influence, baseline=nothing, errors=Gaussian.none(*influence.W.shape))
-    frame = influence_frame(plain)
-    frame = frame.rename(columns={"influence_um_pp_per_g": "influence_um_pp_per_kg_m"})
+    frame = influence_frame(influence)
+    frame = frame.rename(columns=lambda name: name.replace("per_g", "per_kg_m"))
     write_table(tmp_path / "si.csv", frame)
     read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
     assert (read.trials.labels.weight_unit, read.trials.labels.weight_scale) == ("g_mm", 1e6)
     c = correct(read.influence, read.trials).to_dict()["corrections"][0]
     assert c["unit"] == "g_mm"
     assert c["mass"] == pytest.approx(2.951e6, rel=1e-3)
-    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json")
     assert read.trials.labels.weight_unit == "g"
 
 
 def test_a_weights_table_without_rows_and_stored_coefficients(tmp_path, lag):
     write_csv(tmp_path / "none.csv", WEIGHTS[:1])
-    read = job_from_files([tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.csv")
+    read = job_from_files(
+        [tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.json"
+    )
     c = correct(read.influence, read.trials)
     np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
     assert not c.mounted.weights.any()

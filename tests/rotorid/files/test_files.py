@@ -97,10 +97,10 @@ BAD_FILES = {
     "only a mark": (b"\xef\xbb\xbf", "the file is empty"),
     "only comments": (b"# nothing\n;;;\n", "the file is empty"),
     "binary": (bytes(range(256)), "this one is neither"),
-    "binary without NUL": (b"\x01\x02\x03\x04,\x05", "this one is binary"),
+    "binary without NUL": (b"\x01\x02\x03\x04,\x05", "this one is neither"),
     "utf-16 cut off": (b"\xff\xfea\x00b", "this one is neither"),
     "renamed xlsx": (b"PK\x03\x04 and so on", "name it .xlsx"),
-    "renamed xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old Excel workbook"),
+    "renamed xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old workbook"),
     "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", "this one is neither"),
 }
 
@@ -153,7 +153,7 @@ def test_a_workbook_without_the_sheet(tmp_path, weights):
         (True, "TRUE", "not a logical value"),
         ("#DIV/0!", "#DIV/0!", "not an error of the spreadsheet"),
         ("=1+1", "=1+1", "open and save the file in Excel"),
-        ("2.5 um", "2.5 um", "unit in the header"),
+        ("2.5 um", "2.5 um", "a number in um_pp, as the heading"),
         ("9,487", "9,487", "comma may separate thousands"),
         ("", "", "a number"),
         (None, "", "a number"),

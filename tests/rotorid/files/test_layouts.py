@@ -237,27 +237,27 @@ def test_the_same_as_a_sheet(tmp_path, name):
     assert_same(read_trials(tmp_path / "export.xlsx", weights, phase="lag"), tidy)
 
 
-ONE_UNIT = "expected the same unit in all cells of the column (row 2 has {}), or in its heading"
 NAMES = listing([name for column in COLUMNS for name in column.names], "and")
 KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
         re.sub("(?m)^[0-9]+,", "3,", HEADINGS.replace("Phase angle [°]", "Phase")),
-        "runs.csv, row 1, column Phase: found 'Phase', expected its unit too, such as 'Phase (deg)'",
+        "runs.csv, row 1, column Phase: found 'Phase', expected "
+        "its unit, as in 'Phase (deg)' or 98°: phases so small may be radians",
     ),
     "radians or degrees in vectors": (
         re.sub(r"([@<∠/]) ?[0-9]+(°| deg)", r"\1 3", VECTORS.replace(" / ", "@")),
-        "runs.csv, row 1, column 1X [um pp]: found '1X [um pp]', expected the sign of degrees, as in "
-        "6.93 @ 98°: phases so small may be radians",
+        "runs.csv, row 1, column 1X [um pp]: found '1X [um pp]', expected its unit, as in "
+        "'Phase (deg)' or 98°: phases so small may be radians",
     ),
     "amplitude units differ": (
         CELLS_WITH_UNITS.replace("4.9UM PP", "4.9 mil pp"),
-        f"runs.csv, row 4, column Amplitude: found '4.9 mil pp', {ONE_UNIT.format('7.2 um pp')}",
+        "runs.csv, row 4, column Amplitude: found '4.9 mil pp', expected a number in um_pp, as row 2 says",
     ),
     "peak or peak to peak": (
         CELLS_WITH_UNITS.replace("4.9UM PP", "4.9um"),
-        f"runs.csv, row 4, column Amplitude: found '4.9um', {ONE_UNIT.format('7.2 um pp')}",
+        "runs.csv, row 4, column Amplitude: found '4.9um', expected a number in um_pp, as row 2 says",
     ),
     "two speeds": (
         HEADINGS.replace("\n", ",1001\n").replace("Run,1001", "Run,RPM"),
@@ -266,8 +266,8 @@ EXPLAINED = {
     ),
     "no run": (
         re.sub(r",[^,\n]*\n", "\n", HEADINGS),
-        "runs.csv, row 1, column run: expected a column run; the columns are Phase angle [°], 1X Ampl. "
-        "pk-pk [um], Channel and Speed rpm",
+        "runs.csv, row 1, column run: expected a column run; the columns are Channel, Speed rpm, 1X "
+        "Ampl. pk-pk [um] and Phase angle [°]",
     ),
     "lag and lead": (
         DIRECTION.replace("238 lag", "238 lead"),
@@ -282,7 +282,7 @@ EXPLAINED = {
     ),
     "fractions": (
         VECTORS.replace("∠114°", " / 114"),
-        f"runs.csv, row 4, column 1X [um pp]: found '4,9 / 114', {VECTOR}",
+        "runs.csv, row 4, column 1X [um pp]: found '114', expected a number in deg, as row 2 says",
     ),
     "a comma beside the sign": (
         VECTORS.replace("@79", "@,79"),
@@ -290,8 +290,8 @@ EXPLAINED = {
     ),
     "a sensor without a phase": (
         WIDE.replace("B_phase_deg", "note 2"),
-        "runs.csv, row 1, column B_amplitude_um_pp: found 'B_amplitude_um_pp', expected the phase of this "
-        "sensor too, in a column such as 'B phase'",
+        "runs.csv, row 1, column B_amplitude_um_pp: found 'B_amplitude_um_pp', expected amplitude and "
+        "phase of each sensor, in columns such as 'A amplitude' and 'A phase'",
     ),
     "sensors in a column and in headings": (
         WIDE.replace("run,", "run,sensor,").replace("\ninitial,", "\ninitial,A,").replace("\ntrial ", "\nt,"),
@@ -305,12 +305,12 @@ EXPLAINED = {
     ),
     "a reading without its sensor": (
         WIDE.replace("B_", ""),
-        "runs.csv, row 1, column amplitude_um_pp: found 'amplitude_um_pp', expected a name with that of its "
-        "sensor, as the other columns have",
+        "runs.csv, row 1, column amplitude_um_pp: found 'amplitude_um_pp', expected amplitude and phase "
+        "of each sensor, in columns such as 'A amplitude' and 'A phase'",
     ),
     "units row against headings": (
         UNITS_ROW.replace("amplitude,", "amplitude_um,"),
-        "runs.csv, row 2, column amplitude_um: found 'um pp', expected um, as in the heading, or nothing",
+        "runs.csv, row 2, column amplitude_um: found 'um pp', expected a number in um, as the heading says",
     ),
     "units row with a word": (
         UNITS_ROW.replace("um pp", "um px"),
@@ -320,7 +320,7 @@ EXPLAINED = {
     "a unit against the heading": (
         PREAMBLE.replace("4,9", "4,9 um"),
         "runs.csv, row 8, column Amplitude (µm pk-pk): found '4,9 um', expected a number in um_pp, as the "
-        "heading of the column says",
+        "heading says",
     ),
     "a vector of a weight": (
         WIDE_VECTORS.replace("B", "Trial weight"),

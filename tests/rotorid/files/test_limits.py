@@ -9,7 +9,7 @@ import openpyxl
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
 
-from rotorid.files import excel_workbook, grid, input_file, text_file
+from rotorid.files import cells, excel_workbook, input_file
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.input_file import each_file_once, file_content
 from rotorid.files.problems import Problems
@@ -58,13 +58,13 @@ def test_a_formula_without_its_value_is_refused_and_one_with_it_is_read(tmp_path
     made.active.append(["=1+1", 2])
     made.save(tmp_path / "f.xlsx")
     (rows,) = read_workbook(tmp_path / "f.xlsx", Problems()).values()
-    assert rows[1][1][0] == grid.BadCell(
+    assert rows[1][1][0] == cells.BadCell(
         "=1+1", "a formula with its stored value: open and save the file in Excel"
     )
 
 
 def test_a_text_table_beyond_the_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(text_file, "MOST_CELLS", 20)
+    monkeypatch.setattr(cells, "MOST_CELLS", 20)
     path = write_csv(tmp_path / "runs.csv", RUNS)
     (problem,) = complaints(read_trials, path, write_csv(tmp_path / "w.csv", WEIGHTS[:2]))
     assert "at most 20 cells" in problem.expected

@@ -158,7 +158,7 @@ def test_two_near_speeds_in_one_run(bad, read):
 BAD_READINGS = [
     ("amplitude_um_pp", "nan", "a finite number"),
     ("amplitude_um_pp", "", "a number"),
-    ("amplitude_um_pp", "7.2 um", "write the unit in the header"),
+    ("amplitude_um_pp", "7.2 um", "a number in um_pp, as the heading says"),
     ("amplitude_um_pp", -1, "an amplitude of 0 or more"),
     ("phase_deg", "", "a number"),
     ("phase_deg", 361, "a phase from -360 to 360 degrees"),
@@ -263,7 +263,7 @@ def test_a_sensor_that_no_run_has_at_a_speed(bad):
     more = [*RUNS, *([run, 2000, "A", 5, 0] for run in ("initial", "trial 1", "trial 2"))]
     problems = bad(more)
     assert len(problems) == 3
-    assert "every run needs every sensor at every speed" in problems[0].expected
+    assert "as every run needs at every speed" in problems[0].expected
 
 
 BAD_WEIGHTS = [

@@ -17,7 +17,6 @@ from rotorid.files.settings import (
     NotNegative,
     Number,
     Positive,
-    Quantity,
     Settings,
     Text,
     Turn,
@@ -31,6 +30,7 @@ from rotorid.files.settings import (
 )
 
 WEIGHT = {**units.MASS, **units.UNBALANCE}
+ANY = units.vibration
 
 
 class Inner(Settings):
@@ -39,9 +39,13 @@ class Inner(Settings):
 
 
 class Top(Settings):
-    most: Annotated[Quantity, of(Positive)] | None = key("largest", "most_g most_g_mm", None, units=WEIGHT)
+    most: Annotated[units.Quantity, of(Positive)] | None = key(
+        "largest", "most_g most_g_mm", None, units=WEIGHT
+    )
     radius: Positive | None = key("radius", "radius_mm", None, units=units.LENGTH)
-    amplitude: Annotated[Quantity, of(NotNegative)] | None = key("", "amplitude", None, units=units.vibration)
+    amplitude: Annotated[units.Quantity, of(NotNegative)] | None = key(
+        "", "amplitude", None, units=units.vibration
+    )
     kind: Literal["one", "two"] = key("which", default="one")
     use: bool = key("`false`: not used", default=True)
     holes: Annotated[Whole, Field(ge=1, le=9)] | None = key("", default=None, expected="a number of holes")
@@ -102,7 +106,7 @@ def test_a_key_in_every_unit(name):
     unit = WEIGHT[name.removeprefix("most_")]
     found, problems = read(**{name: 3})
     assert problems == []
-    assert found.most == Quantity(name, 3.0, unit)
+    assert found.most == units.Quantity(name, 3.0, unit)
     assert found.most.si == unit.to_si(3.0)
     assert found.written("most") == name
 
@@ -125,7 +129,7 @@ def test_a_field_with_a_unit_is_in_si():
         ({"kind": "on"}, "kind", "on", "'one' or 'two' (did you mean 'one'?)"),
         ({"use": 3}, "use", "3", "true or false, without quotes (in a sheet: yes or no)"),
         ({"holes": 2.5}, "holes", "2.5", "a whole number: a number of holes"),
-        ({"angles_deg": []}, "angles_deg", None, "a list with at least 1: angles, such as"),
+        ({"angles_deg": []}, "angles_deg", "[]", "a list with at least 1: angles, such as"),
         ({"angles_deg": [1, "b"]}, "angles_deg", "b", "a number: angles, such as [0, 90]"),
         ({"taken": "3: 1; 3: 2"}, "taken", "3: 1; 3: 2", "each name once"),
         ({"taken": {"3": 0}}, "taken.3", "0", "a number above 0"),
@@ -133,7 +137,7 @@ def test_a_field_with_a_unit_is_in_si():
         ({"file": " "}, "file", " ", "a text in quotes"),
         ({"model": {}}, "model.size", None, "the size"),
         ({"model": 3}, "model", "3", "a table of settings, [model]"),
-        ({"disc": {}}, "disc", None, "a list, or tables that begin with [[disc]]"),
+        ({"disc": {}}, "disc", "a table", "a list, or tables that begin with [[disc]]"),
         ({"planes": {"left": {"size": 11}}}, "planes.left.size", "11", "a number up to 10"),
         (
             {"disc": [{"size": 1}, {"size": 1, "sze": 1}]},
@@ -148,7 +152,7 @@ def test_a_field_with_a_unit_is_in_si():
             "a known key (did you mean 'holes'?); known are most_g, most_g",
         ),
         ({"password": "secret"}, "password", None, "a known key; known are"),
-        ({"holes": 2, "angles_deg": [1]}, "angles_deg", None, "either holes or angles_deg"),
+        ({"holes": 2, "angles_deg": [1]}, "angles_deg", "[1]", "either holes or angles_deg"),
     ],
 )
 def test_what_is_wrong_has_its_key_its_value_and_what_is_expected(data, column, value, expected):

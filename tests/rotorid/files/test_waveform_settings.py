@@ -199,7 +199,7 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
-    'tacho = "KEY"\nrecords = []\n': "key records: expected a table, [records]: a file for each run",
+    'tacho = "KEY"\nrecords = []\n': "expected a table, [records]: a file for each run",
     'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
     'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
     'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",

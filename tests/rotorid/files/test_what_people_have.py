@@ -340,14 +340,6 @@ def test_units_of_weights_as_people_write_them(tmp_path, heading, unit, si):
     np.testing.assert_allclose(trials.weights[1], [2 * si], rtol=1e-14)
 
 
-def test_units_of_cells_that_differ_are_converted(tmp_path):
-    weights = "run,plane,weight,angle_deg\ntrial P1,P1,10 g,0\ntrial P2,P2,1 oz,0\n"
-    trials = trials_of(tmp_path, PUMP, weights)
-    np.testing.assert_allclose(trials.weights[[1, 2], [0, 1]], [0.01, 0.45359237 / 16], rtol=1e-14)
-    words = refused(trials_of, tmp_path, PUMP, weights.replace("1 oz", "1 oz_in"))
-    assert "row 3, column weight: found '1 oz_in', expected a weight in g" in words
-
-
 @pytest.mark.parametrize(
     ("runs", "unit"), [("in/s", "in_s"), ("ips", "in_s"), ("mils pp", "mil_pp"), ("in/s rms", "in_s_rms")]
 )
@@ -395,7 +387,7 @@ QUESTIONS = {
     ),
     "no unit in one cell": (
         "run,plane,weight,angle_deg\ntrial P1,P1,10 g,3\ntrial P2,P2,10,3\n",
-        "row 3, column weight: found '10', expected a weight with its unit, as g in other cells",
+        "row 3, column weight: found '10', expected a number in g, as row 2 says",
     ),
 }
 
@@ -534,6 +526,11 @@ def test_the_wrong_kind_of_file_is_one_message(name, cli):
     assert (outcome.code, outcome.out) == (2, "")
     assert words in outcome.err
     assert outcome.err.strip().count("\n") == lines - 1
+
+
+def test_fractions_are_no_vectors(tmp_path):
+    runs = wide("Run,rpm,DE,DE deg,Batch", "{},1485,{},{},1/12").replace("DE,DE deg", "DE Amp,DE deg")
+    assert "found 'Batch', expected a known column" in refused(trials_of, tmp_path, runs)
 
 
 def test_a_header_that_was_taken_out_is_none(tmp_path):

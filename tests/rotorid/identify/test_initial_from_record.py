@@ -111,7 +111,7 @@ def test_a_file_says_it_once(tmp_path):
         read_ode_model(path)
     assert len(str(said.value).splitlines()) <= 2
     path.write_text(text.replace('y1 = "record"', 'y1 = "measured"'))
-    with pytest.raises(ValueError, match="measured is none"):
+    with pytest.raises(ValueError, match="measured is not defined here"):
         read_ode_model(path)
 
 

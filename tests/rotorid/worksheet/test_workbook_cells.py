@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 from workbook_jobs import as_workbook
 
 from rotorid.cli import app
+from rotorid.files.job_excel import template_bytes
 from rotorid.tables import read_job
-from rotorid.tables.job.workbook_template import template_bytes
 from rotorid.worksheet.job_files import Conflict, JobFiles
 
 pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
@@ -73,7 +73,7 @@ def test_a_template_is_filled_in_and_read(tmp_path):
         ]
     )
     written = read_job(path)
-    assert written.planes == ("1",)
+    assert tuple(written.planes) == ("1",)
     assert written.radii["1"] == pytest.approx(0.12)
     assert [row["cells"][3] for row in job.state()["tables"]["runs"]["rows"]] == ["4.5", "6.50", "7", "8.25"]
     book = opened(path.read_bytes())

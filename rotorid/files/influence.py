@@ -1,0 +1,407 @@
+"""Stored influence coefficients: a table for people, or JSON that keeps all that is known of their errors.
+
+Instruments and handbooks print the reciprocal for one plane and one sensor, S = 1/W: the weight, and its
+angle, with which the reading is 1 at the phase 0. A vibration Y is corrected by −S Y.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from dataclasses import asdict, fields, replace
+from itertools import islice, product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
+from rotorid.base.arrays import ComplexArray
+from rotorid.base.json import plain
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.files import units
+from rotorid.files.cells import Grid, read_bytes, show
+from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
+from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.headings import read_headings, read_unit, readable
+from rotorid.files.layout import vector_in
+from rotorid.files.problems import MOST_LINES, Problems
+from rotorid.files.runs import SPEED, nearest_speed, show_speed, show_speeds
+from rotorid.files.table_writing import table_bytes, write_bytes
+from rotorid.files.units import Unit, UnitError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+
+_NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
+_OLDER = re.compile(r"(?:std_(?:re|im)|correlation|common)_")
+"""Columns of errors that versions before 1.0 wrote, with rows of a plane `(baseline)`: passed over."""
+_PATTERN = (
+    "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
+)
+
+
+class Stored(NamedTuple):
+    """Stored coefficients, and what their file itself says about its conventions (`phase`, `angles`)."""
+
+    influence: Influence
+    said: Mapping[str, str]
+
+
+class _Halves(NamedTuple):
+    """Units of a coefficient: of the vibration and of the weight, and whether it is weight per vibration."""
+
+    vibration: Unit
+    weight: Unit
+    reciprocal: bool = False
+
+
+def _halves(name: str) -> _Halves:
+    """From `um_pp_per_g`, or `g_per_in_s`, or what stands in a heading such as `Sensitivity (oz/mil)`."""
+    text = re.sub("[ _]per[ _]", "/", name)
+    for sign in re.finditer("/", text):
+        above, below = text[: sign.start()], text[sign.end() :].strip("()")
+        if above and below and readable("mass", above) and readable("amplitude", below):
+            weight, vibration = read_unit("mass", above)[0], read_unit("amplitude", below)[0]
+            if vibration not in units.WEIGHT:
+                return _Halves(units.VIBRATION[vibration], units.WEIGHT[weight], reciprocal=True)
+    above, separator, below = name.rpartition("per_")
+    if not separator or (above and not above.endswith("_")):
+        raise UnitError(f"a name like {_PATTERN}")
+    return _Halves(units.vibration(above.rstrip("_")), units.weight(below))
+
+
+def _influence_unit(name: str) -> Unit:
+    halves = _halves(name)
+    one, other = halves[1::-1] if halves.reciprocal else halves[:2]
+    kind = f"{one.kind} per {other.kind}"
+    return Unit(name, kind, one.multiply * other.divide, one.divide * other.multiply)
+
+
+def _phase_unit(name: str) -> Unit:
+    return units.one_of(units.ANGLE)(read_unit("phase", name.replace("_", " "))[0])
+
+
+COLUMNS = (
+    SPEED,
+    Column("sensor"),
+    Column("plane"),
+    Column("influence", _influence_unit, ("influence_um_pp_per_g", "influence_m_per_kg_m")),
+    Column("phase", _phase_unit, ("phase_deg", "phase_lag_deg")),
+    Column("std", _influence_unit, ("std_um_pp_per_g",), required=False),
+)
+
+
+def read_influence(
+    path: str | Path, *, phase: Phase | None = None, angles: Angles | None = None
+) -> Influence:
+    """Read stored influence coefficients.
+
+    The phase of a coefficient is the phase reading that a weight at angle 0 causes; whether it leads or lags
+    says its heading (`phase_lag_deg`), or else `phase`. Weights per vibration of one plane and one sensor
+    (`influence_g_per_in_s`, `Sensitivity (oz/mil)`, cells such as `45.9 @ 309°`) are the reciprocal:
+    `phase_deg` is the angle of the weight with which the reading has phase 0.
+
+    Parameters
+    ----------
+    path
+        `.json`, which has all that `write_influence` knew of errors, `.csv` or `.xlsx` (sheet `influence`).
+    phase, angles
+        Conventions of the job: to print results in, and to read a table with that states none itself
+        (default: its own, else lead and with rotation).
+
+    Returns
+    -------
+    balancing.Influence
+        In SI, phase lead, with labels to print in.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems = Problems()
+    stored = problems.need(load_influence(Path(path), phase, angles, problems))
+    problems.stop()
+    return stored.influence
+
+
+def load_influence(
+    source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
+) -> Stored | None:
+    """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
+    if isinstance(source, Path) and source.suffix.lower() == ".json":
+        influence = _from_json(source, problems)
+        if influence is None:
+            return None
+        own = influence.labels
+        labels = replace(own, phase=phase or own.phase, angles=angles or own.angles)
+        return Stored(replace(influence, labels=labels), {"phase": own.phase, "angles": own.angles})
+    before = len(problems)
+    grid = read_grid(source, "influence", problems)
+    table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
+    if table is None or table.unit("influence") == UNCLEAR or not _is_sound(table):
+        return None
+    said = _stated(table)
+    written = Labels(
+        phase=as_phase(said.get("phase") or phase or "lead"),
+        angles=as_angles(said.get("angles") or angles or "with rotation"),
+    )
+    size, angle, name = table.numbers("influence"), table.numbers("phase"), table.unit("influence").name
+    vibration, weight, reciprocal = _halves(name)
+    values = written.vibration_from(size, angle)
+    if reciprocal:
+        values = 1.0 / written.weight_from(size, angle)
+    rows = _keys(table)
+    speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*rows, strict=True))
+    speeds.sort()
+    place = {row: i for i, row in enumerate(rows)}
+    missing = (key for key in product(speeds, sensors, planes) if key not in place)
+    for v, c, p in islice(missing, MOST_LINES):
+        shown = show_speed(v, table.unit("speed"))
+        table.as_whole("plane", f"a coefficient of sensor {c!r} and plane {p!r} at {shown}")
+    if len(problems) > before:
+        return None
+    S, C, P = len(speeds), len(sensors), len(planes)
+    at = np.array([place[key] for key in product(speeds, sensors, planes)], dtype=int).reshape(S, C, P)
+    errors = Gaussian.none(S, C, P)
+    if "std" in table:
+        variance = np.zeros((S, C, 2 * P + 2))
+        variance[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
+        covariance = variance[..., None] * np.eye(2 * P + 2)
+        errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
+    labels = Labels(
+        vibration.name,
+        vibration.scale,
+        weight.name,
+        weight.scale,
+        phase=phase or written.phase,
+        angles=angles or written.angles,
+    )
+    nothing, W = np.full((S, C), np.nan), values[at]
+    names = tuple(sensors), tuple(planes)
+    return Stored(Influence(np.array(speeds), *names, W, nothing, errors, labels), said)
+
+
+def _tidied(grid: Grid) -> Grid:
+    """Without columns and rows of older versions; weights per vibration in influence_<unit> and phase_deg."""
+    header = [f"note {name}" if _OLDER.match(name) else name for name in grid.header]
+    rows = grid.rows
+    if "plane" in header:
+        rows = tuple(row for row in rows if show(row[1][header.index("plane")]) != "(baseline)")
+    named = dict[int, _Halves]()
+    for k, name in enumerate(header):
+        if match := _NAMED.fullmatch(name):
+            with suppress(UnitError):
+                named[k] = _halves(match[1])
+    if len(named) == 1 and next(iter(named.values())).reciprocal:
+        [(at, (vibration, weight, _))] = named.items()
+        header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(header)]
+        header[at] = f"influence_{weight.name}_per_{vibration.name}"
+        vectors = [vector_in(cells[at]) for _, cells in rows]
+        if "phase_deg" not in header and all(vectors):
+            header.append("phase_deg")
+            rows = tuple(
+                (number, (*cells[:at], vector[0], *cells[at + 1 :], vector[1].rstrip("° ")))
+                for (number, cells), vector in zip(rows, filter(None, vectors), strict=True)
+            )
+    return replace(grid, header=tuple(header), rows=rows)
+
+
+def _is_sound(table: Table) -> bool:
+    """Whether the cells can be coefficients; else problems."""
+    before, size = len(table.problems), table.numbers("influence")
+    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
+    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
+    if _halves(table.unit("influence").name).reciprocal:
+        table.must_be("influence", size > 0, "a weight above 0")
+        if len({*table.texts("sensor")}) > 1 or len({*table.texts("plane")}) > 1 or "std" in table:
+            expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
+            table.in_header(table.fields["influence"].name, expected)
+    else:
+        table.must_be("influence", size >= 0, "a coefficient of 0 or more")
+        if "std" in table and table.unit("std") != table.unit("influence"):
+            unit = table.unit("influence").name
+            table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit}")
+    table.once("plane", _keys(table), "one coefficient per speed, sensor and plane (row {} has the same)")
+    return len(table) > 0 and not table.problems.of(table.source) and len(table.problems) == before
+
+
+def _keys(table: Table) -> list[tuple[float, str, str]]:
+    """Speed, sensor and plane of each row."""
+    return [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
+
+
+def _stated(table: Table) -> dict[str, str]:
+    """What the heading of the phases, or comment lines of older versions, say about conventions."""
+    patterns = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
+    texts = (*table.comments, table.fields["phase"].name)
+    found = [(key, re.search(pattern, text)) for text in texts for key, pattern in patterns.items()]
+    return {key: match[1] for key, match in found if match}
+
+
+def _from_json(path: Path, problems: Problems) -> Influence | None:
+    """The coefficients of `_document`, or None and a problem."""
+    data = read_bytes(path, problems)
+    if data is None:
+        return None
+    try:
+        whole = json.loads(data)
+        problems.refuse_newer(str(path), whole["schema_version"])
+        stored = whole["influence"]
+        reading, run = stored["reading"], stored["run_errors"]
+        sizes, chances = (np.array(run[key], dtype=float) for key in ("sizes", "probability"))
+        if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
+            raise ValueError("sizes of errors and probabilities must be 0 or more")
+        run = RunErrors(**{**run, "sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()})
+        errors = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
+        reading = Reading(errors, reading["source"], dof=reading["dof"] or np.inf)
+        own = np.array(stored["covariance"], dtype=float)
+        common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
+        influence = Influence(
+            speeds=np.array(stored["speeds_rad_s"], dtype=float),
+            sensors=tuple(stored["sensors"]),
+            planes=tuple(stored["planes"]),
+            W=_complex(stored["W"]),
+            baseline=_complex(stored["baseline"]),
+            errors=Gaussian(own, common, reading, run),
+            labels=Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])}),
+        )
+        covariance = influence.channels() if own.shape[:2] == influence.W.shape[:2] else own[:0]
+        if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
+            raise ValueError("a covariance is none")
+        return influence
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        problems.add(str(path), None, None, None, f"coefficients as --save-influence writes them ({reason})")
+    return None
+
+
+def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON document
+    """From real and imaginary parts."""
+    real, imaginary = np.array(parts, dtype=float)
+    return np.asarray(real + 1j * imaginary)
+
+
+def _document(influence: Influence) -> dict[str, Any]:
+    """All that is known of coefficients and their errors, SI and phase lead: (2, …) real, imaginary parts."""
+    own, common = influence.errors.noise.at(influence.errors.sizes)
+    run, reading = influence.run_errors, influence.reading
+    stored = {
+        "speeds_rad_s": influence.speeds,
+        "sensors": influence.sensors,
+        "planes": influence.planes,
+        "W": (influence.W.real, influence.W.imag),
+        "baseline": (influence.baseline.real, influence.baseline.imag),
+        "covariance": own,
+        "common": (common.real, common.imag),
+        "reading": {
+            "errors": None if reading.errors is None else asdict(reading.errors),
+            "source": reading.source,
+            "dof": reading.dof,
+        },
+        "run_errors": {field.name: getattr(run, field.name) for field in fields(run)},
+        "labels": asdict(influence.labels),
+    }
+    return plain({"schema_version": SCHEMA_VERSION, "influence": stored})
+
+
+def influence_frame(influence: Influence) -> pd.DataFrame:
+    """Influence coefficients as the table that `read_influence` reads, in their units and conventions.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `speed_<unit>`, `sensor`, `plane`, `influence_<unit>`, `phase_lead_deg` or `phase_lag_deg`; where
+        their errors are known, `std_<unit>`: one standard deviation, the same in every direction.
+    """
+    import pandas as pd
+
+    labels = influence.labels
+    S, C, P = influence.W.shape
+    speed = units.SPEED[labels.speed_unit]
+    unit = "_".join(filter(None, (labels.vibration_unit, "per", labels.weight_unit)))
+    size, phase = labels.vibration(influence.W / labels.weight_scale)
+    columns: dict[str, Any] = {
+        f"speed_{speed.name}": np.repeat(influence.speeds * speed.scale, C * P),
+        "sensor": [name for _ in range(S) for name in influence.sensors for _ in range(P)],
+        "plane": influence.planes * (S * C),
+        f"influence_{unit}": size.ravel(),
+        f"phase_{labels.phase}_deg": phase.ravel(),
+    }
+    if influence.known_errors:
+        variance = np.einsum("scii->sci", influence.channels())[..., 2:].reshape(S, C, P, 2).mean(axis=-1)
+        columns[f"std_{unit}"] = (np.sqrt(variance) * labels.vibration_scale / labels.weight_scale).ravel()
+    return pd.DataFrame(columns)
+
+
+def write_influence(path: str | Path, influence: Influence) -> None:
+    """Write influence coefficients: a table for people to `.csv` or `.xlsx`, without loss to `.json`.
+
+    JSON keeps the covariance of the coefficients, what sensors and speeds have in common, the errors of a
+    reading and between runs, and the readings of the bare rotor, with which the errors are correlated. A
+    later job with readings of its own has errors of its own; the same readings have the same as before.
+
+    Parameters
+    ----------
+    path
+        An existing file is replaced.
+    influence
+        The coefficients.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; nothing half written is left.
+    """
+    write_bytes(Path(path), influence_bytes(path, influence))
+
+
+def influence_bytes(path: str | Path, influence: Influence) -> bytes:
+    """What `write_influence` writes."""
+    if Path(path).suffix.lower() == ".json":
+        return json.dumps(_document(influence), ensure_ascii=False).encode()
+    return table_bytes(path, influence_frame(influence), sheet="influence")
+
+
+def fit_to_readings(
+    influence: Influence, trials: Trials, tolerance_percent: float, source: str, problems: Problems
+) -> Influence | None:
+    """The part of stored coefficients that belongs to the readings, in their order, or None and problems.
+
+    Every speed and sensor of the readings must be there; further ones are left out.
+    """
+    ours, theirs, rpm = trials.labels, influence.labels, units.SPEED["rpm"]
+    pairs = [("influence", units.vibration, ours.vibration_unit, theirs.vibration_unit, "runs")]
+    if trials.planes:
+        pairs.append(("influence", units.weight, ours.weight_unit, theirs.weight_unit, "weights"))
+    for column, unit_of, our, their, table in pairs:
+        if unit_of(our).kind != unit_of(their).kind:
+            expected = f"coefficients in {our or 'no unit'} or a unit that converts, as the {table} table has"
+            problems.add(source, None, column, their or "no unit", expected)
+    rows = [nearest_speed(influence.speeds, float(speed), tolerance_percent) for speed in trials.speeds]
+    speeds = zip(trials.speeds.tolist(), rows, strict=True)
+    lacking = [("speed", show_speed(speed, rpm), "runs") for speed, row in speeds if row is None]
+    lacking += [("sensor", repr(name), "runs") for name in trials.sensors if name not in influence.sensors]
+    lacking += [("plane", repr(name), "weights") for name in trials.planes if name not in influence.planes]
+    there = {"sensor": influence.sensors, "plane": influence.planes}
+    for what, name, table in lacking:
+        known = show_speeds(influence.speeds, rpm) if what == "speed" else listing(there[what], "and")
+        hint = did_you_mean(name.strip("'"), there.get(what, ()))
+        expected = f"coefficients of {what} {name}, as the {table} table has; there are {known}{hint}"
+        problems.add(source, None, what, None, expected)
+    if len(problems):
+        return None
+    columns = [influence.sensors.index(name) for name in trials.sensors]
+    unit = units.weight(ours.weight_unit if trials.planes else theirs.weight_unit)
+    if not trials.planes and unit.name == "kg_m":
+        unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
+    labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
+    return replace(influence.part([row or 0 for row in rows], columns), speeds=trials.speeds, labels=labels)

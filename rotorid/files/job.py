@@ -1,0 +1,901 @@
+"""Jobs: readings, weights, planes and sensors of one balancing job, from its files and settings."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from balancing import Holes, Influence, Labels, Limits, Trials, from_list
+from fem import Sensor as Probe
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.complex_numbers import off_axis
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import counted, listing
+from rotorid.files import units
+from rotorid.files.columns import Source, source_name
+from rotorid.files.conventions import (
+    ANGLES,
+    ROTATIONS,
+    Conventions,
+    StatedErrors,
+    as_angles,
+    as_phase,
+    check_angles,
+    resolve_angles,
+)
+from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.influence import Stored, fit_to_readings, load_influence
+from rotorid.files.job_excel import WrittenJob, open_job
+from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor, named_tables
+from rotorid.files.layout import files_of_runs, stated_phase
+from rotorid.files.problems import InputError, Problem, Problems
+from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
+from rotorid.files.settings import Settings
+from rotorid.files.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
+from rotorid.files.units import Quantity
+from rotorid.files.weights import read_weights
+from rotorid.files.weights_with_units import in_job_units, other_kind
+
+if TYPE_CHECKING:
+    from balancing import Mounted
+    from fem import Rotor
+
+IN_HOLE = 1e-3
+"""Relative distance of a weight from the hole that it is in."""
+Arc = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """What the caller says instead of a job, or where none says it.
+
+    Raises
+    ------
+    ValueError
+        If a value is none of the allowed ones.
+    """
+
+    phase: str | None = None
+    angles: str | None = None
+    amplitude_error_percent: float | None = None
+    phase_error_deg: float | None = None
+    run_error_percent: float | None = None
+    waveforms: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        Labels(phase=as_phase(self.phase or "lead"))
+        if self.angles is not None:
+            check_angles(self.angles)
+        self.on(None)
+
+    def on(self, stated: StatedErrors | None) -> StatedErrors | None:
+        """The errors of a job with those that the caller states."""
+        given = {
+            "amplitude_percent": self.amplitude_error_percent,
+            "phase_deg": self.phase_error_deg,
+            "run_percent": self.run_error_percent,
+        }
+        ours = {key: value for key, value in given.items() if value is not None}
+        return replace(stated or StatedErrors(), **ours) if ours else stated
+
+
+@dataclass(frozen=True)
+class JobSource:
+    """What a job is read from: a job (`.toml`, `.xlsx`), or runs and, perhaps, weights; influence table."""
+
+    files: tuple[Path, ...]
+    influence: Path | None = None
+    overrides: Overrides = field(default_factory=Overrides)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One balancing job, read completely.
+
+    Attributes
+    ----------
+    trials
+        Readings and mounted weights, these at the correction radius of their planes.
+    influence
+        Stored coefficients for the speeds and sensors of the readings, in their order, or None.
+    conventions
+        Of phases, angles and speeds.
+    files
+        All files that were read, for the provenance of a result.
+    planes
+        By name, what the job says of each (P): those of stored coefficients or else of the weights, then
+        those that only the rotor model knows. A `node` is a number; lengths in m, angles as the job counts.
+    sensors
+        The same for each sensor of the readings (C).
+    limits
+        In SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`; None: none.
+    row_weights
+        Of each reading in the fit, shape (S, C): the speed's times the sensor's; None where all are 1.
+    check
+        Check runs, in the units and at the speeds of the job, or None.
+    check_mounted
+        Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
+    check_of_weights
+        Whether these were the weights, although there are holes for pieces.
+    check_pieces
+        The pieces that `check.weights` are then, by `rotorid.commands.after_check`; None: others.
+    rotor
+        The model that the job names, or None.
+    holes
+        What can be mounted in each plane that says so, in the unit of the weights; where material is removed
+        their angles are those of the equivalent added weights (180° from the hole).
+    slow_roll
+        Slow-roll vectors, (C,) for all speeds or (S, C), which are subtracted from the readings of `trials`
+        and `check` already; None: none.
+    key_phasor
+        Its direction, degrees with the rotation from the model's x.
+    machine, machine_type, date
+        What was balanced, of which type, and when; empty and None where the job does not say.
+    sheet
+        What it says for the balancing sheet: `[sheet]`.
+    """
+
+    trials: Trials
+    influence: Influence | None
+    conventions: Conventions
+    files: tuple[Path, ...]
+    planes: dict[str, Plane] = field(default_factory=dict)
+    sensors: dict[str, Sensor] = field(default_factory=dict)
+    limits: Limits | None = None
+    row_weights: FloatArray | None = None
+    check: Trials | None = None
+    check_mounted: bool = False
+    check_of_weights: bool = False
+    check_pieces: Mounted | None = None
+    rotor: Rotor | None = None
+    holes: Mapping[str, Holes] = field(default_factory=dict)
+    slow_roll: ComplexArray | None = None
+    key_phasor: float = 0.0
+    machine: str = ""
+    machine_type: str = ""
+    date: datetime.date | None = None
+    sheet: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Planes that are not left out."""
+        return tuple(name for name, plane in self.planes.items() if plane.use)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Planes that the job tells not to use."""
+        return tuple(name for name, plane in self.planes.items() if not plane.use)
+
+    @property
+    def removed(self) -> list[str]:
+        """Planes in which material is taken away."""
+        return [name for name, plane in self.planes.items() if plane.remove]
+
+    @property
+    def radii(self) -> dict[str, float]:
+        """Radius, m, of each plane that has one: it converts between masses and unbalances."""
+        return {name: plane.radius for name, plane in self.planes.items() if plane.radius is not None}
+
+    @property
+    def trial_radii(self) -> dict[str, float]:
+        """Radius, m, at which the weights of the weights table were mounted, where it is another."""
+        radii = {name: plane.trial_radius for name, plane in self.planes.items()}
+        return {name: radius for name, radius in radii.items() if radius is not None}
+
+    @property
+    def plane_nodes(self) -> dict[str, int]:
+        """Node of each plane that has one in the model."""
+        return {name: plane.node for name, plane in self.planes.items() if plane.node is not None}
+
+    @property
+    def sensor_angles(self) -> dict[str, float]:
+        """Direction of each sensor that the job states, degrees with the rotation from the model's x."""
+        turn = self.conventions.labels.with_rotation
+        return {name: turn(one.angle) for name, one in self.sensors.items() if one.angle is not None}
+
+    @property
+    def sensor_places(self) -> dict[str, Probe]:
+        """Node and direction of each sensor that has a node."""
+        angles = self.sensor_angles
+        nodes = {name: one.node for name, one in self.sensors.items()}
+        return {name: Probe(node, angles.get(name, 0.0)) for name, node in nodes.items() if node is not None}
+
+    def limits_of(self, planes: Sequence[str]) -> Limits | None:
+        """Limits of these planes only, in their order, at all speeds."""
+        if self.limits is None:
+            return None
+        order = list(self.planes)
+        return self.limits.pick(range(len(self.trials.speeds)), [order.index(p) for p in planes])
+
+
+def read_job(
+    path: str | Path,
+    *,
+    phase: str | None = None,
+    angles: str | None = None,
+    amplitude_error_percent: float | None = None,
+    phase_error_deg: float | None = None,
+    run_error_percent: float | None = None,
+    waveforms: str | Path | None = None,
+) -> Job:
+    """Read a job file (`.toml`) or a workbook (`.xlsx`, sheets runs, weights, planes, sensors, settings).
+
+    Parameters
+    ----------
+    path
+        The job; files that it names are found relative to it.
+    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
+        Replace what the job says.
+    waveforms
+        A waveforms file, in place of the runs table.
+
+    Returns
+    -------
+    Job
+        In SI, phase lead, angles with the rotation, and labels to print in.
+
+    Raises
+    ------
+    InputError
+        With all problems of all files of the job.
+    ValueError
+        If an argument is none of the allowed values.
+    """
+    overrides = Overrides(
+        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
+    )
+    problems = Problems()
+    return job_of(open_job(Path(path), problems), overrides, problems)
+
+
+def job_from_files(
+    files: Sequence[str | Path],
+    *,
+    influence: str | Path | None = None,
+    phase: str | None = None,
+    angles: str | None = None,
+    amplitude_error_percent: float | None = None,
+    phase_error_deg: float | None = None,
+    run_error_percent: float | None = None,
+    waveforms: str | Path | None = None,
+) -> Job:
+    """A job without a job file: a runs table with a weights table, or with stored coefficients.
+
+    Parameters
+    ----------
+    files
+        Runs and weights; with `influence` the weights (mounted during the runs) may be left out.
+    influence
+        Influence table.
+    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
+        Conventions and stated errors; default: lead and with rotation, which the labels then call assumed;
+        none stated.
+    waveforms
+        As of `read_job`.
+
+    Returns
+    -------
+    Job
+        As of `read_job`.
+
+    Raises
+    ------
+    InputError
+        With all problems of all files.
+    ValueError
+        If the files are too few or too many, or an argument is none of the allowed values.
+    """
+    if not 1 <= len(files) <= 2 or (len(files) == 1 and influence is None):
+        raise ValueError(
+            "give a job (.toml or .xlsx), or a runs table and a weights table, or a runs table and "
+            f"--influence with an influence table; got {counted(len(files), 'file')}"
+        )
+    overrides = Overrides(
+        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
+    )
+    if angles is not None:
+        resolve_angles(angles, None)
+    tables: dict[str, Source] = dict(zip(("runs", "weights"), map(Path, files), strict=False))
+    if influence is not None:
+        tables["influence"] = Path(influence)
+    return job_of(WrittenJob(None, tables=tables), overrides, Problems())
+
+
+def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job:
+    """The job of these settings and tables; raises `InputError` with all problems."""
+    settings = written.read(problems)
+    tables, records = tables_of(written, settings)
+    if overrides.waveforms is not None:
+        tables["runs"] = Path(overrides.waveforms)
+    # vectors know their sign, so that nothing is assumed: a job that says nothing writes lead
+    phase = overrides.phase or settings.phase
+    for key in ("runs", "check", "slow_roll"):
+        path = tables.get(key)
+        if isinstance(path, Path) and path.suffix.lower() == ".toml":
+            from rotorid.files.waveforms import read_vectors_grid
+
+            grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
+            tables[key], records = grid, (*records, *read)
+            overrides = replace(overrides, phase=phase)
+    refused = len(problems) > 0
+    if not refused:
+        _need_rotation(settings, overrides.angles or settings.angles, problems)
+    elif "columns" in written.settings:  # by which the tables would be read
+        problems.stop()
+    readings = _readings(settings, tables, overrides, problems)
+    if refused:
+        problems.stop()
+    settings, rotor, model_files = _in_model(settings, written.folder, problems)
+    readings = problems.need(readings)
+    trials, planes = _planes(settings, readings, rotor, problems)
+    sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
+    limits = _limits(settings, planes, trials, problems)
+    row_weights = _row_weights(settings, sensors, trials, problems)
+    holes = {
+        name: made
+        for k, (name, plane) in enumerate(planes.items())
+        if (made := _holes(plane, k, trials.labels, limits, problems)) is not None
+    }
+    check = _check(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
+    mounted = tables.get("check_weights")
+    if check is not None and mounted is not None:
+        holes = _taken(mounted, check, readings.conventions, holes)
+    problems.stop()
+    order = ("runs", "weights", "influence", "", "check", "check_weights", "slow_roll")
+    first, last = ([tables.get(key) for key in part] for part in (order[:3], order[4:]))
+    files = [written.path, *first, *model_files, *last]
+    labels = readings.conventions.labels
+    phasor = settings.key_phasor.angle if settings.key_phasor else 0.0
+    return _with_assumed(
+        Job(
+            trials=trials,
+            influence=readings.influence,
+            conventions=readings.conventions,
+            files=(*(file for file in files if isinstance(file, Path)), *records),
+            planes=planes,
+            sensors=sensors,
+            limits=limits,
+            row_weights=row_weights,
+            check=check,
+            check_mounted=check is not None and mounted is not None,
+            check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
+            rotor=rotor,
+            holes=holes,
+            slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
+            key_phasor=labels.with_rotation(phasor),
+            machine=settings.machine,
+            machine_type=settings.machine_type,
+            date=settings.date,
+            sheet=settings.sheet.model_dump(),
+        )
+    )
+
+
+def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
+    """What tables there are, by `TABLES`, and the files with one run each."""
+    named = named_tables({key: getattr(settings, key) for key in TABLES})
+    tables: dict[str, Source] = {key: written.folder / name for key, name in named.items()}
+    runs = tuple(written.folder / name for name in settings.runs or ())
+    if runs:
+        tables["runs"] = runs if len(runs) > 1 else runs[0]
+    tables |= written.tables
+    files = runs if len(runs) > 1 else files_of_runs(tables.get("runs"))
+    if files:
+        tables["runs"] = files
+    return tables, tuple(files)
+
+
+def _need_rotation(settings: JobSettings, angles: str | None, problems: Problems) -> None:
+    """Complain about directions without the rotation that they are seen against."""
+    seen = f"the {settings.view}" if settings.view else ""
+    if angles in ROTATIONS:
+        seen = f"the same end as the angles, which count {angles}"
+    if seen and settings.rotation is None:
+        expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from {seen}"
+        settings.complain(problems, "rotation", expected)
+
+
+class _Readings(NamedTuple):
+    """What the tables of a job say, with its conventions settled and slow roll subtracted."""
+
+    trials: Trials
+    influence: Influence | None
+    conventions: Conventions
+    errors: StatedErrors | None
+    slow_roll: SlowRoll | None
+
+
+def _readings(
+    settings: JobSettings, tables: Mapping[str, Source], overrides: Overrides, problems: Problems
+) -> _Readings | None:
+    """Trial runs and stored coefficients, or None and problems."""
+    given = {*tables, *(key for key in (*TABLES, "rotor", "machine_type") if settings.has(key))}
+    if "check_weights" in given and "check" not in given:
+        expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
+        settings.complain(problems, "check_weights", expected)
+    if not given & {"weights", "influence", "rotor", "machine_type"}:
+        expected = (
+            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
+            "whose coefficients come with balance --type"
+        )
+        settings.complain(problems, "weights", expected)
+    if "runs" not in tables:
+        return None
+    before = len(problems)
+    errors = overrides.on(settings.errors.stated if settings.errors else None)
+    if (overrides.phase or settings.phase) is None:
+        overrides = replace(overrides, phase=stated_phase(tables["runs"], settings.columns))
+    stored, name = None, ""
+    if "influence" in tables:
+        name = source_name(tables["influence"])
+        known = conventions_of(settings, overrides)
+        phase, angles = (
+            None if k in known.unstated else getattr(known.labels, k) for k in ("phase", "angles")
+        )
+        stored = load_influence(tables["influence"], phase, angles, problems)
+    conventions = conventions_of(settings, overrides, {} if stored is None else stored.said)
+    trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, problems)
+    influence = None
+    if stored is not None and trials is not None:
+        tolerance = conventions.speed_tolerance_percent
+        influence = fit_to_readings(stored.influence, trials, tolerance, name, problems)
+    if trials is None or len(problems) > before:
+        return None
+    labels = conventions.on(trials.labels if influence is None else influence.labels)
+    if influence is not None:
+        influence = replace(influence, labels=labels)
+    notes = _notes(conventions, stored, name)
+    trials = replace(trials, labels=labels, warnings=notes + trials.warnings)
+    vectors = tables.get("slow_roll", settings.slow_roll)
+    roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
+    if roll is not None:
+        trials = subtract_slow_roll(trials, roll)
+    return _Readings(trials, influence, conventions, errors, roll)
+
+
+def conventions_of(
+    settings: JobSettings, overrides: Overrides, stored: Mapping[str, str] | None = None
+) -> Conventions:
+    """What the numbers of the tables mean: as the caller says, or the job, or the stored coefficients."""
+    stored, rotation = stored or {}, settings.rotation
+    phase, angles = overrides.phase or settings.phase, overrides.angles or settings.angles
+    clock = angles in ROTATIONS and rotation is not None
+    if angles is not None:
+        angles = None if rotation is None and angles not in ANGLES else resolve_angles(angles, rotation)
+    labels = Labels(
+        phase=as_phase(phase or stored.get("phase", "lead")),
+        angles=as_angles(angles or stored.get("angles", "with rotation")),
+        rotation=rotation,
+        view=settings.view if rotation else None,
+        clock=clock,
+    )
+    speed, planes = settings.speed, settings.planes.items()
+    return Conventions(
+        labels,
+        settings.speed_tolerance_percent,
+        tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None),
+        settings.columns,
+        None if speed is None else (speed.unit.name, speed.value),
+        {name: holes for name, plane in planes if (holes := plane.hole_angles())},
+        frozenset(name for name, plane in planes if plane.remove),
+    )
+
+
+def _notes(conventions: Conventions, stored: Stored | None, name: str) -> tuple[str, ...]:
+    """What the user should know about conventions that the coefficients state, or state otherwise."""
+    phase, angles, unstated = conventions.labels.phase, conventions.labels.angles, conventions.unstated
+    adopted = []
+    if "phase" in unstated and phase != "lead":
+        adopted.append(f"phase = {phase}")
+    if "angles" in unstated and angles != "with rotation":
+        adopted.append(f"angles {angles}")
+    notes = []
+    if adopted:
+        notes.append(
+            f"nothing states the conventions of the readings: those of {name} are used for them too, "
+            f"{' and '.join(adopted)}"
+        )
+    if stored is not None and stored.said.get("phase", phase) != phase:
+        notes.append(
+            f"the readings are taken with phase = {phase}, as stated, and the coefficients with "
+            f"phase = {stored.said['phase']}, as {name} says"
+        )
+    return tuple(notes)
+
+
+def _in_model(
+    settings: JobSettings, folder: Path, problems: Problems
+) -> tuple[JobSettings, Rotor | None, tuple[Path, ...]]:
+    """The settings with stations as nodes, the rotor model, and its files."""
+    parts = [*settings.planes.values(), *settings.sensors.values()]
+    if settings.rotor is None:
+        for part in parts if not settings.has("rotor") else ():
+            key = "station" if part.station else "node"
+            if part.has(key):
+                expected = f'the rotor model of this {key} too, rotor = "rotor.toml"'
+                part.complain(problems, key, expected)
+        return settings, None, ()
+    from rotorid.files.rotor import read_rotor, rotor_files
+
+    path = folder / settings.rotor
+    try:
+        rotor = read_rotor(path)
+    except InputError as error:
+        problems.extend(error.problems)
+        return settings, None, ()
+    stations = rotor.stations
+    for part in parts:
+        if part.station is not None and part.station not in stations:
+            known, hint = listing(map(repr, stations), "and") or "none", did_you_mean(part.station, stations)
+            expected = f"a station of the rotor model{hint}; its stations are {known}"
+            part.complain(problems, "station", expected)
+        if part.node is not None and part.node > rotor.n_nodes:
+            part.complain(problems, "node", f"a node of the rotor model, from 1 to {rotor.n_nodes}")
+    placed = {
+        kind: {
+            name: part.model_copy(update={"node": stations.get(part.station or "", part.node)})
+            for name, part in getattr(settings, kind).items()
+        }
+        for kind in ("planes", "sensors")
+    }
+    return settings.model_copy(update=placed), rotor, rotor_files(path)
+
+
+def _planes(
+    settings: JobSettings, readings: _Readings, rotor: Rotor | None, problems: Problems
+) -> tuple[Trials, dict[str, Plane]]:
+    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone."""
+    trials, stated = readings.trials, settings.planes
+    own = trials.planes if readings.influence is None else readings.influence.planes
+    every = rotor is None and not own  # or what a type knows
+    more = [name for name, plane in stated.items() if every or plane.node is not None]
+    planes = {name: stated.get(name, Plane()) for name in (*own, *more)}
+    if not own:
+        masses = rotor is None or all(plane.radius is not None for plane in planes.values())
+        unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
+        if rotor is not None:
+            _need_places(settings, trials.sensors, problems)
+        labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
+        trials = replace(trials, labels=labels)
+    if planes:
+        _known(settings, "planes", tuple(planes), problems)
+        if not any(plane.use for plane in planes.values()):
+            expected = "at least one plane without use = false"
+            problems.extend([_without_value(settings, "planes", expected)])
+    _known(settings, "sensors", trials.sensors, problems)
+    # what acts is the unbalance, mass × radius: a mass m at the radius r counts as m r / R at R
+    factors = np.ones(len(trials.planes))
+    if units.weight(trials.labels.weight_unit).kind == "mass":
+        for k, name in enumerate(trials.planes):
+            plane = planes.get(name, Plane())
+            if plane.trial_radius is not None and plane.radius is not None:
+                factors[k] = plane.trial_radius / plane.radius
+            elif plane.trial_radius is not None:
+                expected = "the correction radius too, radius_mm, to which the trial weights are converted"
+                plane.complain(problems, "trial_radius", expected)
+    return replace(trials, weights=trials.weights * factors), planes
+
+
+def _need_places(settings: JobSettings, sensors: Sequence[str], problems: Problems) -> None:
+    """A job without weights and coefficients rests on the model: every sensor and some plane need a node."""
+    if not any(plane.node is not None and plane.use for plane in settings.planes.values()):
+        expected = "a plane with a node of the rotor model ([planes.NAME], node = 3), or a weights table"
+        problems.extend([_without_value(settings, "planes", expected)])
+    for name in sensors:
+        if name not in settings.sensors or settings.sensors[name].node is None:
+            expected = f"a node of the rotor model for sensor {name!r} ([sensors.{name}], node = 3)"
+            problems.extend([_without_value(settings, "sensors", expected)])
+
+
+def _without_value(settings: Settings, key: str, expected: str) -> Problem:
+    return replace(settings.problem(key, expected), value=None)
+
+
+def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Problems) -> None:
+    """Complain about planes or sensors that are in no table."""
+    for name, part in getattr(settings, key).items():
+        if name in known:
+            continue
+        hint = did_you_mean(name, known)
+        expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
+        if key == "planes" and not hint:
+            expected += f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
+        problems.extend([replace(part.problem("", expected), value=name)])
+
+
+def _arc(labels: Labels, first: float, last: float, *, opposite: bool) -> Arc:
+    """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
+
+    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
+    is removed a job says where nothing can be taken away; the weight that would have to be added instead
+    stands `opposite`, and so does the arc of the correction.
+    """
+    start = (first if labels.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
+    return math.radians(start % 360.0), math.radians((last - first) % 360.0)
+
+
+def _limits(
+    settings: JobSettings, planes: Mapping[str, Plane], trials: Trials, problems: Problems
+) -> Limits | None:
+    """In SI with the rotation, in the order of speeds, sensors and planes; None: nothing limited."""
+    labels, most = trials.labels, np.full(len(planes), np.inf)
+    for k, plane in enumerate(planes.values()):
+        if plane.max_weight is not None:
+            size = in_job_units(plane.max_weight, labels.weight_unit, plane.radius)
+            if size is None:
+                plane.complain(problems, "max_weight", other_kind("max", labels.weight_unit))
+            else:
+                most[k] = size[0]
+    arcs = tuple(
+        tuple(_arc(labels, *pair, opposite=plane.remove) for pair in plane.forbidden or ())
+        for plane in planes.values()
+    )
+    residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
+    for name, sensor in settings.sensors.items():
+        if name in trials.sensors and sensor.limit:
+            rows = _at_speeds(settings, sensor, "limit", trials, math.inf, problems)
+            residual[:, trials.sensors.index(name)] = rows / labels.vibration_scale
+    limits = Limits(most, residual, arcs)
+    return limits if limits.any else None
+
+
+def _row_weights(
+    settings: JobSettings, sensors: Mapping[str, Sensor], trials: Trials, problems: Problems
+) -> FloatArray | None:
+    """Of each reading, (S, C): that of its speed times that of its sensor; None: all 1."""
+    columns = np.array([sensor.weight for sensor in sensors.values()])
+    rows = _at_speeds(settings, settings, "speed_weights", trials, 1.0, problems)
+    for key, weights in (("sensors", columns), ("speed_weights", rows)):
+        if not weights.any():
+            expected = f"at least one {key.split('_')[0].rstrip('s')} with a weight above 0"
+            problems.extend([_without_value(settings, key, expected)])
+    return None if (columns == 1.0).all() and (rows == 1.0).all() else np.asarray(rows[:, None] * columns)
+
+
+def _at_speeds(
+    settings: JobSettings, part: Settings, key: str, trials: Trials, default: float, problems: Problems
+) -> FloatArray:
+    """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
+    numbers: Mapping[str, float] = getattr(part, key)
+    unit = units.SPEED[trials.labels.speed_unit]
+    out = np.full(len(trials.speeds), numbers.get("", default))
+    seen: dict[int, str] = {}
+    for word, number in numbers.items():
+        if not word:
+            continue
+        speed = unit.to_si(parse_number(word, comma="," in word))
+        near = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
+        if near is None:
+            known = show_speeds(trials.speeds, unit)
+            expected = f"speeds of the runs table, not {word}: there are {known}"
+            part.complain(problems, key, expected)
+        elif near in seen:
+            expected = f"each speed once; {seen[near]} and {word} count as one"
+            part.complain(problems, key, expected)
+        else:
+            seen[near] = word
+            out[near] = number
+    return out
+
+
+def _holes(plane: Plane, k: int, labels: Labels, limits: Limits | None, problems: Problems) -> Holes | None:
+    """Holes of a plane, as the job's weights are (kg or kg·m); those inside a forbidden arc are left out.
+
+    Where material is removed a hole drilled at the angle φ acts like a weight added at φ + 180°: `Holes` has
+    the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is the correction.
+    """
+    at = plane.hole_angles()
+    if not at:
+        return None
+    arcs, largest = ((), math.inf) if limits is None else (limits.forbidden[k], float(limits.max_weight[k]))
+    sizes: dict[str, tuple[float, ...]] = {}
+    for field_, quantity in (("available", plane.available), ("step", plane.step)):
+        made = () if quantity is None else in_job_units(quantity, labels.weight_unit, plane.radius)
+        if made is None:
+            expected = other_kind(plane.written(field_), labels.weight_unit)
+            plane.complain(problems, field_, expected)
+            return None
+        sizes[field_] = made
+    turn = 180.0 if plane.remove else 0.0
+    angles = {name: math.radians((labels.with_rotation(angle) + turn) % 360.0) for name, angle in at.items()}
+    taken = {name: plane.taken.get(name, 0.0) / labels.weight_scale for name in at}
+    kept = [name for name, angle in angles.items() if taken[name] > 0 or not _inside(angle, arcs)]
+    key = "holes" if plane.holes is not None else "holes_at"
+    if not any(taken[name] == 0 for name in kept):
+        plane.complain(problems, key, "at least one free hole outside the angles of forbidden_deg")
+        return None
+    try:
+        return from_list(
+            [angles[name] for name in kept],
+            sizes["available"],
+            per_hole=plane.per_hole,
+            step=(sizes["step"] or (0.0,))[0],
+            taken=[taken[name] for name in kept],
+            stock=None if plane.stock is None else np.array(plane.stock),
+            names=kept,
+            max_weight=largest,
+        )
+    except ValueError as error:
+        plane.complain(problems, key, f"holes in which something can be mounted: {error}")
+        return None
+
+
+def _inside(angle: float, arcs: Iterable[Arc]) -> bool:
+    """Whether an angle lies strictly inside one of the arcs; their ends, to within rounding, do not count."""
+    near = math.radians(SAME_DEG)
+    return any(near < (angle - start) % (2 * math.pi) < width - near for start, width in arcs)
+
+
+def _check(
+    tables: Mapping[str, Source],
+    readings: _Readings,
+    trials: Trials,
+    planes: tuple[str, ...],
+    problems: Problems,
+) -> Trials | None:
+    """Check runs, fitted to the speeds, units and names of the job, or None and problems."""
+    runs, weights = tables["check"], tables.get("check_weights")
+    check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
+    if check is None:
+        return None
+    before = len(problems)
+    _check_units(check, trials.labels, runs, weights, problems)
+    for found, known, what, table in (
+        (check.sensors, trials.sensors, "sensor", runs),
+        (check.planes, planes, "plane", runs if weights is None else weights),
+    ):
+        for name in found:
+            if name not in known:
+                expected = (
+                    f"a {what} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
+                )
+                problems.add(source_name(table), None, what, name, expected)
+    tolerance = readings.conventions.speed_tolerance_percent
+    speeds = list(_check_speeds(check, trials, tolerance, source_name(runs), problems))
+    if len(problems) > before:
+        return None
+    shown, mounted = check.planes, check.weights
+    if weights is not None:
+        # all planes of the job: a weights table without rows says that nothing was mounted
+        shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
+        mounted[:, [planes.index(name) for name in check.planes]] = check.weights
+    check = replace(check, speeds=np.array(speeds), labels=trials.labels, planes=shown, weights=mounted)
+    if readings.slow_roll is None:
+        return check
+    check = subtract_slow_roll(check, readings.slow_roll)
+    return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))
+
+
+def _check_speeds(
+    check: Trials, trials: Trials, tolerance_percent: float, source: str, problems: Problems
+) -> Iterator[float]:
+    """The speeds of the job that those of the check runs are."""
+    unit, seen = units.SPEED[check.labels.speed_unit], set[int]()
+    for speed in check.speeds.tolist():
+        near = nearest_speed(trials.speeds, speed, tolerance_percent)
+        if near is None or near in seen:
+            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
+            problems.add(source, None, "speed", show_speed(speed, unit), expected)
+            continue
+        seen.add(near)
+        yield float(trials.speeds[near])
+
+
+def _check_units(
+    check: Trials, ours: Labels, runs: Source, weights: Source | None, problems: Problems
+) -> None:
+    """Complain about what does not convert into the units of the job."""
+    theirs = check.labels
+    if units.vibration(ours.vibration_unit).kind != units.vibration(theirs.vibration_unit).kind:
+        expected = (
+            f"readings in {ours.vibration_unit or 'no unit'}, as in the runs table, or converting to it"
+        )
+        problems.add(source_name(runs), None, "amplitude", theirs.vibration_unit or "no unit", expected)
+    if weights is not None and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
+        expected = f"weights in {ours.weight_unit}, as the job has, or in a unit that converts to it"
+        problems.add(source_name(weights), None, "weight", theirs.weight_unit, expected)
+
+
+def _taken(
+    weights: Source, check: Trials, conventions: Conventions, holes: Mapping[str, Holes]
+) -> dict[str, Holes]:
+    """The holes with what stands in them since the last check run, where the job does not say what is taken.
+
+    A plane whose weights are not all in its holes, or fill all of them, stays as it is.
+    """
+    read = read_weights(weights, check.runs, conventions, Problems())
+    rows = () if read is None else read.rows
+    out = dict(holes)
+    for plane, free in holes.items():
+        mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
+        if not len(mounted) or free.taken.any():
+            continue
+        unit = np.exp(1j * free.angles)
+        hole = np.argmax((unit.conj() * mounted[:, None]).real, axis=1)
+        taken = np.zeros(len(unit))
+        np.add.at(taken, hole, np.abs(mounted))
+        off = np.abs(mounted - np.abs(mounted) * unit[hole])
+        if (off <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
+            out[plane] = replace(free, taken=taken)
+    return out
+
+
+def _with_assumed(job: Job) -> Job:
+    """The job whose labels name what is assumed.
+
+    Phases always matter. The direction of angles matters as soon as the job writes an angle other than 0° and
+    180°: of a weight, a hole, a forbidden arc, or of a sensor or key phasor of the model.
+    """
+    matters = {"phase": True, "angles": any(off_axis(unit) for unit in _directions(job))}
+    assumed = tuple(name for name in job.conventions.unstated if matters[name])
+    if not assumed:
+        return job
+    labels = replace(job.trials.labels, assumed=assumed)
+    parts = {name: getattr(job, name) for name in ("trials", "influence", "check")}
+    return replace(job, **{k: replace(one, labels=labels) for k, one in parts.items() if one is not None})
+
+
+def _directions(job: Job) -> Iterator[ComplexArray]:
+    """Whatever the job writes with an angle, as complex numbers."""
+    yield job.trials.weights
+    if job.check is not None:
+        yield job.check.weights
+    for holes in job.holes.values():
+        yield np.exp(1j * holes.angles)
+    for arcs in () if job.limits is None else job.limits.forbidden:
+        yield np.exp(1j * np.array([end for start, width in arcs for end in (start, start + width)]))
+    if job.rotor is not None:
+        yield np.exp(1j * np.radians([job.key_phasor, *job.sensor_angles.values()]))
+
+
+def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:
+    """The job with other limits, each in place of what the job itself says there.
+
+    Parameters
+    ----------
+    job
+        As read.
+    weights
+        Largest weights by plane; a mass where the job's weights are unbalances (or the reverse) needs the
+        plane's `radius_mm`. The key is what complaints begin with.
+    amplitudes
+        Largest amplitudes by sensor, at all speeds.
+
+    Returns
+    -------
+    Job
+        With new `limits`; holes keep to the largest weight of their plane.
+
+    Raises
+    ------
+    ValueError
+        For a weight that does not convert to those of the job, and one that the holes cannot keep to.
+    """
+    if not weights and not amplitudes:
+        return job
+    trials, own, planes = job.trials, job.trials.labels.weight_unit, list(job.planes)
+    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(planes))
+    most, residual = old.max_weight.copy(), old.residual.copy()
+    for plane, weight in weights.items():
+        size = in_job_units(weight, own, job.planes[plane].radius)
+        if size is None:
+            raise ValueError(
+                f"{weight.key}: the weights of the job are in {own}, to which {weight.unit.name} converts "
+                f"only with a radius_mm of plane {plane!r} in the job"
+            )
+        most[planes.index(plane)] = size[0]
+    for sensor, amplitude in amplitudes.items():
+        residual[:, trials.sensors.index(sensor)] = amplitude.si
+    holes = {}
+    for name, its in job.holes.items():
+        try:
+            holes[name] = replace(its, max_weight=float(most[planes.index(name)]))
+        except ValueError as error:
+            raise ValueError(f"{weights[name].key}: plane {name!r}: {error}") from None
+    return replace(job, limits=Limits(most, residual, old.forbidden), holes=holes)

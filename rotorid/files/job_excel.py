@@ -1,0 +1,381 @@
+"""Jobs as they are written: a job file, or the sheets of a workbook; workbooks with results."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import re
+import tomllib
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, Protocol
+
+from balancing import Influence
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.tables import LONGEST_TITLE
+from rotorid.base.text import listing
+from rotorid.files.cells import BadCell, Cell, Grid, Row, Shown, make_grid, read_bytes, show
+from rotorid.files.columns import REMARKS, Source, sheet_source
+from rotorid.files.decimal_numbers import parse_number
+from rotorid.files.excel_pages import Line, Page, book_bytes
+from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.job_models import READINGS, TABLES, JobSettings, Plane, Sensor
+from rotorid.files.layout import rows_from_header
+from rotorid.files.problems import Problems
+from rotorid.files.settings import Settings, read_settings
+from rotorid.files.toml_file import read_toml
+
+NAMED: dict[str, tuple[str, type[Settings]]] = {"planes": ("plane", Plane), "sensors": ("sensor", Sensor)}
+"""Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""
+SETTINGS = (*NAMED, "settings")
+RESULTS = "results"
+"""Sheets whose names begin so hold what a command has computed: they are not read."""
+OPTIONAL = "note (a blank value: not stated)"
+"""A column of the sheet settings with this name lets values be blank, for forms to fill in."""
+TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
+"""Columns of names, in which `1` is text."""
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenJob:
+    """A job as it is written: settings nested as in a job file, and the tables of a workbook.
+
+    Attributes
+    ----------
+    path
+        The job file or workbook, None without one.
+    settings
+        As a job file holds them.
+    tables
+        Tables that are there already, by `TABLES`: cells of sheets, or files.
+    where
+        Sheet, row and column of each setting, by its dotted key.
+    """
+
+    path: Path | None
+    settings: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, Source] = field(default_factory=dict)
+    where: dict[str, tuple[str, int, str]] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """From which files are named."""
+        return Path() if self.path is None else self.path.parent
+
+    def read(self, problems: Problems) -> JobSettings:
+        """All settings; a file that is named in place of a sheet is a problem."""
+        source = "" if self.path is None else str(self.path)
+        read = read_settings(JobSettings, self.settings, source, problems, self.where)
+        settings = problems.need(read)
+        if not self.tables and "runs" not in self.settings:
+            settings.complain(problems, "runs", 'the runs table, runs = "runs.csv"')
+        for key in TABLES if self.tables and self.path else ():
+            if settings.has(key) and (key in self.tables or key in TABLES[:2]):
+                expected = f"the table in the sheet {key!r} of this workbook, not a file"
+                settings.complain(problems, key, expected)
+        return settings
+
+
+def open_job(path: Path, problems: Problems) -> WrittenJob:
+    """A job file (`.toml`) or a workbook (`.xlsx`) as it is written.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of a job in it.
+    """
+    if is_workbook(path):
+        return job_in_sheets(path, problems.need(read_workbook(path, problems)), problems)
+    if path.suffix.lower() != ".toml":
+        expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
+        problems.add(str(path), None, None, None, expected)
+        problems.stop()
+    return WrittenJob(path, problems.need(read_toml(path, problems)))
+
+
+def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Problems) -> WrittenJob:
+    """The job in the sheets of a workbook; `path` is where it is, or will be.
+
+    Raises
+    ------
+    InputError
+        If there are no runs; other problems are noted.
+    """
+    known = (*TABLES, *SETTINGS, RESULTS)
+    titles = {
+        title.strip().casefold(): title for title in reversed(list(sheets)) if _holds_cells(sheets[title])
+    }
+    for name, title in titles.items():
+        if name not in known and not name.startswith((RESULTS, *REMARKS)):
+            expected = (
+                f"a known sheet{did_you_mean(name, known)}; known are {listing(known, 'and')}, remarks go "
+                "into 'notes' (hidden sheets count too)"
+            )
+            problems.add(str(path), None, None, title, expected)
+    job = WrittenJob(path)
+    for name in (*TABLES, *SETTINGS):
+        if name not in titles:
+            continue
+        source, rows = sheet_source(path, titles[name]), sheets[titles[name]]
+        if name in (*READINGS, "weights", "check_weights"):
+            rows = rows_from_header(rows, {}, weights=name not in READINGS)
+        may_be_empty = name in ("weights", "check_weights", *SETTINGS)
+        grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)
+        if grid is not None and name in TABLES:
+            job.tables[name] = grid
+        elif grid is not None:
+            (_read_settings if name == "settings" else _read_named)(grid, name, job, problems)
+    if "runs" not in titles:
+        shown = listing((repr(title) for title in sheets), "and")
+        problems.add(str(path), None, None, None, f"a sheet 'runs' with readings; the sheets are {shown}")
+    if "runs" not in job.tables:
+        problems.stop()
+    return job
+
+
+def _holds_cells(rows: Sequence[Row]) -> bool:
+    return any(show(cell) for _, cells in rows for cell in cells)
+
+
+def _is_remark(name: str) -> bool:
+    return not name or name.casefold().startswith(REMARKS)
+
+
+def _value(key: str, cell: Cell) -> Cell | bool:
+    """A cell as a job file has it: a logical one as that, a date as its text."""
+    if isinstance(cell, BadCell):
+        if cell.value in ("TRUE", "FALSE"):
+            return cell.value == "TRUE"
+        return cell.value.partition(" ")[0] if key == "date" else cell
+    return cell
+
+
+def _read_settings(grid: Grid, _: str, job: WrittenJob, problems: Problems) -> None:
+    """Rows of key and value; a dotted key stands for a table (`errors.phase_deg`)."""
+    folded = [name.casefold() for name in grid.header]
+    if [name for name in folded if not _is_remark(name)] not in (["key", "value"], ["setting", "value"]):
+        found = listing(filter(None, grid.header), "and")
+        problems.add(grid.source, grid.header_row, None, found, "the columns key and value")
+        return
+    at, to = (
+        next(i for i, name in enumerate(folded) if name in pair) for pair in (("key", "setting"), ("value",))
+    )
+    for row, cells in grid.rows:
+        key = show(cells[at])
+        parts = key_parts(key)
+        name, place = ".".join(parts), (grid.source, row, grid.header[to])
+        value = _value(parts[-1], cells[to])
+        wrong, expected = at, ""
+        if isinstance(cells[at], BadCell) or not key:
+            expected = getattr(cells[at], "expected", "the name of a setting")
+        elif value == "" and OPTIONAL in grid.header:
+            continue
+        elif isinstance(value, BadCell) or value == "":
+            wrong, expected = to, getattr(value, "expected", f"a value for {key}")
+        elif name in job.where:
+            expected = f"each setting once (row {job.where[name][1]} has it too)"
+        else:
+            job.where[name] = place
+            if not _put(job, parts, value, place):
+                expected = f"no parts of {name.rpartition('.')[0]}, which has a value of its own"
+        if expected:
+            problems.add(grid.source, row, grid.header[wrong], show(cells[wrong]), expected)
+
+
+def key_parts(key: str) -> list[str]:
+    """Parts of a dotted key; as in a job file, one in quotes may hold points itself."""
+    if '"' in key or "'" in key:
+        try:
+            inner: Any = tomllib.loads(f"{key} = 0")
+        except tomllib.TOMLDecodeError:
+            return key.split(".")
+        parts = []
+        while isinstance(inner, dict) and len(inner) == 1:
+            [(part, inner)] = inner.items()
+            parts.append(part)
+        return parts
+    return key.split(".")
+
+
+def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str, int, str]) -> bool:
+    """Store a value under its dotted key; false where a part of the key holds a value already."""
+    inner: Any = job.settings
+    for depth, part in enumerate(parts[:-1], start=1):
+        job.where.setdefault(".".join(parts[:depth]), place)
+        inner = inner.setdefault(part, {})
+        if not isinstance(inner, dict):
+            return False
+    inner[parts[-1]] = value
+    return True
+
+
+def _read_named(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
+    """Rows of one plane or sensor each; a blank cell leaves the setting out."""
+    key = NAMED[sheet][0]
+    if key not in grid.header:
+        expected = f"a column {key}; the columns are {listing(filter(None, grid.header), 'and')}"
+        problems.add(grid.source, grid.header_row, key, None, expected)
+        return
+    at = grid.header.index(key)
+    columns = {i: name for i, name in enumerate(grid.header) if i != at and not _is_remark(name)}
+    for row, cells in grid.rows:
+        item, expected = show(cells[at]), ""
+        name = f"{sheet}.{item}"
+        if isinstance(cells[at], BadCell) or not item:
+            expected = getattr(cells[at], "expected", f"the name of a {key}")
+        elif name in job.where:
+            expected = f"each {key} once (row {job.where[name][1]} has it too)"
+        if expected:
+            problems.add(grid.source, row, key, item, expected)
+            continue
+        job.where[name] = (grid.source, row, key)
+        section = job.settings.setdefault(sheet, {})
+        if not isinstance(section, dict):  # a setting of this name; the job refuses it
+            return
+        section = section.setdefault(item, {})
+        for i, column in columns.items():
+            value = _value(column, cells[i])
+            job.where[f"{name}.{column}"] = (grid.source, row, column)
+            if isinstance(value, BadCell):
+                problems.add(grid.source, row, column, value.value, value.expected)
+            elif value != "":
+                section[column] = value
+
+
+def number_cell(cell: Cell, separator: str, *, comma: bool) -> Cell:
+    """A number with the digits in which it is written; NotANumber for a text that is none."""
+    if not isinstance(cell, str) or not cell:
+        return cell
+    value = parse_number(cell, comma=comma, separator=separator)
+    text = cell.replace(",", ".").rstrip(".")
+    if text != show(value) and (value or "e" not in text.lower()):
+        return Shown(value, text)  # 12.50 keeps its digits
+    whole = value.is_integer() and abs(value) < 1e15 and (value != 0 or math.copysign(1.0, value) > 0)
+    return int(value) if whole else value
+
+
+def dotted_key(parts: Sequence[str]) -> str:
+    """A dotted key; where a part could be misread, parts stand in quotes, as in a job file."""
+    if all(part and part == part.strip() and not re.search(r"[.\"'\\#]", part) for part in parts):
+        return ".".join(parts)
+    return ".".join(part if _BARE.fullmatch(part) else json.dumps(part, ensure_ascii=False) for part in parts)
+
+
+def setting_cell(column: str, value: Any) -> Cell:  # noqa: ANN401
+    """A value of a job file as one cell, under a heading or beside a key."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return "; ".join(f"{name}: {_plain(entry)}" for name, entry in value.items())
+    if not isinstance(value, list):
+        return value if isinstance(value, (int, float, str)) else str(value)
+    if column == "forbidden_deg":
+        pairs = value if value and isinstance(value[0], list) else [value]
+        return "; ".join(" to ".join(map(_plain, pair)) for pair in pairs)
+    return "; ".join(map(_plain, value))
+
+
+def _plain(value: object) -> str:
+    """A number without an exponent."""
+    return format(Decimal(repr(value)), "f") if isinstance(value, float) else str(value)
+
+
+def template_bytes() -> bytes:
+    """An empty workbook for a balancing job.
+
+    Returns
+    -------
+    bytes
+        Sheets runs, weights, planes, sensors and settings to fill in, with comments on their headers and
+        lists of allowed values; a sheet notes with all explanations and an example.
+    """
+    return Path(__file__).with_name("template.xlsx").read_bytes()
+
+
+class Results(Protocol):
+    """What `rotorid balance` has found."""
+
+    @property
+    def influence(self) -> Influence:
+        """The influence coefficients."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of `--json`, without its provenance."""
+
+
+def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapping[str, Any]) -> bytes:
+    """A workbook with the results of a job, for reading; its sheets of results are not read back.
+
+    Parameters
+    ----------
+    files
+        What the job was read from: of a workbook all sheets but those of older results are kept, with their
+        formats and formulas, without pictures and charts.
+    results
+        What was found.
+    provenance
+        Program version, input files, date and options.
+
+    Raises
+    ------
+    InputError
+        If the workbook of the job cannot be read any more.
+    """
+    from rotorid.files.influence import influence_frame
+
+    own = None
+    if len(files) == 1 and is_workbook(files[0]):
+        import openpyxl
+
+        problems = Problems()
+        data = problems.need(read_bytes(files[0], problems))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about parts that are not kept
+            own = openpyxl.load_workbook(io.BytesIO(data))
+        for title in own.sheetnames:
+            if title.strip().casefold().startswith(RESULTS):
+                del own[title]
+    sheets: dict[str, list[Line]] = {}
+    document = results.to_dict()
+    summary = list(_sorted({**document, "provenance": provenance}, (), sheets))
+    coefficients = influence_frame(results.influence)
+    cells = coefficients.astype(object).where(coefficients.notna(), None).itertuples(index=False)
+    sheets["influence"] = [tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
+    notes = [(f"# warning: {text}",) for text in document.get("warnings", ())]
+    lines = {"": [*notes, *sheets.pop("corrections")], "summary": [("result", "value"), *summary], **sheets}
+    head = ("# computed from the other sheets; not read back",)
+    pages = [Page(f"{RESULTS} {name}".strip()[:LONGEST_TITLE], [head, *rows]) for name, rows in lines.items()]
+    return book_bytes(pages, RESULTS, own)
+
+
+def _sorted(
+    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[Line]]
+) -> Iterator[Line]:
+    """Single values of a document by their dotted names, and lists of words; of tables `sheets` are made."""
+    for key, value in document.items():
+        name = (*above, key)
+        if isinstance(value, Mapping):
+            yield from _sorted(value, name, sheets)
+        elif not isinstance(value, list) or any(not isinstance(one, Mapping) for one in value):
+            values = value if isinstance(value, list) else [value]
+            yield from ((".".join(name), _cell(one)) for one in values if one is not None)
+        elif value:
+            # lists in it, such as covariances, are left to `--json`
+            heads = [head for head, one in value[0].items() if not isinstance(one, (list, Mapping))]
+            rows = [tuple(_cell(row.get(head)) for head in heads) for row in value]
+            sheets[" ".join(name).replace("_", " ")] = [tuple(heads), *rows]
+
+
+def _cell(value: Any) -> Cell:  # noqa: ANN401  what a table or a document holds
+    item = getattr(value, "item", None)
+    value = item() if callable(item) else value
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, (int, float)) and math.isfinite(value) else str(value)

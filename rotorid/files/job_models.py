@@ -1,0 +1,483 @@
+"""Keys of a job as typed models: of a job file, and of the sheets of a workbook."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.words import Angles, Phase, Rotation, View
+from rotorid.files import units
+from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, StatedErrors
+from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.settings import (
+    Date,
+    Label,
+    NotNegative,
+    Number,
+    Positive,
+    Settings,
+    Text,
+    Turn,
+    Whole,
+    by_name,
+    entries,
+    key,
+    listed,
+    of,
+)
+from rotorid.files.units import Quantity
+
+TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
+"""Keys of a job file that name tables; the sheets of a workbook that are such tables."""
+WEIGHTS = "weights"
+"""In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
+READINGS = ("runs", "check", "slow_roll")
+"""Those that are runs tables."""
+RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
+MOST_HOLES = 1000
+SAME_DEG = 1e-4
+Pair = tuple[Turn, Turn]
+_ANY_NUMBER = r"([+-]?[0-9]+(?:[.,][0-9]+)?)"
+_PAIR = re.compile(rf"{_ANY_NUMBER}\s*(?:-|\N{{EN DASH}}|\.\.|:|to)\s*{_ANY_NUMBER}")
+_ARCS = "pairs [from, to] of different angles from -360 to 360 degrees, such as [[20, 60], [300, 340]]"
+_LIMIT = "an amplitude above 0 in the unit of the readings"
+
+
+def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
+    named = {key: settings.get(key) for key in TABLES}
+    if named["check_weights"] == WEIGHTS:
+        del named["check_weights"]
+    return {key: name for key, name in named.items() if isinstance(name, str)}
+
+
+def _printable(name: str) -> str:
+    if not name.isprintable():
+        raise ValueError(
+            "the name of a file, without control characters: in double quotes TOML takes \\ for the "
+            "beginning of one; write / in its place, or put the name in single quotes"
+        )
+    return name
+
+
+def _pairs(value: object) -> object:
+    """One pair, or a text of them, as pairs."""
+    if isinstance(value, str):
+        found = [_PAIR.fullmatch(part.strip()) for part in value.split(";") if part.strip()]
+        value = [
+            [float(m[i].replace(",", ".")) for i in (1, 2)] if m else part
+            for part, m in zip(value, found, strict=False)
+        ]
+    flat = isinstance(value, list) and not any(isinstance(one, list) for one in value)
+    return [value] if flat and value else value
+
+
+def _free(arcs: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if any((last - first) % 360.0 == 0.0 for first, last in arcs):
+        raise ValueError("different angles (use = false leaves a plane out)")
+    if covers_circle(arcs):
+        raise ValueError("arcs that leave some angle free; use = false leaves a plane out")
+    return arcs
+
+
+def covers_circle(pairs: Iterable[tuple[float, float]]) -> bool:
+    """Whether arcs (degrees, from → to) together leave no arc of the circle free."""
+    pairs = list(pairs)
+    edges = sorted({angle % 360.0 for pair in pairs for angle in pair})
+    for edge, following in zip(edges, [*edges[1:], edges[0] + 360.0], strict=True):
+        middle = (edge + following) / 2
+        if not any((middle - first) % 360.0 < (last - first) % 360.0 for first, last in pairs):
+            return False
+    return True
+
+
+def _ascending(degrees: tuple[float, ...]) -> tuple[float, ...]:
+    """Listed angles of holes: different, ascending (holes are numbered in this order), within one turn."""
+    steps = [after - before for before, after in pairwise(degrees)]
+    last = 360.0 - (degrees[-1] - degrees[0]) if steps else 360.0
+    if len(degrees) > MOST_HOLES or abs(degrees[0]) > 360.0 or min((*steps, last)) < SAME_DEG:
+        raise ValueError(
+            f"different angles in ascending order within one turn, at most {MOST_HOLES}; a list may begin "
+            "below zero, [-30, 0, 30], and hole_names gives holes other names"
+        )
+    return degrees
+
+
+def _by_speed(value: object) -> object:
+    """A table of numbers by speed, or a text of one."""
+    value = entries(value)
+    for speed in value if isinstance(value, dict) else ():
+        try:
+            good = parse_number(speed, comma="," in speed) > 0
+        except NotANumber:
+            good = False
+        if not good:
+            raise ValueError(f"speeds above 0, not {speed!r}")
+    return value
+
+
+def _or_one(value: object) -> object:
+    """A number for all speeds, at the speed ""."""
+    alone = not isinstance(value, dict) and ":" not in str(value)
+    return {"": value} if alone else _by_speed(value)
+
+
+def _kind(value: object) -> str:
+    return "file" if isinstance(value, str) else "vectors"
+
+
+_NUMBERS = Annotated[dict[str, NotNegative], Field(min_length=1)]
+_LIMITS = Annotated[dict[str, Positive], Field(min_length=1)]
+Arcs = Annotated[
+    tuple[Pair, ...],
+    BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | str),
+    AfterValidator(_free),
+    Field(min_length=1),
+]
+Limits = Annotated[
+    dict[str, Positive],
+    BeforeValidator(_or_one, json_schema_input_type=Positive | _LIMITS | str),
+    Field(min_length=1),
+]
+SpeedWeights = Annotated[
+    dict[str, NotNegative],
+    BeforeValidator(_by_speed, json_schema_input_type=_NUMBERS | str),
+    Field(min_length=1),
+]
+Weight = Annotated[Quantity, of(Positive)]
+File = Annotated[Text, AfterValidator(_printable)]
+Files = Annotated[
+    tuple[File, ...],
+    BeforeValidator(
+        lambda v: v if isinstance(v, list) else (v,),
+        json_schema_input_type=Text | Annotated[list[Text], Field(min_length=1)],
+    ),
+    Field(min_length=1),
+]
+
+
+class _Placed(Settings):
+    """What may stand in the rotor model."""
+
+    node: Annotated[Whole, Field(ge=1)] | None = key(
+        "where it is in the rotor model, by number", default=None, expected="a node of the rotor model"
+    )
+    station: Text | None = key(
+        "or by name", default=None, expected="the name of a station of the rotor model, in quotes"
+    )
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Both."""
+        if self.node is not None and self.station is not None:
+            yield "station", "either node or station, not both"
+
+
+class Plane(_Placed):
+    """`[planes.NAME]`."""
+
+    max_weight: Weight | None = key(
+        "largest weight that may be mounted, in any unit of a mass or unbalance",
+        "max_mass_g max_unbalance_g_mm",
+        None,
+        units=units.WEIGHT,
+    )
+    radius: Positive | None = key(
+        "radius of the corrections; converts masses and unbalances", "radius_mm", None, units=RADIUS
+    )
+    trial_radius: Positive | None = key(
+        "radius of the trial weights, where it is another", "trial_radius_mm", None, units=RADIUS
+    )
+    use: bool = key("whether the plane is used", default=True, example="false")
+    remove: bool = key(
+        "whether material is taken away (drilled, ground) instead of added", default=False, example="false"
+    )
+    forbidden: Arcs | None = key(
+        "arcs from … to … where nothing may be mounted",
+        "forbidden_deg",
+        None,
+        expected=f"{_ARCS}, in a sheet 20-60; 300-340",
+        example="[[20, 60], [300, 340]]",
+    )
+    holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = key(
+        "a number of equally spaced holes",
+        default=None,
+        expected=f"the number of holes, equally spaced, a whole number from 1 to {MOST_HOLES}",
+    )
+    first_hole: Turn = key("angle of the first of them, default 0", "first_hole_deg", 0.0)
+    holes_at: listed(Number, _ascending) | None = key(  # type: ignore[valid-type]
+        "or the angles of the holes",
+        "holes_deg",
+        None,
+        expected="angles of the holes in degrees, such as holes_deg = [0, 30, 75]",
+        example="holes_deg = [0, 30, 75]",
+    )
+    hole_names: listed(Label) | None = key(  # type: ignore[valid-type]
+        "names of the holes instead of the numbers 1, 2, …",
+        default=None,
+        expected='a different name for each hole, such as ["A", "B", "C"]',
+        example='["A", "B", "C"]',
+    )
+    available: Annotated[Quantity, of(listed(Positive))] | None = key(
+        "weights, in any unit, of which each can be mounted in a hole",
+        "available_g available_g_mm",
+        None,
+        units=units.WEIGHT,
+        expected="weights of which each can be mounted, such as available_g = [5, 10, 20]",
+        example="available_g = [5, 10, 20]",
+    )
+    step: Weight | None = key("or any weight in such steps", "step_g step_g_mm", None, units=units.WEIGHT)
+    per_hole: Annotated[Whole, Field(ge=1, le=100)] = key(
+        "how many weights one hole takes, default 1", default=1
+    )
+    taken: by_name(Positive) = key(  # type: ignore[valid-type]
+        "weights that are in holes already, by number or name of the hole",
+        default={},
+        expected='weights that are in holes already, by number or name of the hole, such as { "3" = 10 }',
+        example='{ "3" = 10 }',
+    )
+    stock: listed(Annotated[Whole, Field(ge=0)]) | None = key(  # type: ignore[valid-type]
+        "how many there are of each available weight",
+        default=None,
+        expected="how many there are of each available weight, such as stock = [4, 4, 2]",
+        example="stock = [4, 4, 2]",
+    )
+
+    def hole_angles(self) -> dict[str, float]:
+        """Angle of each hole by its name, degrees as the job counts; none where there are no holes."""
+        degrees = self.holes_at or ()
+        if self.holes is not None:
+            degrees = tuple(self.first_hole + 360.0 * k / self.holes for k in range(self.holes))
+        return dict(zip(self.hole_names or map(str, range(1, len(degrees) + 1)), degrees, strict=False))
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Radii and keys of holes that do not fit together."""
+        yield from super().wrong()
+        if self.holes is not None and self.holes_at is not None:
+            yield "holes", "either holes, equally spaced, or holes_deg, their angles, not both"
+            return
+        if self.has("first_hole") and self.holes is None:
+            yield "first_hole", "the number of equally spaced holes too, holes = 12"
+        names, sizes = tuple(self.hole_angles()), () if self.available is None else self.available.value
+        about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
+        if not names:
+            wanted = "the holes of the plane too, holes = 12 or holes_deg = [0, 30, 75]"
+            yield from ((one, wanted) for one in about_holes if self.has(one))
+            return
+        count = self.holes or len(self.holes_at or ())
+        if self.hole_names is not None and len(set(self.hole_names)) != count:
+            yield (
+                "hole_names",
+                f"a different name for each of the {count} holes",
+            )
+            return
+        yield from self._wrong_weights(names, sizes)
+
+    def _wrong_weights(self, names: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[tuple[str, str]]:
+        if self.step is not None and sizes:
+            yield "step", f"either {self.written('available')}, single weights, or steps of any size"
+        if not sizes:
+            yield from (
+                (one, "the weights that are available too, available_g = [5, 10]")
+                for one in ("per_hole", "stock")
+                if self.has(one)
+            )
+        for name in self.taken:
+            if name not in names:
+                yield (
+                    "taken",
+                    f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}{did_you_mean(name, names)}",
+                )
+        if len(set(sizes)) < len(sizes):
+            yield "available", "each weight once (stock says how many of each there are)"
+        if all(name in self.taken for name in names):
+            yield "taken", "at least one hole that is free"
+        if sizes and self.stock and len(self.stock) != len(sizes):
+            yield "stock", f"one number for each of the {len(sizes)} available weights, not {len(self.stock)}"
+        elif self.stock and not any(self.stock):
+            yield "stock", "at least one weight"
+
+
+class Sensor(_Placed):
+    """`[sensors.NAME]`."""
+
+    limit: Limits = key(
+        "largest amplitude, in the unit of the readings; or by speed",
+        default={},
+        expected=f'{_LIMIT}, or a table of them by speed, such as {{ "3000" = 20 }}, in a sheet 3000: 20',
+        example='{ "3000" = 20, "4500" = 30 }',
+    )
+    weight: NotNegative = key(
+        "weight in the fit, default 1; 0: the sensor counts only for its limit", default=1.0
+    )
+    angle: Turn | None = key(
+        "where the sensor points, from the model's x, in the job's angle direction", "angle_deg", None
+    )
+
+
+class Errors(Settings):
+    """`[errors]`."""
+
+    amplitude_percent: NotNegative | None = key(
+        "one standard deviation of an amplitude, percent of it", default=None
+    )
+    phase_deg: NotNegative | None = key("one standard deviation of a phase, degrees", default=None)
+    floor: NotNegative | None = key(
+        "one standard deviation at amplitude 0, in the unit of the readings", default=None
+    )
+    run_percent: NotNegative | None = key(
+        "what changes from run to run, one standard deviation, percent", default=None
+    )
+    run_floor: NotNegative | None = key("the same at amplitude 0, in the unit of the readings", default=None)
+    placement_deg: NotNegative | None = key(
+        "one standard deviation of the angle of a mounted weight, degrees", default=None
+    )
+    placement_percent: NotNegative | None = key("one standard deviation of its mass, percent", default=None)
+    drift_percent: NotNegative | None = key(
+        "how far readings drift from the first run to the last, percent", default=None
+    )
+
+    @property
+    def stated(self) -> StatedErrors:
+        """What is written, with what is not left to `StatedErrors`."""
+        return StatedErrors(**{name: value for name, value in self if value is not None})
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Nothing above 0."""
+        if not any(value or (name.startswith("run_") and value == 0) for name, value in self):
+            yield "", "an error above 0 (amplitude_percent, phase_deg or floor), or no [errors] at all"
+
+
+class KeyPhasor(Settings):
+    """`[key_phasor]`."""
+
+    angle: Turn = key(
+        "where it stands, from the model's x, in the job's angle direction",
+        "angle_deg",
+        expected="the direction of the key phasor, degrees from the model's x",
+    )
+
+
+class Vector(Settings):
+    """`[slow_roll.SENSOR]`."""
+
+    amplitude: Annotated[Quantity, of(NotNegative)] = key(
+        "at slow speed, in the unit of the readings; or `amplitude_<unit>`",
+        "amplitude",
+        units=units.vibration,
+        expected="the amplitude at slow speed, in the unit of the readings",
+    )
+    phase: Turn = key(
+        "counted as the readings count it",
+        "phase_deg",
+        expected="the phase at slow speed, counted as the readings count it",
+    )
+
+
+class Columns(Settings):
+    """`[columns]`."""
+
+    run: Text | None = key("name in the file of the column `run`, and so on", default=None)
+    speed: Annotated[Quantity, of(Text)] | None = key(
+        "or another unit of a speed", "speed_rpm", None, units=units.SPEED
+    )
+    sensor: Text | None = key("not where each sensor has columns of its own", default=None)
+    amplitude: Annotated[Quantity, of(Text)] | None = key(
+        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", None, units=units.vibration
+    )
+    phase: Annotated[Quantity, of(Text)] | None = key("or `phase_rad`", "phase_deg", None, units=units.ANGLE)
+    repeat: Text | None = key("of repeated readings", default=None)
+
+    def in_file(self) -> dict[str, str]:
+        """Fields by the names that the columns have in the file."""
+        return {str(getattr(v, "value", v)): name for name, v in self if v is not None}
+
+
+class Sheet(Settings):
+    """`[sheet]`."""
+
+    machine: Label = key("what was balanced; default: `machine` of the job", default="")
+    place: Label = key("where it stands", default="")
+    date: Date | None = key(
+        "when it was balanced; default: `date` of the job", default=None, example="2026-03-17"
+    )
+    engineer: Label = key("who balanced it", default="")
+    instrument: Label = key("with what, its number", default="")
+    zero: Literal["right", "top"] = key(
+        "where 0° stands in the polar plots of the sheet; default: right, analysers have it at the top",
+        default="right",
+    )
+
+
+class JobSettings(Settings):
+    """A job file."""
+
+    runs: Files | None = key(
+        "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
+        default=None,
+        expected='the runs table, or the files of the runs, runs = ["as found.csv", "trial.csv"]',
+    )
+    weights: File | None = key("the weights table", default=None)
+    influence: File | None = key("stored coefficients instead of trial runs, or beside them", default=None)
+    rotor: File | None = key("a rotor table or file: coefficients are computed", default=None)
+    check: File | None = key("runs table of a check run, with the proposed weights mounted", default=None)
+    check_weights: File | None = key(
+        "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
+        'where there are holes, else the weights; `"weights"`: these, although there are holes',
+        default=None,
+    )
+    slow_roll: (
+        Annotated[
+            Annotated[File, Tag("file")] | Annotated[dict[str, Vector], Field(min_length=1), Tag("vectors")],
+            Discriminator(_kind),
+        ]
+        | None
+    ) = key(
+        "a runs table of one run at slow speed, to be subtracted from every reading; or "
+        "`[slow_roll.SENSOR]`, see below",
+        default=None,
+        expected="vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at "
+        'slow speed, slow_roll = "slow.csv"',
+    )
+    key_phasor: KeyPhasor | None = key("where the key phasor stands, see below", default=None)
+    speed_weights: SpeedWeights = key(
+        "weights of the speeds in the fit, 0: only for the limits",
+        default={},
+        expected='a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }',
+        example='{ "3000" = 2, "4500" = 0.5 }',
+    )
+    phase: Phase | None = key(
+        "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
+        "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
+        default=None,
+    )
+    angles: Literal[Angles, Rotation] | None = key(
+        "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
+        "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
+        default=None,
+    )
+    rotation: Rotation | None = key("how the rotor turns, seen from the same end as the angles", default=None)
+    view: View | None = key("the end from which that is seen", default=None)
+    speed_tolerance_percent: Annotated[NotNegative, Field(le=LARGEST_TOLERANCE)] = key(
+        f"speeds of different runs that differ by less count as one, default {DEFAULT_TOLERANCE:g}",
+        default=DEFAULT_TOLERANCE,
+    )
+    speed: Annotated[Quantity, of(Positive)] | None = key(
+        "the speed of runs tables without a column of speeds", "speed_rpm", None, units=units.SPEED
+    )
+    errors: Errors | None = key(
+        "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
+        "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
+        default=None,
+    )
+    columns: Columns | None = key("other names of the columns of runs tables, see below", default=None)
+    planes: dict[str, Plane] = key("see below", default={})
+    sensors: dict[str, Sensor] = key("see below", default={})
+    machine: Label = key("its name or serial number, for `rotorid fleet`", default="")
+    machine_type: Label = key("its type, for the same", default="")
+    date: Date | None = key("when it was balanced, for the same", default=None, example="2026-03-17")
+    sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())

@@ -1,0 +1,447 @@
+"""Model files of `identify`, `fit` and `simulate`: equations, matrices or states, in one description.
+
+Matrices serve both worlds. In time they are M y'' + C y' + K y = f; of amplitudes, with p = d/dt, the rows
+of (M p² + C p + K) Y = F. An output that is a number times a displacement y or its rate, z = s y or s p y,
+takes that amplitude's place, y = z / s or z / (s p); any other one adds an equation.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
+
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.files.forces import whole
+from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
+from rotorid.files.small_model import FORCE, small_equations
+from rotorid.files.toml_file import MOST_NAMES, read_toml
+from rotorid.identify import expressions
+from rotorid.identify.expressions import is_name
+
+if TYPE_CHECKING:
+    from rotorid.identify.amplitudes import AmplitudeErrors
+    from rotorid.identify.ode import OdeModel
+    from rotorid.identify.operator_model import HarmonicModel
+
+Pairs = dict[str, tuple[float, float]]
+_EXAMPLE = '"(m*p**2 + b*p + c)*X = F"'
+_ESTIMATE = (
+    'names to estimate, estimate = ["c", "b"], or [estimate] with name = starting value (empty where a model '
+    "in time is only to be simulated)"
+)
+_NOT_BESIDE = {
+    "states": ("M", "C", "K", "coordinates", "force"),
+    "equations": ("states", "M", "C", "K", "coordinates", "force", "initial", "outputs", "per_record"),
+}
+# numbers first: the e of 1e5 is no name
+_TOKEN = re.compile(
+    r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[A-Za-z\u0370-\u03ff][A-Za-z0-9_\u0370-\u03ff]*"
+)
+
+
+def _name(value: str) -> str:
+    if not is_name(value):
+        raise ValueError(f"names: a letter, then letters, digits and _; no function; {value!r} is none")
+    return value
+
+
+def _expression(value: object) -> object:
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= expressions.LARGEST:
+        return float(value)
+    if isinstance(value, str) and value.strip():
+        return value
+    raise ValueError('a number, or an expression in quotes, such as "-a*x"')
+
+
+def _two(value: object) -> object:
+    if isinstance(value, list) and len(value) == 2 and not any(isinstance(one, (bool, str)) for one in value):
+        return tuple(value)
+    raise ValueError("two numbers: [lowest, highest], or [value, standard deviation above 0]")
+
+
+def _estimates(value: object) -> object:
+    """Names without starting values have None."""
+    if not isinstance(value, list):
+        return value
+    if not value or len({*map(str, value)}) < len(value):
+        raise ValueError("a list of different names")
+    return dict.fromkeys(map(str, value))
+
+
+Name = Annotated[str, AfterValidator(_name)]
+Text = Annotated[float | str, PlainValidator(_expression, json_schema_input_type=float | str)]
+Texts = dict[Name, Text]
+Matrix = list[list[Text]]
+Limit = Annotated[float, Field(allow_inf_nan=True)]
+Std = Annotated[Number, Field(ge=1e-30)]
+Two = BeforeValidator(_two, json_schema_input_type=list[float])
+Estimates = Annotated[
+    dict[Name, Number | None],
+    BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
+]
+
+
+class AmplitudeErrorKeys(Settings):
+    """One standard deviation of a reading of an amplitude."""
+
+    amplitude_percent: NotNegative = key("of an amplitude, percent of it", default=0.0, le=1000)
+    phase_deg: NotNegative = key("of a phase, degrees", default=0.0, le=360)
+    floor: NotNegative = key("at amplitude 0, in the unit of the model", default=0.0)
+
+
+class Nuisance(Settings):
+    """What sensors add to every output."""
+
+    hum: listed(Positive) = key(  # type: ignore[valid-type]
+        "a frequency or a list of them (parameters `hum50_cos_NAME`, `hum50_sin_NAME`)", "hum_Hz", ()
+    )
+    offset: bool = key("a constant (`offset_NAME`)", default=False)
+    drift: bool = key("a rate per second (`drift_NAME`)", default=False)
+
+
+class ModelFile(Settings):
+    """A model: equations of amplitudes, matrices of second order, or states."""
+
+    equations: list[str] = key("texts with `=` in p = d/dt, of amplitudes", default=[], example=_EXAMPLE)
+    M: Matrix = key("matrix of M y'' + C y' + K y = f: numbers and expressions", default=[])
+    C: Matrix = key("likewise; it may be absent", default=[])
+    K: Matrix = key("likewise", default=[])
+    coordinates: list[Name] = key(
+        "names of y; `y1`, `y2`, … by default. The velocity of `y1` is `v_y1`", default=[]
+    )
+    states: Texts = key('name = "its rate of change", with the time as `t`', default={})
+    estimate: Estimates = key("names, or name = starting value", expected=_ESTIMATE)
+    known: dict[Name, Number] = key("names with their numbers", default={})
+    inputs: list[Name] | None = key(
+        "amplitudes that excite, or measured inputs in time (columns of the record); of equations by default "
+        "those that stand only on right sides",
+        default=None,
+    )
+    varying: list[Name] = key(
+        "known quantities that change from row to row, such as a speed; without it names that stand only as "
+        "factors of an amplitude",
+        default=[],
+    )
+    outputs: Texts = key('name = "expression" of states; default: the states', default={})
+    initial: Texts = key(
+        'name = number, or an expression of parameters, or `"record"`: the first sample of the output that '
+        "equals this state, with its error (a parameter `NAME_0` of each record); `t0`: the time they belong "
+        'to, in s, perhaps before the record, or `"first"`: the first time of each record (the default, '
+        "which asks where a record does not begin at 0)",
+        default={},
+    )
+    force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
+    per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
+    bounds: dict[str, Annotated[tuple[Limit, Limit], Two]] = key(
+        "name = [lowest, highest], `inf` for none", default={}
+    )
+    prior: dict[str, Annotated[tuple[Number, Std], Two]] = key(
+        "name = [value, standard deviation]: what is known of it beside the data", default={}
+    )
+    start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
+    errors: AmplitudeErrorKeys | None = key("of readings of amplitudes, one standard deviation", default=None)
+    speed: NotNegative = key("the speed at which matrices of a rotor hold", "speed_rad_s", 0.0)
+    nuisance: Nuisance | None = key(
+        "what sensors add to every output, estimated anew for every record", default=None
+    )
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Two forms in one, matrices of several sizes."""
+        for form, others in _NOT_BESIDE.items():
+            for other in others if self.has(form) else ():
+                if self.has(other):
+                    yield other, f"equations, matrices or states: nothing of this name beside {form}"
+        for table in ("bounds", "prior", "start"):
+            for name in sorted(getattr(self, table).keys() - self.estimate.keys()):
+                yield table, f"names of estimate; {name} is none{did_you_mean(name, self.estimate)}"
+        for name, (low, high) in self.bounds.items():
+            value = self.start.get(name, self.estimate.get(name))
+            if not low < high or (value is not None and not low <= value <= high):
+                yield (
+                    "bounds",
+                    f"[lowest, highest] of {name}, such as [0, inf], with its starting value between",
+                )
+        rows = [row for matrix in (self.M, self.K, self.damping) for row in matrix]
+        if len({len(self.M), len(self.K), len(self.damping), len(self.names), *map(len, rows)}) > 1:
+            example = 'M = [["a", 0], [0, 2.5]]'
+            yield "M", f"square matrices M, K and perhaps C of one size, with a name for each row: {example}"
+
+    @property
+    def names(self) -> list[str]:
+        """Of the displacements of matrices."""
+        return self.coordinates or [f"y{i + 1}" for i in range(len(self.M))]
+
+    @property
+    def damping(self) -> list[list[float | str]]:
+        """C, zero where it is absent."""
+        return self.C or [[0.0] * len(self.M) for _ in self.M]
+
+
+@dataclass(frozen=True)
+class HarmonicFile:
+    """A model of amplitudes, read from a file.
+
+    Attributes
+    ----------
+    model
+        The equations.
+    bounds
+        Lowest and highest value of parameters, ±inf for none.
+    start
+        Guessed values of parameters.
+    errors
+        Stated errors of the amplitudes, or None.
+    path
+        Where it was read.
+    unmeasured
+        Outputs that a model in time does not show.
+    prior
+        Value and standard deviation of parameters that are known beside the data.
+    """
+
+    model: HarmonicModel
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
+    errors: AmplitudeErrors | None = None
+    path: Path | None = None
+    unmeasured: tuple[str, ...] = ()
+    prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def read_harmonic_model(path: str | Path) -> HarmonicFile:
+    """Read a model of amplitudes (`harmonic.toml`).
+
+    Its keys are `equations` (texts with p = d/dt), `estimate` (names), `known` (name = number), optional
+    `inputs` (names of the exciting amplitudes), `varying` (names of known quantities that change from row to
+    row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest,
+    highest]), `[start]` (name = guess), `[prior]` (name = [value, standard deviation]) and `[errors]`
+    (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
+
+    Instead of equations there may be matrices `M`, `C`, `K` as `read_ode_model` reads them and `rotorid
+    reduce --model` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its
+    `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
+    `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
+    those not in the table are 0. An output that is a number times a displacement or velocity is measured in
+    place of it; other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
+    parameter of initial values alone is left out, with a warning. Explicit time, constant loads and
+    nonlinear terms are refused. An amplitude that `[outputs]` do not show, or that is not measured, is
+    predicted.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    HarmonicFile
+
+    Raises
+    ------
+    InputError
+        With the problems of the file, each with its key.
+
+    Warns
+    -----
+    TableWarning
+        Where a parameter of a model in time has no influence on amplitudes.
+    """
+    path = Path(path)
+    from rotorid.identify.amplitudes import AmplitudeErrors
+    from rotorid.identify.equations import harmonic_model
+
+    def read(file: ModelFile) -> HarmonicFile:
+        equations, inputs, unseen = file.equations, file.inputs, list[str]()
+        estimate, errors = file.estimate, None
+        if file.M:
+            equations, inputs, unseen = _of_amplitudes(file)
+            used = {name for text in equations for name in _words(text)}
+            estimate = {name: value for name, value in estimate.items() if name in used}
+            if lost := listing(sorted(file.estimate.keys() - used), "and"):
+                words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
+                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
+        if not equations:
+            raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
+        model = harmonic_model(
+            equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
+        )
+        if file.M and model.has_constant_terms:
+            raise ValueError(
+                "a load or output without any amplitude stands in it: a constant one has no influence on "
+                "amplitudes, leave it out; one that excites must be a measured input"
+            )
+        if given := file.errors:
+            phase = math.radians(given.phase_deg)
+            errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
+        start = {name: value for name, value in estimate.items() if value is not None} | file.start
+        tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
+        bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
+        return HarmonicFile(model, bounds, guess, errors, path, tuple({*unseen} & {*model.outputs}), prior)
+
+    return whole(_read(path), "model of amplitudes", read)
+
+
+def read_ode_model(path: str | Path) -> OdeModel:
+    """Read a model in time (`ode.toml`).
+
+    Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number,
+    an expression of parameters, or "record": as measured at the first time, with its error), `[outputs]`
+    (name = "expression"; default: the states), `[estimate]` (name = starting value; empty where a model
+    is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
+    `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
+    record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
+    records has for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first");
+    `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
+    output, with factors to be estimated for every record. Without states the outputs are functions of the
+    time.
+
+    Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
+    parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
+    velocity of y1 is v_y1) and `[force]` (y1 = "expression"). Initial values are 0 then where none is given.
+    A coordinate without mass, of which row and column of M are 0, is of first order: its row of C holds it.
+    The speed at which the matrices of a rotor hold may stand in `speed_rad_s`.
+
+    Matrices are read by `read_harmonic_model`, too; `[errors]` of amplitudes are for that alone.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    OdeModel
+
+    Raises
+    ------
+    InputError
+        With the problems of the file, each with its key.
+    """
+    from rotorid.identify.ode import ode_model, with_nuisance
+    from rotorid.identify.second_order import second_order
+
+    def read(file: ModelFile) -> OdeModel:
+        if file.equations or file.varying:
+            raise ValueError("[states], or M and K; equations are of amplitudes, for `rotorid identify`")
+        start = file.estimate | file.start
+        if lost := [name for name, value in start.items() if value is None]:
+            raise ValueError(f"no starting value of {lost[0]}: [estimate] has name = starting value in time")
+        outputs, factors = {name: str(text) for name, text in file.outputs.items()}, list[str]()
+        if extra := file.nuisance:
+            outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
+            outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
+        given: dict[str, Any] = {
+            "initial": file.initial,
+            "outputs": outputs or None,
+            "estimate": start | dict.fromkeys(factors, 0.0),
+            "known": file.known,
+            "inputs": file.inputs or (),
+            "bounds": file.bounds,
+            "per_record": [*file.per_record, *factors],
+        }
+        if not file.M:
+            return ode_model({name: str(text) for name, text in file.states.items()}, **given)
+        return second_order(file.M, file.damping, file.K, names=file.names, force=file.force, **given)
+
+    file = _read(Path(path))
+    return replace(whole(file, "model", read), prior=file.prior)
+
+
+def _read(path: Path) -> ModelFile:
+    """What stands in a model file, or of a small model its linear equations; raises its problems."""
+    source, problems = str(path), Problems()
+    data = problems.need(read_toml(path, problems))
+    if {"masses_kg", "shaft_stiffness_N_per_m"} & data.keys():
+        data = small_equations(path)
+    for name, value in data.items():
+        if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
+            expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
+            problems.add(source, None, name, None, expected)
+    problems.stop()
+    file = problems.need(read_settings(ModelFile, data, source, problems))
+    problems.stop()
+    return file
+
+
+def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
+    """Matrices as equations of amplitudes, what excites, and what outputs do not show.
+
+    Raises
+    ------
+    ValueError
+        What has no meaning for amplitudes; whether the equations are linear is seen by `harmonic_model`.
+    """
+    y, inputs, force = file.names, list(file.inputs or ()), file.force
+    constants = {*file.estimate, *file.known} - {*file.per_record}
+    states = {x: (x, "") for x in y} | {f"v_{x}": (x, "/p") for x in y}
+    matrices = {"*p**2": file.M, "*p": file.damping, "": file.K}
+    entries = [one for matrix in matrices.values() for row in matrix for one in row]
+    texts = [*force.values(), *file.outputs.values()]
+    for text, allowed in [
+        *((one, set()) for one in entries),
+        *((text, {*states, *inputs}) for text in texts),
+    ]:
+        if isinstance(text, str):
+            for name in sorted(expressions.names(expressions.parse(text)) - constants - allowed):
+                raise ValueError(
+                    f"{name} in {text!r} has no meaning for amplitudes: M, C and K hold parameters and known "
+                    "numbers, the same in all tests; what changes with the time t must be a measured input"
+                )
+    if not inputs and not force:
+        inputs = [f"{FORCE}{x}" for x in y]
+        force = dict(zip(y, inputs, strict=True))
+    put: dict[str, str] = {}
+    more: dict[str, str] = {}
+    for output, text in file.outputs.items():
+        state, scale = _scaled(str(text), file)
+        base, rate = states.get(state, ("", ""))
+        if base and base not in put:
+            plain = (output, scale, rate) == (base, "1", "")
+            put[base] = output if plain else f"({output}{rate}/({scale}))"
+        else:
+            more[output] = str(text)
+    unseen, strange = [x for x in y if x not in put], force.keys() - {*y}
+    names = [*constants, *inputs, *file.outputs, *unseen]
+    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(strange)
+    if wrong:
+        raise ValueError(
+            f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
+        )
+    put = {x: put.get(x, x) for x in y}
+    put |= {f"v_{x}": f"(p*{text})" for x, text in put.items()}
+    equations = []
+    for i, name in enumerate(y):
+        terms = []
+        for j, other in enumerate(y):
+            parts = [f"({m[i][j]}){power}" for power, m in matrices.items() if m[i][j] != 0]
+            terms += [f"({' + '.join(parts)})*{other}"] if parts else []
+        if not terms:
+            raise ValueError(f"the row of {name} in M, C and K is empty: leave this coordinate out")
+        equations.append(f"{' + '.join(terms)} = {force.get(name, 0)}")
+    equations += [f"{output} = {text}" for output, text in more.items()]
+    equations = [_TOKEN.sub(lambda found: put.get(found[0], found[0]), text) for text in equations]
+    return equations, inputs, unseen if file.outputs else []
+
+
+def _words(text: str) -> set[str]:
+    return {word for word in _TOKEN.findall(text) if word[0].isalpha()}
+
+
+def _scaled(text: str, file: ModelFile) -> tuple[str, str]:
+    """The name and the number of an output that is number · name; "" for any other."""
+    import sympy
+
+    known = {sympy.Symbol(name): sympy.Rational(repr(value)) for name, value in file.known.items()}
+    scale, symbol = sympy.expand(expressions.parse(text).subs(known)).as_coeff_Mul()
+    if symbol.is_Symbol and scale.is_Rational:
+        return symbol.name, f"{scale.p}/{scale.q}" if scale.q != 1 else str(scale.p)
+    return "", ""

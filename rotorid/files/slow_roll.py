@@ -1,0 +1,222 @@
+"""Slow-roll vectors: what a sensor reads at slow speed, subtracted from all readings before anything else.
+
+A probe on a shaft reads the run-out of its track with the vibration: measured = vibration + S, with the same
+S at every speed, and S alone at slow speed, where unbalance does nothing. S is read with the same mark,
+sensor and phase convention as the readings, so subtraction needs no knowledge of either. Influence
+coefficients are differences of runs, in which S cancels; the vibration to be balanced is not. Derivation:
+docs/conventions.md.
+
+Stated errors in percent of the amplitude and degrees of phase hold for the *measured* amplitude |Y + S|. Of
+the difference only |Y| is left, so the share of S goes to the floor: with e the larger of the relative
+amplitude and the phase error, floor'² = floor² + (e max|S|)².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import counted, listing
+from rotorid.files import units
+from rotorid.files.columns import Source, source_name
+from rotorid.files.conventions import Conventions
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
+
+if TYPE_CHECKING:
+    from rotorid.files.job_models import Vector
+
+SLOW = 0.5
+"""A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlowRoll:
+    """Slow-roll vectors of C sensors.
+
+    Attributes
+    ----------
+    sensors
+        Names (C,).
+    vectors
+        Complex, in the unit of the readings inside, phase lead: shape (C,), for all speeds, or (S, C); zero
+        for a sensor that has none.
+    speeds
+        rad/s, shape (S,), where the vectors differ by speed; else None.
+    warnings
+        What the user should know.
+    """
+
+    sensors: tuple[str, ...]
+    vectors: ComplexArray
+    speeds: FloatArray | None = None
+    warnings: tuple[str, ...] = ()
+
+    def at(self, speeds: FloatArray, sensors: tuple[str, ...]) -> ComplexArray:
+        """Vectors (S, C) at some of these speeds (the nearest counts) and of some of these sensors."""
+        columns = [self.sensors.index(name) for name in sensors]
+        if self.speeds is None:
+            return np.tile(self.vectors[columns], (len(speeds), 1))
+        rows = [int(np.argmin(np.abs(self.speeds - speed))) for speed in speeds]
+        return np.asarray(self.vectors[np.ix_(rows, columns)])
+
+
+def make_slow_roll(
+    said: Source | Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
+) -> SlowRoll | None:
+    """Slow-roll vectors for the sensors of a job, or None and problems.
+
+    Parameters
+    ----------
+    said
+        A runs table, or by sensor `amplitude` (in its unit, or without one in that of the readings) and
+        `phase_deg`.
+    trials
+        Its readings, for names, units and speeds.
+    conventions
+        What phases mean, and which speeds count as one.
+    problems
+        Collects the complaints.
+    """
+    before, words = len(problems), list[str]()
+    vectors: ComplexArray
+    speeds = None
+    if isinstance(said, Mapping):
+        given, vectors = _stated(said, trials, conventions, problems)
+    else:
+        own = Problems()  # those of the job must not hide what is wrong with this file, nor the reverse
+        runs = make_trials(said, None, conventions, None, own)
+        problems.extend(own)
+        if runs is None or not _fits(runs, source_name(said), trials, problems):
+            return None
+        given, vectors = runs.sensors, runs.mean[0]
+        if len(runs.speeds) > 1:
+            band = conventions.speed_tolerance_percent
+            near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
+            rows = [row for row in near if row is not None]
+            unit = units.SPEED[trials.labels.speed_unit]
+            if len(rows) < len(near):
+                missing = show_speed(float(trials.speeds[near.index(None)]), unit)
+                expected = (
+                    "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
+                    f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
+                )
+                problems.add(source_name(said), None, "speed", None, expected)
+            vectors, speeds = vectors[rows], trials.speeds
+        elif runs.speeds[0] > SLOW * trials.speeds.min():
+            slow, lowest = (trials.labels.speed_words(float(one.speeds.min())) for one in (runs, trials))
+            words.append(
+                f"the slow-roll vectors were read at {slow}, which is not slow against {lowest}: vibration "
+                "that is subtracted with them is left unbalanced"
+            )
+    if len(problems) > before:
+        return None
+    whole = np.zeros((len(vectors), len(trials.sensors)), dtype=complex)
+    whole[:, [trials.sensors.index(name) for name in given]] = vectors
+    if lacking := [name for name in trials.sensors if name not in given]:
+        words.append(
+            f"there is no slow-roll vector for {'sensors' if len(lacking) > 1 else 'sensor'} "
+            f"{listing(map(repr, lacking), 'and')}: its readings are used as they are (amplitude = 0 says "
+            "that nothing is to be subtracted)"
+        )
+    return SlowRoll(trials.sensors, whole if speeds is not None else whole[0], speeds, tuple(words))
+
+
+def _stated(
+    said: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
+) -> tuple[tuple[str, ...], ComplexArray]:
+    """Sensors and vectors (1, C) of the job file, for all speeds."""
+    own = units.vibration(trials.labels.vibration_unit)
+    size, angle = np.zeros((1, len(said))), np.zeros((1, len(said)))
+    for k, (name, vector) in enumerate(said.items()):
+        amplitude, phase = vector.amplitude, vector.phase
+        if name not in trials.sensors:
+            hint = did_you_mean(name, trials.sensors)
+            known = listing(trials.sensors, "and")
+            expected = f"a sensor of the runs table, not {name!r}{hint}; its sensors are {known}"
+            vector.complain(problems, "", expected)
+        else:
+            unit = amplitude.unit if amplitude.unit.name else own
+            if unit.kind != own.kind:
+                vector.complain(problems, "amplitude", _other_unit(own.name))
+            size[0, k], angle[0, k] = unit.to_si(amplitude.value), np.radians(phase)
+    return tuple(said), conventions.labels.vibration_from(size, angle)
+
+
+def _fits(runs: Trials, source: str, trials: Trials, problems: Problems) -> bool:
+    """Whether a slow run has the units and sensors of the job; else problems."""
+    before = len(problems)
+    ours, its = (units.vibration(one.labels.vibration_unit) for one in (trials, runs))
+    if its.kind != ours.kind:
+        problems.add(source, None, "amplitude", its.name or "no unit", _other_unit(ours.name))
+    if len(runs.runs) > 1:
+        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
+        problems.add(source, None, "run", runs.runs[1], expected)
+    for name in runs.sensors:
+        if name not in trials.sensors:
+            hint, known = did_you_mean(name, trials.sensors), listing(trials.sensors, "and")
+            problems.add(source, None, "sensor", name, f"a sensor of the job{hint}; its sensors are {known}")
+    return len(problems) == before
+
+
+def _other_unit(name: str) -> str:
+    return f"an amplitude in {name or 'no unit'}, as the readings have, or in a unit that converts to it"
+
+
+def subtract_slow_roll(trials: Trials, roll: SlowRoll) -> Trials:
+    """Readings less the slow-roll vectors, with honest errors, and warnings.
+
+    Parameters
+    ----------
+    trials
+        Readings as they were measured, shape (K, R, S, C).
+    roll
+        Vectors of (at least) their sensors.
+    """
+    S = roll.at(trials.speeds, trials.sensors)
+    left, labels, errors = trials.readings - S, trials.labels, trials.errors
+    words = list(roll.warnings)
+
+    def shown(amplitude: float) -> str:
+        return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_in}".rstrip()
+
+    size = np.abs(trials.mean)
+    excess = np.abs(S) * (1.0 - 1e-12) - size
+    if (excess > 0).any():
+        r, s, c = np.unravel_index(int(np.nanargmax(excess)), excess.shape)
+        others = int((excess > 0).sum()) - 1
+        more = f", and than {counted(others, 'other reading')}" if others else ""
+        words.append(
+            f"the slow-roll vector of sensor {trials.sensors[c]!r}, {shown(abs(S[s, c]))}, is larger than "
+            f"its reading in run {trials.runs[r]!r} at {labels.speed_words(float(trials.speeds[s]))}, "
+            f"{shown(size[r, s, c])}{more}: check its unit, and that the readings have not been "
+            "corrected already"
+        )
+    largest = float(np.abs(S).max(initial=0.0))
+    share = 0.0 if errors is None else max(errors.amplitude, errors.phase) * largest
+    if errors is not None and share:
+        errors = replace(errors, floor=float(np.hypot(errors.floor, share)))
+        words.append(
+            "the stated errors hold for the amplitudes as measured: of the slow-roll vectors, up to "
+            f"{shown(largest)}, they add {shown(share)} to the floor"
+        )
+    steps = None if trials.steps is None else _turned(trials.steps, trials.readings, left)
+    return replace(trials, readings=left, errors=errors, warnings=(*trials.warnings, *words), steps=steps)
+
+
+def _turned(steps: FloatArray, measured: ComplexArray, left: ComplexArray) -> FloatArray:
+    """Steps of the difference that give the same variances along and across it as those of the measured one.
+
+    The measured amplitude was rounded in its own direction, the phase across; what is left points elsewhere.
+    """
+    amplitude, phase = steps[0] ** 2, (steps[1] * np.abs(measured)) ** 2
+    cos = np.cos(np.angle(left) - np.angle(measured)) ** 2
+    along, across = cos * amplitude + (1 - cos) * phase, (1 - cos) * amplitude + cos * phase
+    size = np.maximum(np.abs(left), 1e-12 * np.abs(measured)) + np.finfo(float).tiny
+    return np.array([np.sqrt(along), np.sqrt(across) / size])

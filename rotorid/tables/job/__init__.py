@@ -1,1 +1,0 @@
-"""Balancing jobs: job files and workbooks, read, completed and written."""

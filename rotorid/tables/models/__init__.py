@@ -1,1 +1,0 @@
-"""Model files for identification, read and written."""

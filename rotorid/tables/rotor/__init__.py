@@ -1,1 +1,0 @@
-"""Rotor tables and files, their bearings, and unbalance tables."""

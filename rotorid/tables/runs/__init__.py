@@ -1,1 +1,0 @@
-"""Runs, weights and influence tables: what balancing works on."""

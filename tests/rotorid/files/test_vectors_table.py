@@ -1,0 +1,128 @@
+"""Tables of vectors over speed: units, conventions and errors by hand, and what is refused, in words."""
+
+import numpy as np
+import pytest
+from run_ups import drawn, table
+
+from rotorid.files.vectors_table import read_vectors, runs_columns
+from rotorid.tables import InputError
+
+HEAD = "run,speed_rpm,sensor,amplitude_um_pp,phase_deg,time_s,amplitude_std_um_pp,phase_std_deg\n"
+ROWS = "a,600,DE,20,30,1,2,6\na,900,DE,40,90,2,2,3\n"
+
+
+def read(tmp_path, text, phase="lead"):
+    path = tmp_path / "vectors.csv"
+    path.write_text(text)
+    return read_vectors(path, phase)
+
+
+def test_numbers_by_hand(tmp_path):
+    (sweep,) = read(tmp_path, HEAD + ROWS)
+    np.testing.assert_allclose(sweep.speeds, [20 * np.pi, 30 * np.pi])
+    np.testing.assert_allclose(sweep.vectors[:, 0], [1e-5 * np.exp(1j * np.pi / 6), 2e-5j], atol=1e-20)
+    along, across = 1e-12, (2e-5 * np.radians(3)) ** 2
+    np.testing.assert_allclose(sweep.covariances[1, 0], [[across, 0], [0, along]], atol=1e-24)
+    assert sweep.time.tolist() == [1, 2]
+    (lag,) = read(tmp_path, HEAD + ROWS, "lag")
+    np.testing.assert_allclose(lag.vectors, sweep.vectors.conj())
+    np.testing.assert_allclose(lag.covariances[0, 0, 0, 1], -sweep.covariances[0, 0, 0, 1])
+
+
+def test_a_table_comes_back(tmp_path):
+    _, sweep = drawn()
+    for lag in (False, True):
+        path = table(tmp_path / "v.csv", [sweep], lag=lag)
+        (back,) = read_vectors(path, "lag" if lag else "lead")
+        np.testing.assert_allclose(back.vectors, sweep.vectors, rtol=1e-9)
+        np.testing.assert_allclose(back.covariances, sweep.covariances, rtol=1e-8, atol=1e-20)
+        frame = {
+            c.name: c.values for c in runs_columns([(back, back.speeds, back.vectors, back.covariances)])
+        }
+        assert set(frame) == set(HEAD.strip().split(",")) - {"time_s"}
+        np.testing.assert_allclose(frame["amplitude_std_um_pp"], 2.0, rtol=1e-8)
+
+
+def test_runs_have_their_own_speeds_and_order(tmp_path):
+    """Rows in any order, by time; without times by speed; a sensor may lack."""
+    text = HEAD + "b,700,DE,1,0,5,1,1\nb,650,DE,2,0,4,1,1\nb,650,NDE,3,0,4,1,1\n" + ROWS
+    b, a = read(tmp_path, text)
+    assert (b.run, a.run) == ("b", "a")
+    np.testing.assert_allclose(b.speeds * 30 / np.pi, [650, 700])
+    assert np.isnan(b.vectors).tolist() == [[False, False], [False, True]]
+    (bare,) = read(tmp_path, "run,speed_Hz,sensor,amplitude,phase_deg\na,9,x,1,0\na,8,x,2,0\n")
+    assert bare.time is None
+    assert bare.covariances is None
+    np.testing.assert_allclose(bare.speeds / 2 / np.pi, [8, 9])
+    assert bare.labels.speed_unit == "Hz"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEAD + ROWS.replace("600", "0"), r"row 2, column speed_rpm: found '0', expected a speed above 0"),
+        (
+            HEAD + ROWS.replace(",20,", ",-20,"),
+            "amplitude_um_pp: found '-20', expected an amplitude of 0",
+        ),
+        (HEAD + ROWS.replace(",30,", ",400,"), "column phase_deg: found '400', expected a phase from -360"),
+        (
+            HEAD + ROWS.replace(",2,6", ",0,6"),
+            "amplitude_std_um_pp: found '0', expected a standard dev",
+        ),
+        (HEAD + ROWS + "a,900,DE,1,1,2,1,1\n", "row 4, column sensor: found 'DE', expected another .* row 3"),
+        (
+            HEAD + ROWS + "a,901,NDE,1,1,2,1,1\n",
+            "column speed_rpm: found '901', expected 900 as in row 3",
+        ),
+        (HEAD.replace(",phase_std_deg", "") + ROWS.replace(",2,6", ",2").replace(",2,3", ",2"), "phase_std"),
+        (HEAD.replace("std_um_pp", "std_mm_s") + ROWS, "amplitude_std_mm_s.* a unit that converts"),
+        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s, ms, us or min"),
+        ("run,speed_rpm,sensor,amplitude,phase_deg\na,9,x,1,0\na,9,x,2,0\n", "need a column time_s"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_words(tmp_path, text, words):
+    with pytest.raises(InputError, match=words):
+        read(tmp_path, text)
+
+
+def test_a_table_without_known_errors_has_no_columns_of_them(tmp_path):
+    _, sweep = drawn()
+    unknown = np.full((*sweep.vectors.shape, 2, 2), np.nan)
+    names = [c.name for c in runs_columns([(sweep, sweep.speeds, sweep.vectors, unknown)])]
+    assert names == ["run", "speed_rpm", "sensor", "amplitude_m", "phase_deg"]
+
+
+LONG = """\
+run,speed_rpm,sensor,amplitude_mil_pp,phase_deg,time_s
+coast,600,DE,2.1,30,1
+coast,600,NDE,1.5,40,1
+coast,650,DE,4.2,90,2
+coast,650,NDE,2.5,95,2
+"""
+SAME = {
+    "columns per sensor": "run,RPM,DE mils pp,DE deg,NDE mils pp,NDE deg,time_s\n"
+    "coast,600,2.1,30,1.5,40,1\ncoast,650,4.2,90,2.5,95,2\n",
+    "two rows of headings": ",,DE,,NDE,,\nrun,rpm,mils pp,deg,mils pp,deg,time_s\n"
+    "coast,600,2.1,30,1.5,40,1\ncoast,650,4.2,90,2.5,95,2\n",
+    "vectors": "run,RPM,DE,NDE,time_s\n,rpm,mil pp,mil pp,s\n"
+    "coast,600,2.1 @ 30°,1.5 @ 40°,1\ncoast,650,4.2 @ 90°,2.5 @ 95°,2\n",
+    "one run, named as its file": "RPM,DE mils pp,DE deg,NDE mils pp,NDE deg,time_s\n"
+    "600,2.1,30,1.5,40,1\n650,4.2,90,2.5,95,2\n",
+}
+
+
+@pytest.mark.parametrize("form", SAME)
+def test_tables_as_instruments_write_them_are_the_same(tmp_path, form):
+    (tmp_path / "coast.csv").write_text(SAME[form], encoding="utf-8")
+    (sweep,) = read_vectors(tmp_path / "coast.csv", "lag")
+    (other,) = read(tmp_path, LONG, "lag")
+    assert (sweep.run, sweep.sensors, sweep.labels) == (other.run, other.sensors, other.labels)
+    assert sweep.time.tolist() == other.time.tolist()
+    np.testing.assert_allclose(sweep.vectors, other.vectors, rtol=1e-14)
+
+
+def test_a_single_sensor_needs_no_column(tmp_path):
+    (sweep,) = read(tmp_path, "RPM,Amp (mils),Phase (deg)\n600,2.1,30\n650,4.2,90\n")
+    assert (sweep.run, sweep.sensors) == ("vectors", ("1",))
+    np.testing.assert_allclose(sweep.labels.vibration(sweep.vectors[:, 0]), [[2.1, 4.2], [30, 90]])

@@ -1,0 +1,147 @@
+"""Jobs as workbooks: the same as files that say the same; with results, what was there stays."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+from openpyxl.styles import Font
+from tables_data import RUNS, WEIGHTS, write_csv
+from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, as_workbook, differences
+
+from balancing import correct, estimate_influence
+from rotorid.files.job_excel import NAMED, template_bytes
+from rotorid.files.job_models import Errors, JobSettings
+from rotorid.samples import sample_data
+from rotorid.tables import job_from_files, read_job, write_influence
+
+DATA = sample_data()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A job's folder with every table that a job may name."""
+    place = tmp_path / "a job"
+    place.mkdir()
+    tables = {"runs": RUNS, "weights": WEIGHTS, "check": CHECK, "slow": SLOW}
+    for name, table in (tables | {"check_weights": WEIGHTS[:1]}).items():
+        write_csv(place / f"{name}.csv", table)
+    write_csv(place / "rotor.csv", [["" if cell is None else cell for cell in row] for row in ROTOR])
+    trials = job_from_files([place / "runs.csv", place / "weights.csv"], phase="lag").trials
+    write_influence(place / "influence.csv", estimate_influence(trials))
+    return place
+
+
+def there_and_back(job, target):
+    """The job of a file, read from the workbook that says the same."""
+    plain, back = read_job(job), read_job(as_workbook(job, target))
+    assert differences(plain, back) == ()
+    return plain, back
+
+
+def cells(path, sheet):
+    return [list(row) for row in openpyxl.load_workbook(path)[sheet].iter_rows(values_only=True)]
+
+
+def write_job(folder, text):
+    path = folder / "job.toml"
+    path.write_text(HEAD + text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_every_sample_job_is_the_same_as_a_workbook(sample, tmp_path):
+    folder = tmp_path / "samples" / sample.split("/")[0]
+    shutil.copytree(DATA / folder.name, folder)
+    job, back = there_and_back(DATA / f"{sample}.toml", folder / "sheet.xlsx")
+    assert back.trials.warnings == job.trials.warnings
+    assert (job.rotor is None) == (back.rotor is None)
+    np.testing.assert_array_equal(back.trials.readings, job.trials.readings)
+    np.testing.assert_array_equal(back.trials.weights, job.trials.weights)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_all_that_a_job_says_is_the_same_in_a_workbook(part, folder):
+    path = write_job(folder, PARTS[part])
+    job, back = there_and_back(path, folder / "sheet.xlsx")
+    assert differences(job, read_job(write_job(folder, ""))), "this part of the job must matter"
+    found = [correct(estimate_influence(j.trials), limits=j.limits_of(j.trials.planes)) for j in (job, back)]
+    np.testing.assert_array_equal(found[0].weights, found[1].weights)
+
+
+def test_digits_survive(tmp_path):
+    third, tiny = 1 / 3, 1.2345678901234567e-7
+    runs = [RUNS[0], *[[r, 1e3 * third, s, a * third, p * third + tiny] for r, _, s, a, p in RUNS[1:]]]
+    write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", WEIGHTS)
+    there_and_back(write_job(tmp_path, ""), tmp_path / "sheet.xlsx")
+
+
+def test_names_with_points_quotes_and_signs(tmp_path):
+    names = {"A": '3.5" probe', "B": "#2 it's"}
+    runs = [RUNS[0], *[[r, s, names[c], a, p] for r, s, c, a, p in RUNS[1:]]]
+    weights = [WEIGHTS[0], *[[r, f"#{p}.0", m, a] for r, p, m, a in WEIGHTS[1:]]]
+    for name, table in {"runs": runs, "weights": weights}.items():
+        text = "\n".join(",".join(f'"{str(c).replace(chr(34), chr(34) * 2)}"' for c in row) for row in table)
+        (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
+    text = "".join(f"[slow_roll.{json.dumps(n)}]\namplitude = 0.1\nphase_deg = 3\n" for n in names.values())
+    _, back = there_and_back(write_job(tmp_path, text), tmp_path / "sheet.xlsx")
+    assert tuple(back.planes) == ("#1.0", "#2.0")
+    assert back.trials.sensors == ('3.5" probe', "#2 it's")
+
+
+def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):
+    """Formats, formulas, remarks and sheets of no table stay; older results go."""
+    path = as_workbook(write_job(folder, 'phase = "lag"\n'), folder / "job.xlsx")
+    book = openpyxl.load_workbook(path)
+    book["runs"]["A1"].font = Font(color="FFFF0000")
+    book["runs"]["H2"] = "=D2*2"
+    book["runs"]["H1"], book["runs"]["I1"] = "note", "note 2"
+    book["runs"]["I2"].value, book["runs"]["I2"].data_type = repr(0.1 + 0.2), "n"
+    book.create_sheet("notes")["B3"] = "new cable"
+    book.create_sheet("results of June")["A1"] = 1
+    book.save(path)
+    for name in ("done", "again"):  # once more from its own copy
+        with_values(path)
+        outcome = cli("balance", path, "--output", folder / f"{name}.xlsx")
+        assert outcome.code == 0, outcome.err
+        done = openpyxl.load_workbook(folder / f"{name}.xlsx")
+        assert [name for name in done.sheetnames if not name.startswith("results")] == [
+            name for name in book.sheetnames if not name.startswith("results")
+        ]
+        assert "results of June" not in done.sheetnames
+        assert (done["runs"]["A1"].font.color.rgb, done["runs"]["H2"].value) == ("FFFF0000", "=D2*2")
+        assert done["runs"]["I2"].value == 0.1 + 0.2
+        assert done["notes"]["B3"].value == "new cable"
+        assert cells(folder / f"{name}.xlsx", "weights") == cells(path, "weights")
+        assert done.active.title == "results"
+        assert done["results"]["A2"].value is not None
+        path = folder / f"{name}.xlsx"
+
+
+def with_values(path):
+    """The formula of H2 with a stored value, as Excel saves it."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    sheet = "xl/worksheets/sheet1.xml"
+    parts[sheet] = re.sub(rb"<f>D2\*2</f><v ?/?>(</v>)?", b"<f>D2*2</f><v>1</v>", parts[sheet])
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in parts.items():
+            archive.writestr(name, data)
+
+
+def test_the_columns_of_the_form_are_keys():
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    for sheet, (first, model) in NAMED.items():
+        names = [cell.value for cell in book[sheet][1] if cell.value not in (first, "note")]
+        assert names
+        known = model.known_keys()
+        assert {model.usual(name) for name in names} <= set(known)
+    of_errors = Errors.known_keys()
+    known = {*JobSettings.known_keys(), *(f"errors.{name}" for name in of_errors)}
+    assert {cell.value for cell in book["settings"]["A"][1:]} <= known

@@ -1,0 +1,208 @@
+"""The form to fill in, and workbooks and CSV files as a European Excel saves them."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+from cases import each_of
+from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, write_book
+from workbook_jobs import differences, filled, rows
+
+from balancing import correct, estimate_influence
+from rotorid.files.job_excel import template_bytes
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+
+BK = sample_data() / "bk_two_plane"
+FORM = ("runs", "weights", "planes", "sensors", "settings")
+SETTINGS = [["key", "value"], ["phase", "lag"], ["errors.phase_deg", 0.5], ["speed_tolerance_percent", 1]]
+PLANES = [
+    ["plane", "max_mass_g", "forbidden_deg", "holes_deg", "available_g", "taken", "use"],
+    ["1", 20.5, "20.5-60", "0; 7.5; 90", "2.5; 5", "2: 2.5", None],
+    ["2", None, None, 7.5, 2.5, None, False],
+]
+SENSORS = [["sensor", "limit", "weight"], ["A", 6.5, 1], ["B", "1000: 6,5", 0.5]]
+BOOK = {"runs": RUNS, "weights": WEIGHTS, "planes": PLANES, "sensors": SENSORS, "settings": SETTINGS}
+
+
+def european(table):
+    """Every number as the text that a European spreadsheet program shows."""
+    return [
+        [str(cell).replace(".", ",") if type(cell) in (int, float) else cell for cell in row] for row in table
+    ]
+
+
+def bk(name):
+    lines = (BK / name).read_text(encoding="utf-8").splitlines()
+    header, *body = [line.split(",") for line in lines if not line.startswith("#")]
+    number = {"speed_rpm", "amplitude", "phase_deg", "mass_g", "angle_deg"}
+    return [
+        header,
+        *[[float(c) if h in number else c for h, c in zip(header, row, strict=True)] for row in body],
+    ]
+
+
+def solved(job):
+    return correct(estimate_influence(job.trials)).weights
+
+
+def test_the_form_has_headers_explanations_and_choices():
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    assert tuple(book.sheetnames) == (*FORM, "notes")
+    for name in FORM:
+        sheet = book[name]
+        names = [cell.value for cell in sheet[1]]
+        assert None not in names
+        if name != "settings":
+            assert sheet.max_row == 1
+            for cell in sheet[1]:
+                assert cell.comment is not None, cell.coordinate
+                assert "Allowed" in cell.comment.text
+        notes = [(row[0], row[1]) for row in book["notes"].iter_rows(values_only=True)]
+        keys = names if name != "settings" else [cell.value for cell in book["settings"]["A"][1:]]
+        assert {(name, key) for key in keys} <= set(notes)
+
+    rules = {str(rule.sqref): rule for rule in book["runs"].data_validations.dataValidation}
+    assert rules["B1"].formula1.strip('"').split(",") == ["speed_rpm", "speed_rad_s", "speed_Hz"]
+    assert float(rules["D2:D1048576"].formula1) == 0
+    assert [float(rules["E2:E1048576"].formula1), float(rules["E2:E1048576"].formula2)] == [-360, 360]
+
+
+def test_the_form_filled_with_the_published_example(tmp_path):
+    runs, weights = bk("runs.csv"), bk("weights.csv")
+    path = filled(tmp_path / "job.xlsx", runs=rows(runs, amplitude="amplitude_um_pp"), weights=rows(weights))
+    expected = solved(read_job(BK / "job.toml"))
+    np.testing.assert_allclose(solved(read_job(path)), expected, rtol=1e-12)
+    assert abs(expected[0]) == pytest.approx(2.951e-3, rel=1e-3)
+    book = openpyxl.load_workbook(path)
+    book["runs"]["D1"] = "amplitude"
+    book.save(path)
+    assert differences(read_job(path), read_job(BK / "job.toml")) == ()
+
+
+def test_the_form_with_settings(tmp_path):
+    path = filled(
+        tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=[{"plane": "1", "use": "no"}]
+    )
+    book = openpyxl.load_workbook(path)
+    keys = [cell.value for cell in book["settings"]["A"]]
+    assert read_job(path).conventions.labels.phase == "lead"
+    for key, value in (("phase", "lag"), ("errors.phase_deg", "1,5")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
+    book.save(path)
+    job = read_job(path)
+    assert (job.conventions.labels.phase, job.left_out) == ("lag", ("1",))
+    assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
+
+
+def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
+    plain = read_job(write_book(tmp_path / "plain.xlsx", BOOK))
+    tables = {name: european(table) for name, table in BOOK.items()}
+    tables["planes"][1][1:6] = ["20,5", "20,5-60", "0; 7,5; 90", "2,5; 5", "2: 2,5"]
+    for row in (1, 2):
+        tables["planes"][row][0] = str(row)
+    path = write_book(tmp_path / "job.xlsx", tables)
+    job = read_job(path)
+    assert differences(plain, job) == ()
+
+
+@each_of(
+    ("sheet", "row", "column", "value", "shown", "words"),
+    [
+        ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
+        ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
+        ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
+        ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("settings", 3, "value", "=1/2", "=1/2", "a formula with its stored value"),
+        ("settings", 2, "key", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+    ],
+)
+def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, value, shown, words):
+    changed = {**BOOK, sheet: replaced(BOOK[sheet], row, column, value)}
+    found = complaints(read_job, write_book(tmp_path / "job.xlsx", changed))
+    problem = the_only(found, "job.xlsx", row, column, shown, words)
+    assert f"sheet {sheet!r}" in problem.file
+
+
+def with_stored_values(path, values):
+    """The workbook with values stored in its formulas, in order, as Excel stores them."""
+    parts = {}
+    with zipfile.ZipFile(path) as book:
+        for name in book.namelist():
+            data = book.read(name).decode() if name.endswith(".xml") else book.read(name)
+            while (
+                isinstance(data, str)
+                and name.startswith("xl/worksheets")
+                and "</f><v></v>" in data.replace("<v />", "<v></v>")
+            ):
+                data = data.replace("<v />", "<v></v>").replace(
+                    "</f><v></v>", f"</f><v>{values.pop(0)}</v>", 1
+                )
+            parts[name] = data
+    with zipfile.ZipFile(path, "w") as book:
+        for name, data in parts.items():
+            book.writestr(name, data)
+    assert not values
+    return path
+
+
+def test_formulas_with_stored_values_count(tmp_path):
+    runs = replaced(replaced(RUNS, 4, "amplitude_um_pp", "=9.8/2"), 5, "phase_deg", "=E4+1")
+    settings = replaced(SETTINGS, 3, "value", "=1/2")
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "runs": runs, "settings": settings})
+    with_stored_values(path, [4.9, 347, 0.5])
+    job = read_job(path)
+    assert differences(job, read_job(write_book(tmp_path / "plain.xlsx", BOOK))) == ()
+
+
+def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "Tabelle2": []})
+    plain = read_job(path)
+    book = openpyxl.load_workbook(path)
+    book["settings"].sheet_state = "hidden"
+    book["runs"].row_dimensions[3].hidden = True
+    for name in FORM:
+        book[name].cell(40, 1).value = "\u00a0 "
+        book[name].cell(2, 30).value = " "
+        book[name].cell(60, 12).number_format = "0.00"
+    book.save(path)
+    assert differences(plain, read_job(path)) == ()
+
+
+def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
+    check = [RUNS[0], ["check", 1000, "A", 0.3, 17], ["check", 1000, "B", 0.7, 301]]
+    settings = [["key", "value"], ["check", "check.csv"]]
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "check": check, "settings": settings})
+    words = "the table in the sheet 'check' of this workbook, not a file"
+    the_only(complaints(read_job, path), "job.xlsx", 2, "value", "check.csv", words)
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "check_weights": WEIGHTS})
+    words = "the check runs too"
+    the_only(complaints(read_job, path), "job.xlsx", None, "check_weights", None, words)
+
+
+def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):
+    """Excel keeps "2%" as 0.02: it must not be read as 0.02 percent."""
+    path = tmp_path / "job.xlsx"
+    write_book(path, BOOK)
+    book = openpyxl.load_workbook(path)
+    cell = book["settings"]["B4"]
+    cell.value, cell.number_format = 0.02, "0%"
+    book.save(path)
+    (complaint,) = complaints(lambda: read_job(path))
+    assert "2%" in str(complaint)
+    assert "formatted as a percentage" in str(complaint)
+
+
+def test_a_plane_that_does_not_exist_is_named_with_its_sheet_and_row(tmp_path):
+    path = tmp_path / "job.xlsx"
+    write_book(path, {**BOOK, "planes": [*PLANES, ["9", 5, None, None, None, None, None]]})
+    (complaint,) = complaints(lambda: read_job(path))
+    assert (complaint.row, complaint.column, complaint.value) == (4, "plane", "9")
+    assert "planes" in complaint.file
