@@ -56,8 +56,7 @@ def model_files(
     ValueError
         For forces where no mass stands.
     """
-    from rotorid.files.small_model import equations_of, linear_equations, small_model_files
-    from rotorid.files.toml_writing import toml_bytes
+    from rotorid.files.small_model import linear_equations, small_model_files
 
     at = ", ".join(map(str, result.nodes))
     made = f"{name} reduced to masses at nodes {at} (formula 50, {counted(result.modes, 'mode')})"

@@ -117,7 +117,8 @@ def second_order(  # noqa: PLR0913
             where = f"{what} matrix, row {i + 1}"
             inertia[row, column] = read_expression(entries[i][j], where, estimate, plain.known)
     model = replace(plain, inertia=tuple(inertia))
-    model.augmented(0.0, np.zeros((len(states), 1)), model.start, np.zeros(len(inputs)))  # a singular mass matrix
+    # refuses a singular mass matrix
+    model.augmented(0.0, np.zeros((len(states), 1)), model.start, np.zeros(len(inputs)))
     return model
 
 

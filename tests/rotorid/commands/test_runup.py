@@ -9,7 +9,6 @@ from run_ups import drawn, table
 
 from rotorid.base.rpm import RPM
 from rotorid.commands import RunUpOptions, runup
-from rotorid.files.vectors_table import read_vectors
 from rotorid.samples import sample_data
 from rotorid.tables import read_modes, read_rotor
 

@@ -11,8 +11,6 @@ import fem
 from fem import state_space as of_motion
 from rotorid.files.small_model import equations_of
 from rotorid.files.toml_writing import toml_bytes
-from rotorid.identify.ode import ode_model
-from rotorid.identify.second_order import second_order
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
