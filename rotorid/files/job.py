@@ -484,6 +484,10 @@ def conventions_of(
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
+        any(
+            one.limit is not None and one.limit.unit.name.endswith("_rms")
+            for one in settings.sensors.values()
+        ),
     )
 
 
@@ -604,7 +608,7 @@ def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Prob
             continue
         hint = did_you_mean(name, known)
         expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
-        if key == "planes" and not hint:
+        if key == "planes":
             expected += f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
         problems.extend([replace(part.problem("", expected), value=name)])
 
@@ -625,6 +629,7 @@ def _limits(
 ) -> Limits | None:
     """In SI with the rotation, in the order of speeds, sensors and planes; None: nothing limited."""
     labels, most = trials.labels, np.full(len(planes), np.inf)
+    own = units.vibration(labels.vibration_unit)
     for k, plane in enumerate(planes.values()):
         if plane.max_weight is not None:
             size = in_job_units(plane.max_weight, labels.weight_unit, plane.radius)
@@ -638,9 +643,15 @@ def _limits(
     )
     residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
     for name, sensor in settings.sensors.items():
-        if name in trials.sensors and sensor.limit:
-            rows = _at_speeds(settings, sensor, "limit", trials, math.inf, problems)
-            residual[:, trials.sensors.index(name)] = rows / labels.vibration_scale
+        if name in trials.sensors and sensor.limit is not None:
+            rows = _at_speeds(settings, sensor, "limit", sensor.limit.value, trials, math.inf, problems)
+            unit = sensor.limit.unit if sensor.limit.unit.name else own
+            if unit.kind != own.kind:
+                expected = (
+                    f"an amplitude in {own.name or 'no unit'}, as the readings have, or converting to it"
+                )
+                sensor.complain(problems, "limit", expected)
+            residual[:, trials.sensors.index(name)] = rows / unit.scale
     limits = Limits(most, residual, arcs)
     return limits if limits.any else None
 
@@ -650,7 +661,7 @@ def _row_weights(
 ) -> FloatArray | None:
     """Of each reading, (S, C): that of its speed times that of its sensor; None: all 1."""
     columns = np.array([sensor.weight for sensor in sensors.values()])
-    rows = _at_speeds(settings, settings, "speed_weights", trials, 1.0, problems)
+    rows = _at_speeds(settings, settings, "speed_weights", settings.speed_weights, trials, 1.0, problems)
     for key, weights in (("sensors", columns), ("speed_weights", rows)):
         if not weights.any():
             expected = f"at least one {key.split('_')[0].rstrip('s')} with a weight above 0"
@@ -659,10 +670,15 @@ def _row_weights(
 
 
 def _at_speeds(
-    settings: JobSettings, part: Settings, key: str, trials: Trials, default: float, problems: Problems
+    settings: JobSettings,
+    part: Settings,
+    key: str,
+    numbers: Mapping[str, float],
+    trials: Trials,
+    default: float,
+    problems: Problems,
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    numbers: Mapping[str, float] = getattr(part, key)
     unit = units.SPEED[trials.labels.speed_unit]
     out = np.full(len(trials.speeds), numbers.get("", default))
     seen: dict[int, str] = {}

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
+_PEAK = re.compile("peak|pk", re.IGNORECASE)
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
@@ -235,6 +236,8 @@ def long_rows(
             under = below.get(h.index) if column.stem != "phase" or h.stem == "phase" else None
             if column.stem in (*NUMBERS, *pair):
                 column = _with_unit(column, under, rows, phase)
+                if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
+                    column = column._replace(unit="mm_s_rms")
             columns.append(column)
     sensors = _by_name(columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
@@ -366,7 +369,7 @@ def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Ro
 
 def is_severity(name: str) -> bool:
     """Whether a heading says that mm/s alone are rms, as of a vibration severity."""
-    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not re.search("peak|pk", name)
+    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not _PEAK.search(name)
 
 
 def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dict[str, dict[str, _Column]]:

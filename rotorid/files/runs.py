@@ -214,7 +214,7 @@ def read_runs(
         _placed(vectors[rows], at, shape),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=words + _which_mm_s(table),
+        warnings=words + _which_mm_s(table, rms=conventions.rms),
         steps=_placed(steps[:, rows], at, shape),
         covariance=covariance,
     )
@@ -329,10 +329,10 @@ def _heading_of(table: Table) -> str:
     return field.names[0] if field.names else field.name
 
 
-def _which_mm_s(table: Table) -> tuple[str, ...]:
+def _which_mm_s(table: Table, *, rms: bool) -> tuple[str, ...]:
     """How mm/s alone are read, below a heading that is not one of this program's own."""
     heading, unit = _heading_of(table), table.unit("amplitude").name
-    if unit == "mm_s_rms" and is_severity(heading):
+    if unit == "mm_s_rms" and (is_severity(heading) or (rms and "rms" not in heading.casefold())):
         return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
     if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
         return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
