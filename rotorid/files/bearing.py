@@ -17,7 +17,7 @@ from rotorid.base.tables import csv_bytes
 from rotorid.base.text import listing
 from rotorid.files import forces, units
 from rotorid.files.columns import Column, Table, read_table
-from rotorid.files.forces import Place, Places, in_si, made, read_force
+from rotorid.files.forces import Place, Places, each, in_si, read_force
 from rotorid.files.problems import Problems
 from rotorid.files.settings import NotNegative, Number, Settings, Text, key
 from rotorid.files.units import one_of
@@ -39,15 +39,13 @@ COLUMNS = (
 
 
 def _two(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else (value,)
+    if isinstance(value, list) and len(value) != 2:
+        raise ValueError("a number, or two: [x, y]")
+    return tuple(value) if isinstance(value, list) else (value, value)
 
 
-_Two = Field(min_length=1, max_length=2)
-OneOrTwo = Annotated[
-    tuple[NotNegative, ...],
-    BeforeValidator(_two, json_schema_input_type=float | Annotated[list[float], _Two]),
-    _Two,
-]
+_Written = float | Annotated[list[float], Field(min_length=2, max_length=2)]
+OneOrTwo = Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_two, json_schema_input_type=_Written)]
 
 
 class _SupportKeys(Place):
@@ -56,19 +54,17 @@ class _SupportKeys(Place):
     )
     kind: Literal["bearing", "seal"] = key("which it is, where it is another one", default="bearing")
     pedestal_mass: NotNegative = key("mass of what it stands on", "pedestal_mass_kg", 0.0, units=units.MASS)
-    pedestal_stiffness: OneOrTwo = key(
+    pedestal_stiffness: OneOrTwo | None = key(
         "its stiffness; one number, or two for x and y",
         "pedestal_stiffness_N_per_m",
-        (),
+        None,
         units=units.STIFFNESS,
-        expected="a number, or two: [x, y]",
     )
     pedestal_damping: OneOrTwo = key(
         "its damping; one number, or two for x and y",
         "pedestal_damping_N_s_per_m",
-        (0.0,),
+        (0.0, 0.0),
         units=units.DAMPING,
-        expected="a number, or two: [x, y]",
     )
     table: Text | None = key("a table of these coefficients over speed", default=None)
 
@@ -80,16 +76,16 @@ class _SupportKeys(Place):
     @property
     def pedestal(self) -> Pedestal | None:
         """What it stands on."""
-        pairs: list[Any] = [self.pedestal_stiffness, self.pedestal_damping]
-        pairs = [two if len(two) > 1 else two[0] for two in pairs if two]
-        return Pedestal(self.pedestal_mass, *pairs) if self.pedestal_stiffness else None
+        if self.pedestal_stiffness is None:
+            return None
+        return Pedestal(self.pedestal_mass, self.pedestal_stiffness, self.pedestal_damping)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A bearing that pushes outwards, and a pedestal of no stiffness."""
         for name, value in self.constants.items():
             if self.kind == "bearing" and name in _DIAGONAL and value < 0:
                 yield name, OUTWARDS
-        if not self.pedestal_stiffness and (self.pedestal_mass or any(self.pedestal_damping)):
+        if self.pedestal_stiffness is None and (self.pedestal_mass or any(self.pedestal_damping)):
             yield "pedestal_stiffness", "the stiffness of the pedestal"
 
 
@@ -126,54 +122,35 @@ def read_attached(
     file: Settings, at: Places, folder: Path, problems: Problems
 ) -> tuple[list[Support], list[NodeForce]]:
     """Supports and forces of a file, of which tables are named from its folder."""
-    supports = [
-        _support(one, at(one), folder, problems) for kind in KINDS for one in getattr(file, kind.name)
-    ]
-    loads = [
-        read_force(one, kind.name, at(one), problems) for kind in FORCES for one in getattr(file, kind.name)
-    ]
-    return [*filter(None, supports)], [*filter(None, loads)]
+    supports, loads = [], []
+    for kind in KINDS:
+        items = getattr(file, kind.name)
+        supports += each(problems, items, kind.name, lambda item: _support(item, at(item), folder))
+    for kind in FORCES:
+        items = getattr(file, kind.name)
+        loads += each(problems, items, kind.name, lambda item: read_force(item, at(item)))
+    return supports, loads
 
 
-def _support(item: _SupportKeys, node: int, folder: Path, problems: Problems) -> Support | None:
-    values, speeds, before = item.constants, np.empty(0), len(problems)
+def _support(item: _SupportKeys, node: int, folder: Path) -> Support:
+    values, speeds = item.constants, np.empty(0)
     if item.table is not None:
-        table = _over_speed(folder / item.table, item.kind, problems)
-        if table is None:
-            return None
+        table = _over_speed(folder / item.table, item.kind)
         speeds = table.numbers("speed")
-        for name in NAMES:
-            if name in table and name in values:
-                problems.extend([item.problem(name, f"nothing: {table.source} has a column {NAMES[name]}")])
-            elif name in table:
-                values[name] = table.numbers(name)
+        columns = {name: table.numbers(name) for name in NAMES if name in table}
+        if twice := values.keys() & columns:
+            raise ValueError(f"{NAMES[min(twice)]} once: {table.source} has this column, too")
+        values |= columns
     if not values:
-        missing = f"the stiffness of the {item.kind}, or its damping"
-        problems.extend([item.problem("stiffness", missing)])
+        raise ValueError("its stiffness is missing, or its damping")
     for quantity, entries in ENTRIES.items():
-        used = [name for name in entries if name in values]
-        if used and (quantity in values or len({entries[0], entries[3]} & {*used}) == 1):
+        used = {*entries} & values.keys()
+        if used and (quantity in values or len({entries[0], entries[3]} & used) == 1):
             both = listing([NAMES[entries[0]], NAMES[entries[3]]], "and")
-            where = used[0] if item.has(used[0]) else "table"
-            problems.extend([item.problem(where, f"either {NAMES[quantity]}, or both {both}")])
-    if len(problems) > before:
-        return None
+            raise ValueError(f"either {NAMES[quantity]}, or both {both}")
     stiffness, damping = (_matrices(quantity, values) for quantity in ENTRIES)
-    return made(
-        problems,
-        item,
-        item.kind,
-        lambda: Support(
-            node,
-            stiffness,
-            damping,
-            item.name,
-            tuple(speeds),
-            item.pedestal,
-            item.kind,
-            item.tilting_stiffness,
-        ),
-    )
+    rest = tuple(speeds), item.pedestal, item.kind, item.tilting_stiffness
+    return Support(node, stiffness, damping, item.name, *rest)
 
 
 def _matrices(quantity: str, values: Mapping[str, FloatArray]) -> FloatArray:
@@ -184,12 +161,10 @@ def _matrices(quantity: str, values: Mapping[str, FloatArray]) -> FloatArray:
     return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
 
 
-def _over_speed(path: Path, kind: str, problems: Problems) -> Table | None:
-    """A table of coefficients; None with a problem."""
-    before = len(problems)
-    table = read_table(path, kind, COLUMNS, problems, first=True)
-    if table is None:
-        return None
+def _over_speed(path: Path, kind: str) -> Table:
+    """A table of coefficients."""
+    problems = Problems()
+    table = problems.need(read_table(path, kind, COLUMNS, problems, first=True))
     speed = table.numbers("speed")
     table.must_be("speed", speed >= 0, "a speed of 0 or more")
     rising = np.insert(~(np.diff(speed) <= 0), 0, True)
@@ -201,7 +176,8 @@ def _over_speed(path: Path, kind: str, problems: Problems) -> Table | None:
         table.must_be(name, table.numbers(name) >= 0, OUTWARDS)
     if len(table) == 1:
         table.complain(0, "speed", "two speeds at least: a table says how coefficients change")
-    return None if len(problems) > before else table
+    problems.stop()
+    return table
 
 
 def support_tables(
@@ -217,8 +193,7 @@ def support_tables(
     files: dict[Path, bytes] = {}
     for number, support in enumerate(supports, start=1):
         section = "bearing" if ordered else support.kind
-        values: dict[str, Any] = {"name": support.name, "node": support.node, "kind": support.kind}
-        columns = _columns(support)
+        values, columns = vars(support) | dict.fromkeys((*ENTRIES, "table")), _columns(support)
         if support.speeds:
             table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv")
             names, rows = (
@@ -228,13 +203,9 @@ def support_tables(
             values["table"], files[table] = table.name, csv_bytes((), ["speed_rad_s", *names], [*rows])
         else:
             values |= {name: value for name, (value,) in columns.items()}
-        values["tilting_stiffness"] = support.tilting_stiffness
         if stand := support.pedestal:
-            values |= {
-                "pedestal_mass": stand.mass,
-                "pedestal_stiffness": stand.xy("stiffness"),
-                "pedestal_damping": stand.xy("damping"),
-            }
+            pairs = {f"pedestal_{name}": stand.xy(name) for name in ENTRIES}
+            values |= {"pedestal_mass": stand.mass, **pairs}
         tables.setdefault(section, []).append(in_si(KEYS[section], values))
     return tables, files
 

@@ -14,10 +14,11 @@ from rotorid.base.registry import find
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.problems import Problems
+from rotorid.files.problems import InputError, Problems
 from rotorid.files.settings import NotNegative, Positive, Settings, key
 
 T = TypeVar("T")
+S = TypeVar("S", bound=Settings)
 _NODE = "a node: its number from 1, or the name of a station"
 
 
@@ -98,7 +99,7 @@ def _keys(kind: str, force: type[NodeForce]) -> type[Place]:
             Film if item.name == "film" else Positive if item.name in force.above_zero else NotNegative
         )
         keys[item.name] = type_, key(about, name, ... if needed else item.default, units=of)
-    return create_model(f"[[{kind}]]", __base__=_Force, **keys)
+    return create_model(kind, __base__=_Force, **keys)
 
 
 KEYS = {method.name: _keys(method.name, method.function) for method in FORCES}
@@ -128,32 +129,40 @@ class Places:
 
     nodes: Collection[int]
     stations: Mapping[str, int]
-    problems: Problems
 
     def __call__(self, item: Place) -> int:
-        """The node of a table of settings; 1 and a problem where it is none."""
+        """The node of a table of settings; InputError where it is none."""
         try:
             return node_number(item.node, self.nodes, self.stations)
         except ValueError as error:
-            self.problems.extend([item.problem("node", str(error))])
-            return 1
+            raise InputError([item.problem("node", str(error))]) from None
 
 
-def made(problems: Problems, item: Settings, what: str, make: Callable[..., T], **values: Any) -> T | None:  # noqa: ANN401
-    """What settings say; what its constructor refuses is a problem of theirs."""
-    try:
-        return make(**values)
-    except ValueError as error:
-        problems.extend([item.problem("", f"a possible {what}: {error}")])
-        return None
+def each(problems: Problems, items: Iterable[S], what: str, read: Callable[[S], T]) -> list[T]:
+    """What settings say; what is wrong with each, and what a constructor refuses, goes to the problems."""
+    out = []
+    for item in items:
+        try:
+            out.append(read(item))
+        except InputError as error:
+            problems.extend(error.problems)
+        except ValueError as error:
+            problems.extend([item.problem("", f"a possible {what}: {error}")])
+    return out
 
 
-def read_force(item: Place, kind: str, node: int, problems: Problems) -> NodeForce | None:
-    """A force of a kind of `FORCES` from its settings, at a node."""
+def whole(item: S, what: str, read: Callable[[S], T]) -> T:
+    """What settings say; InputError with what is wrong."""
+    problems = Problems()
+    found = each(problems, [item], what, read)
+    problems.stop()
+    return found[0]
+
+
+def read_force(item: Place, node: int) -> NodeForce:
+    """A force from its settings, at a node."""
     values: dict[str, Any] = {**item.model_dump(), "node": node}
-    force: NodeForce | None = made(
-        problems, item, kind.replace("_", " "), find(FORCES, kind, "kind").function, **values
-    )
+    force: NodeForce = find(FORCES, type(item).__name__, "kind").function(**values)
     return force
 
 
@@ -162,17 +171,14 @@ def force_tables(forces: Iterable[NodeForce]) -> dict[str, list[dict[str, Any]]]
     out: dict[str, list[dict[str, Any]]] = {}
     for force in forces:
         kind = kind_of(force)
-        out.setdefault(kind, []).append(in_si(KEYS[kind], dataclasses.asdict(force)))
+        out.setdefault(kind, []).append(in_si(KEYS[kind], vars(force)))
     return out
 
 
 def in_si(keys: type[Settings], values: Mapping[str, Any]) -> dict[str, Any]:
     """Values by field as a table of a file, by its keys in SI, without those that are the default."""
-    names = {field: one.alias or field for field, one in keys.model_fields.items()}
     return {
-        next(
-            name for name, unit in keys.known_keys()[names[field]].variants.items() if unit.scale == 1.0
-        ): value
-        for field, value in values.items()
-        if value != keys.model_fields[field].default
+        next(name for name, unit in key.variants.items() if unit.scale == 1.0): values[field]
+        for (field, one), key in zip(keys.model_fields.items(), keys.known_keys().values(), strict=True)
+        if values.get(field, one.default) != one.default
     }

@@ -20,7 +20,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.files.forces import made
+from rotorid.files.forces import whole
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
 from rotorid.files.toml_file import MOST_NAMES, read_toml
@@ -99,17 +99,6 @@ class AmplitudeErrorKeys(Settings):
     phase_deg: NotNegative = key("of a phase, degrees", default=0.0, le=360)
     floor: NotNegative = key("at amplitude 0, in the unit of the model", default=0.0)
 
-    def wrong(self) -> Iterator[tuple[str, str]]:
-        """No error at all."""
-        if not (self.amplitude_percent or self.phase_deg or self.floor):
-            yield "", "at least one of amplitude_percent, phase_deg and floor above 0, or no [errors] at all"
-
-    def read(self) -> AmplitudeErrors:
-        """As `identify` takes them."""
-        from rotorid.identify.amplitudes import AmplitudeErrors
-
-        return AmplitudeErrors(self.amplitude_percent / 100, math.radians(self.phase_deg), self.floor)
-
 
 class Nuisance(Settings):
     """What sensors add to every output."""
@@ -173,6 +162,16 @@ class ModelFile(Settings):
             for other in others if self.has(form) else ():
                 if self.has(other):
                     yield other, f"equations, matrices or states: nothing of this name beside {form}"
+        for table in ("bounds", "prior", "start"):
+            for name in sorted(getattr(self, table).keys() - self.estimate.keys()):
+                yield table, f"names of estimate; {name} is none{did_you_mean(name, self.estimate)}"
+        for name, (low, high) in self.bounds.items():
+            value = self.start.get(name, self.estimate.get(name))
+            if not low < high or (value is not None and not low <= value <= high):
+                yield (
+                    "bounds",
+                    f"[lowest, highest] of {name}, such as [0, inf], with its starting value between",
+                )
         rows = [row for matrix in (self.M, self.K, self.damping) for row in matrix]
         if len({len(self.M), len(self.K), len(self.damping), len(self.names), *map(len, rows)}) > 1:
             example = 'M = [["a", 0], [0, 2.5]]'
@@ -258,49 +257,39 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     TableWarning
         Where a parameter of a model in time has no influence on amplitudes.
     """
-    path, problems = Path(path), Problems()
-    file = _read(path, problems)
+    path = Path(path)
+    from rotorid.identify.amplitudes import AmplitudeErrors
     from rotorid.identify.equations import harmonic_model
 
-    estimate, errors = [*file.estimate], file.errors
-
-    def read() -> tuple[HarmonicModel, Sequence[str]]:
-        if not file.M:
-            if not file.equations:
-                raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
-            varying = file.varying
-            model = harmonic_model(
-                file.equations, known=file.known, estimate=estimate, inputs=file.inputs, varying=varying
-            )
-            return model, ()
-        equations, inputs, unseen = _of_amplitudes(file)
-        used = {name for text in equations for name in _words(text)}
-        at_start = {name for text in file.initial.values() for name in _words(str(text))} - used
-        if lost := [name for name in estimate if name in at_start]:
-            stands = f"{listing(lost, 'and')} {'stands' if len(lost) == 1 else 'stand'}"
-            words = f"{stands} in initial values only, which amplitudes do not show"
-            warnings.warn(f"{path}: {words}: left out", TableWarning, stacklevel=4)
-            estimate[:] = [name for name in estimate if name not in lost]
-        inputs = [name for name in inputs if name in used]
-        model = harmonic_model(equations, known=file.known, estimate=estimate, inputs=inputs)
-        if model.has_constant_terms:
+    def read(file: ModelFile) -> HarmonicFile:
+        equations, inputs, unseen = file.equations, file.inputs, list[str]()
+        estimate, errors = file.estimate, None
+        if file.M:
+            equations, inputs, unseen = _of_amplitudes(file)
+            used = {name for text in equations for name in _words(text)}
+            estimate = {name: value for name, value in estimate.items() if name in used}
+            if lost := listing(sorted(file.estimate.keys() - used), "and"):
+                words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
+                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
+        if not equations:
+            raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
+        model = harmonic_model(
+            equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
+        )
+        if file.M and model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "
                 "amplitudes, leave it out; one that excites must be a measured input"
             )
-        return model, unseen
+        if given := file.errors:
+            phase = math.radians(given.phase_deg)
+            errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
+        start = {name: value for name, value in estimate.items() if value is not None} | file.start
+        tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
+        bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
+        return HarmonicFile(model, bounds, guess, errors, path, tuple({*unseen} & {*model.outputs}), prior)
 
-    model, unseen = problems.need(made(problems, file, "model of amplitudes", read))
-    start = {name: value for name, value in file.estimate.items() if value is not None} | file.start
-    return HarmonicFile(
-        model,
-        {name: limits for name, limits in file.bounds.items() if name in estimate},
-        {name: value for name, value in start.items() if name in estimate},
-        errors.read() if errors else None,
-        path,
-        tuple({*unseen} & {*model.outputs}),
-        {name: known for name, known in file.prior.items() if name in estimate},
-    )
+    return whole(_read(path), "model of amplitudes", read)
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -339,67 +328,50 @@ def read_ode_model(path: str | Path) -> OdeModel:
     InputError
         With the problems of the file, each with its key.
     """
-    path, problems = Path(path), Problems()
-    file = _read(path, problems)
-    if file.equations or file.varying:
-        expected = "[states], or M and K: equations and varying are of amplitudes, for `rotorid identify`"
-        problems.extend([file.problem("equations", expected)])
-    start = file.estimate | file.start
-    if lost := [name for name, value in start.items() if value is None]:
-        expected = f"[estimate] with name = starting value, {lost[0]} = 1.0"
-        problems.extend([file.problem("estimate", expected)])
-    problems.stop()
     from rotorid.identify.ode import ode_model, with_nuisance
     from rotorid.identify.second_order import second_order
 
-    outputs = {name: str(text) for name, text in file.outputs.items()}
-    if extra := file.nuisance:
-        outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
-        outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
-    else:
-        factors = []
-    given: dict[str, Any] = {
-        "initial": file.initial,
-        "outputs": outputs or None,
-        "estimate": start | dict.fromkeys(factors, 0.0),
-        "known": file.known,
-        "inputs": file.inputs or (),
-        "bounds": file.bounds,
-        "per_record": [*file.per_record, *factors],
-    }
-
-    def model() -> OdeModel:
+    def read(file: ModelFile) -> OdeModel:
+        if file.equations or file.varying:
+            raise ValueError("[states], or M and K; equations are of amplitudes, for `rotorid identify`")
+        start = file.estimate | file.start
+        if lost := [name for name, value in start.items() if value is None]:
+            raise ValueError(f"no starting value of {lost[0]}: [estimate] has name = starting value in time")
+        outputs, factors = {name: str(text) for name, text in file.outputs.items()}, list[str]()
+        if extra := file.nuisance:
+            outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
+            outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
+        given: dict[str, Any] = {
+            "initial": file.initial,
+            "outputs": outputs or None,
+            "estimate": start | dict.fromkeys(factors, 0.0),
+            "known": file.known,
+            "inputs": file.inputs or (),
+            "bounds": file.bounds,
+            "per_record": [*file.per_record, *factors],
+        }
         if not file.M:
             return ode_model({name: str(text) for name, text in file.states.items()}, **given)
         return second_order(file.M, file.damping, file.K, names=file.names, force=file.force, **given)
 
-    return replace(problems.need(made(problems, file, "model", model)), prior=file.prior)
+    file = _read(Path(path))
+    return replace(whole(file, "model", read), prior=file.prior)
 
 
-def _read(path: Path, problems: Problems) -> ModelFile:
+def _read(path: Path) -> ModelFile:
     """What stands in a model file, or of a small model its linear equations; raises its problems."""
     from rotorid.files.small_model import small_equations
 
-    source, data = str(path), problems.need(read_toml(path, problems))
+    source, problems = str(path), Problems()
+    data = problems.need(read_toml(path, problems))
     if {"masses_kg", "shaft_stiffness_N_per_m"} & data.keys():
-        data = problems.need(small_equations(path, problems))
+        data = small_equations(path)
     for name, value in data.items():
         if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
             expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
             problems.add(source, None, name, None, expected)
     problems.stop()
-    file = read_settings(ModelFile, data, source, problems)
-    problems.stop()
-    file = problems.need(file)
-    for table in ("bounds", "prior", "start"):
-        for name in getattr(file, table).keys() - file.estimate.keys():
-            hint = did_you_mean(name, file.estimate)
-            problems.add(source, None, f"{table}.{name}", None, f"a name of estimate{hint}")
-    for name, (low, high) in file.bounds.items():
-        value = file.start.get(name, file.estimate.get(name))
-        if not low < high or (value is not None and not low <= value <= high):
-            expected = "[lowest, highest], such as [0, 2e6] or [0, inf], with the starting value between them"
-            problems.add(source, None, f"bounds.{name}", f"{[low, high]}", expected)
+    file = problems.need(read_settings(ModelFile, data, source, problems))
     problems.stop()
     return file
 
@@ -423,7 +395,7 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
         *((text, {*states, *inputs}) for text in texts),
     ]:
         if isinstance(text, str):
-            for name in expressions.names(expressions.parse(text)) - constants - allowed:
+            for name in sorted(expressions.names(expressions.parse(text)) - constants - allowed):
                 raise ValueError(
                     f"{name} in {text!r} has no meaning for amplitudes: M, C and K hold parameters and known "
                     "numbers, the same in all tests; what changes with the time t must be a measured input"
@@ -443,7 +415,7 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
             more[output] = str(text)
     unseen, strange = [x for x in y if x not in put], force.keys() - {*y}
     names = [*constants, *inputs, *file.outputs, *unseen]
-    wrong = [name for name in names if name == "p" or names.count(name) > 1] + [*strange]
+    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(strange)
     if wrong:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
@@ -514,8 +486,9 @@ def equations_of(
     on, off = np.flatnonzero(~free), np.flatnonzero(free)
     if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
         raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
-    K = K[np.ix_(on, on)] - K[np.ix_(on, off)] @ np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
-    names, damping = [motion.coordinates[i] for i in on], C[np.ix_(on, on)].astype(object)
+    bent = np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
+    M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K - K[:, off] @ bent @ np.eye(len(K))[on]))
+    names, damping = [motion.coordinates[i] for i in on], C.astype(object)
     allowed = {f"{kind}{name}" for name in names for kind in ("", "v_", FORCE)}
     for name in (*dampers, *inputs, *(outputs or ())):
         if name not in allowed:
@@ -527,7 +500,7 @@ def equations_of(
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],
         "coordinates": names,
-        "M": M[np.ix_(on, on)].tolist(),
+        "M": M.tolist(),
         "C": damping.tolist(),
         "K": K.tolist(),
         "force": {name.removeprefix(FORCE): name for name in inputs},

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
-    KINDS,
     SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
@@ -26,13 +25,12 @@ from fem import (
 )
 from fem.forces import kind_of
 from fem.parameters import expand
-from rotorid.base.registry import names
 from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached
 from rotorid.files.columns import Column, read_table
-from rotorid.files.forces import Place, Places, made
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.forces import Place, Places, each, whole
+from rotorid.files.problems import InputError, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, read_settings
 from rotorid.files.toml_file import read_toml
 from rotorid.files.units import one_of
@@ -76,7 +74,6 @@ USUAL = {
     "friction": (0.0, 1.5, "of the normal force", {"percent": 0.01}),
 }
 """What quantities are in machines: from, to, in which unit; other units by their size in that one."""
-_SAG = 10.0  # m: a rotor that sags by more swings below 0.2 Hz
 
 
 class Material(Settings):
@@ -108,10 +105,11 @@ class Station(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A name that means something else."""
-        if self.name.isdecimal():
-            yield "name", "a name, not a number, which would read as a node"
-        if {":", ","} & {*self.name}:
-            yield "name", "a name without ':' and ',', which separate names on the command line"
+        if self.name.isdecimal() or {":", ","} & {*self.name}:
+            yield (
+                "name",
+                "a name, not a number, without ':' and ',', which separate names on the command line",
+            )
 
 
 class DiscKeys(Place):
@@ -224,42 +222,42 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes, materials and bearings that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    file, at = None, Places((), {}, problems)
+    file, stations = None, dict[str, int]()
     if path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
         if "shaft" not in data and "masses_kg" in data:
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             problems.add(str(path), None, "shaft", None, expected)
             problems.stop()
-        file = read_settings(RotorFile, data, str(path), problems)
+        file = problems.need(read_settings(RotorFile, data, str(path), problems))
         problems.stop()
     material = file.material if file else Material()
-    parts = problems.need(_shaft(path.parent / file.shaft if file else path, material, problems))
+    parts = _shaft(path.parent / file.shaft if file else path, material)
     if file:
-        nodes = range(1, len(parts["length"]) + 2)
-        at = Places(nodes, _stations(file, nodes, problems), problems)
-        discs = [_disc(item, at(item), material, problems) for item in file.disc]
-        supports, forces = read_attached(file, at, path.parent, problems)
-        parts["discs"] += [*filter(None, discs)]
+        at = Places(range(1, len(parts["length"]) + 2), stations)
+
+        def name(item: Station) -> None:
+            if item.name in stations:
+                raise InputError([item.problem("name", "a name that no other station has")])
+            stations[item.name] = at(item)
+
+        each(problems, file.station, "station", name)
+        parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), material))
+        supports, parts["forces"] = read_attached(file, at, path.parent, problems)
         parts["supports"] += supports
         shear = parts["model"]["shear"] or "poisson_ratio" in data.get("material", {})
         effects = file.model.model_dump()
-        parts |= {
-            "forces": forces,
-            "model": effects if file.model.has("shear") else effects | {"shear": shear},
-        }
+        parts["model"] = effects if file.model.has("shear") else effects | {"shear": shear}
     problems.stop()
     try:
-        rotor = Rotor(**parts | {"model": Model(**parts["model"]), "stations": at.stations})
+        rotor = Rotor(**parts | {"model": Model(**parts["model"]), "stations": stations})
     except ValueError as error:
         problems.add(str(path), None, None, None, f"a possible rotor: {error}")
         problems.stop()
         raise
     _warn_of_units(str(path), rotor)
     if file and file.calibration:
-        keys = file.calibration
-        found = made(problems, keys, "calibration", lambda: _calibration(keys, rotor))
-        problems.stop()
+        found = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
         return replace(rotor, calibration=found)
     return rotor
 
@@ -278,18 +276,22 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    parts = [data, *(one for kind in names(KINDS) if isinstance(data.get(kind), list) for one in data[kind])]
-    tables = [one.get(key) for one in parts if isinstance(one, dict) for key in ("shaft", "table")]
-    named = dict.fromkeys(name.strip() for name in tables if isinstance(name, str) and name.strip())
+    named = dict.fromkeys(name.strip() for name in _tables(data) if name.strip())
     return (path, *(path.parent / name for name in named))
 
 
-def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any] | None:
-    """What a rotor table says, by the attributes of a rotor; None with a problem."""
-    before = len(problems)
-    table = read_table(path, "rotor", COLUMNS, problems, first=True)
-    if table is None:
-        return None
+def _tables(data: object) -> Iterator[str]:
+    """Names of tables anywhere in a file."""
+    if isinstance(data, dict):
+        yield from (data[key] for key in ("shaft", "table") if isinstance(data.get(key), str))
+    for one in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _tables(one)
+
+
+def _shaft(path: Path, material: Material) -> dict[str, Any]:
+    """What a rotor table says, by the attributes of a rotor."""
+    problems = Problems()
+    table = problems.need(read_table(path, "rotor", COLUMNS, problems, first=True))
 
     def values(stem: str, none: float = 0.0) -> Any:  # noqa: ANN401
         return np.where(table.is_blank(stem), none, table.numbers(stem, none))
@@ -297,7 +299,8 @@ def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any]
     length, diameter, inner = table.numbers("length"), table.numbers("diameter"), values("inner_diameter")
     elements = length != 0
     last = np.arange(len(length)) == len(length) - 1
-    table.must_be("length", (length > 0) | (last & ~elements), _LENGTH)
+    expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
+    table.must_be("length", (length > 0) | (last & ~elements), expected)
     short = too_short(np.where(elements, length, 0.0)) & (length > 0)
     table.must_be(
         "length", ~short, f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
@@ -315,8 +318,7 @@ def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any]
     for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in ATTACHED)):
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
         table.must_be(stem, ~(values(stem) < 0), f"a number of 0 or more{outwards}")
-    if len(problems) > before:
-        return None
+    problems.stop()
     rows = np.array([values(column.stem) for column in ATTACHED]).T.tolist()
     return {
         "length": length[elements],
@@ -329,25 +331,11 @@ def _shaft(path: Path, material: Material, problems: Problems) -> dict[str, Any]
     }
 
 
-_LENGTH = "a length above 0 (0 only in the last row, which attaches to the right end)"
-
-
-def _stations(file: RotorFile, nodes: range, problems: Problems) -> dict[str, int]:
-    at, stations = Places(nodes, {}, problems), dict[str, int]()
-    for item in file.station:
-        if item.name in stations:
-            problems.extend([item.problem("name", "a name that no other station has")])
-        stations[item.name] = at(item)
-    return stations
-
-
-def _disc(item: DiscKeys, node: int, material: Material, problems: Problems) -> Disc | None:
-    if item.width is None or item.outer_diameter is None:
-        sizes = item.mass or 0.0, item.polar_inertia or 0.0, item.diametral_inertia or 0.0
-        return made(problems, item, "disc", lambda: Disc(node, *sizes, item.name))
-    density = material.density if item.density is None else item.density
-    sizes = item.width, item.outer_diameter, item.inner_diameter or 0.0
-    return made(problems, item, "disc", lambda: Disc.from_geometry(node, *sizes, density, item.name))
+def _disc(item: DiscKeys, node: int, material: Material) -> Disc:
+    values = item.model_dump(exclude_none=True) | {"node": node}
+    if "mass" in values:
+        return Disc(**values)
+    return Disc.from_geometry(**{"density": material.density} | values)
 
 
 def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
@@ -372,7 +360,6 @@ def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
 
 def _warn_of_units(source: str, rotor: Rotor) -> None:
     """Sizes in a wrong unit give a rotor that can be computed all the same."""
-    found = []
     items = [(f"{kind_of(one).replace('_', ' ')} at node {one.node}", one) for one in rotor.forces]
     for what, item in [("", rotor), *items]:
         for name, (low, high, unit, others) in USUAL.items():
@@ -382,14 +369,6 @@ def _warn_of_units(source: str, rotor: Rotor) -> None:
                 value, place = float(values[i]), what or f"element {i + 1}"
                 meant = [other for other, size in others.items() if low <= value * size <= high]
                 more = f" (and {counted(odd.size - 1, 'more')})" if odd.size > 1 else ""
-                found.append((f"{place}{more}: {name} {value:.6g} {unit}", meant))
-    bearings = [one for one in rotor.supports if one.kind == "bearing"]
-    weight = 9.81 * rotor.total_mass / max(1, len(bearings))
-    for one in bearings:
-        stiffness = float(np.abs(one.table[0]).max())
-        if 0 < stiffness < weight / _SAG:
-            place = f"bearing at node {one.node}: {stiffness:.4g} N/m, which its share of the weight"
-            found.append((f"{place} bends by {weight / stiffness:.3g} m", ["N/mm"]))
-    for words, meant in found:
-        question = f"is this in {meant[0] if meant else 'another unit'}?"
-        warnings.warn(f"{source}, {words}; {question}", TableWarning, stacklevel=3)
+                question = f"is this in {[*meant, 'another unit'][0]}?"
+                words = f"{source}, {place}{more}: {name} {value:.6g} {unit}; {question}"
+                warnings.warn(words, TableWarning, stacklevel=3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from pathlib import Path
 from typing import Any
@@ -85,7 +84,7 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         **{_OF_ELEMENTS[name]: array.tolist() for name, array in values.items() if name not in uniform},
     }
     columns = {name: column for name, column in columns.items() if column}
-    effects = in_si(Effects, dataclasses.asdict(rotor.model))
+    effects = in_si(Effects, vars(rotor.model))
     if not rotor.model.shear and (rotor.poisson_ratio != STEEL_POISSON).any():
         effects["shear"] = False  # without a word it would be counted
     supports, tables = support_tables(rotor.supports, path)
@@ -93,7 +92,7 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         "shaft": shaft.name,
         "material": in_si(Material, uniform),
         "model": effects,
-        "disc": [in_si(DiscKeys, dataclasses.asdict(disc)) for disc in rotor.discs],
+        "disc": [in_si(DiscKeys, vars(disc)) for disc in rotor.discs],
         **supports,
         **force_tables(rotor.forces),
         "station": [{"name": name, "node": node} for name, node in rotor.stations.items()],

@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached, support_tables
-from rotorid.files.forces import Place, Places, force_tables, made
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.forces import Place, Places, each, force_tables, whole
+from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Turn, key, read_settings
 from rotorid.files.toml_file import read_toml
 from rotorid.files.toml_writing import toml_bytes
@@ -35,14 +35,6 @@ def _numbers(value: object) -> FloatArray:
     raise ValueError("a list of finite numbers, one for each node, or a square matrix of them")
 
 
-def _nodes(value: object) -> tuple[int, ...]:
-    nodes = _numbers(value)
-    if (nodes % 1).any() or (nodes < 1).any() or len(np.unique(nodes)) < nodes.size:
-        raise ValueError("different whole numbers from 1 up")
-    return tuple(map(int, nodes.ravel()))
-
-
-Nodes = Annotated[tuple[int, ...], PlainValidator(_nodes, json_schema_input_type=list[int])]
 List = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[float])]
 Matrix = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[list[float]])]
 
@@ -64,8 +56,8 @@ class BowKeys(Place):
 class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
     """A small model; arrays in the order of `SmallModel`."""
 
-    nodes: Nodes = key(
-        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]"
+    nodes: tuple[Annotated[int, Field(ge=1)], ...] = key(
+        "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]", min_length=1
     )
     masses: List = key(
         "mass at each node; 0 where only a force acts", "masses_kg", expected="a mass for each node"
@@ -121,28 +113,28 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     """A small model and its `[equations]`."""
     problems = Problems()
     data = problems.need(read_toml(path, problems))
-    file = read_settings(SmallModelFile, data, str(path), problems)
+    file = problems.need(read_settings(SmallModelFile, data, str(path), problems))
     problems.stop()
-    file = problems.need(file)
-    at = Places(file.nodes, {}, problems)
+    at, unbalance, bow = Places(file.nodes, {}), dict[int, complex](), dict[int, complex]()
+
+    def mount(item: UnbalanceKeys) -> None:
+        node = at(item)
+        unbalance[node] = unbalance.get(node, 0j) + complex(polar(item.unbalance, item.angle))
+
+    def bend(item: BowKeys) -> None:
+        if at(item) in bow:
+            raise ValueError("it stands at a node that has one already")
+        bow[at(item)] = complex(polar(item.bow, item.angle))
+
     supports, forces = read_attached(file, at, path.parent, problems)
-    unbalance: dict[int, complex] = {}
-    for one in file.unbalance:
-        unbalance[at(one)] = unbalance.get(at(one), 0j) + complex(polar(one.unbalance, one.angle))
-    bow = {at(one): complex(polar(one.bow, one.angle)) for one in file.bow}
-    if len(bow) < len(file.bow):
-        problems.extend([file.bow[-1].problem("node", "each node in one [[bow]]")])
+    each(problems, file.unbalance, "unbalance", mount)
+    each(problems, file.bow, "bow", bend)
     problems.stop()
-    arrays = {name: getattr(file, name) for name in ARRAYS}
+    arrays: dict[str, Any] = {name: getattr(file, name) for name in ARRAYS}
     if arrays["weight"] is None:
         arrays["weight"] = GRAVITY * arrays["masses"]
-    model = made(
-        problems,
-        file,
-        "small model",
-        lambda: SmallModel(**arrays, supports=supports, forces=forces, unbalance=unbalance, bow=bow),
-    )
-    model = problems.need(model)
+    more: dict[str, Any] = {"supports": supports, "forces": forces, "unbalance": unbalance, "bow": bow}
+    model = whole(file, "small model", lambda _: SmallModel(**arrays, **more))
     held = float(model.stiffness.sum())
     if abs(held) > _HELD * np.abs(model.stiffness).max() and (supports or forces):
         warnings.warn(
@@ -165,8 +157,8 @@ def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Moti
     return model.motion(speed, plane)
 
 
-def small_equations(path: Path, problems: Problems) -> dict[str, Any] | None:
-    """The linear equations of a small model as keys of a model file; None with a problem."""
+def small_equations(path: Path) -> dict[str, Any]:
+    """The linear equations of a small model as keys of a model file."""
     from rotorid.files.model import equations_of
 
     model, more = _read(path)
@@ -175,18 +167,16 @@ def small_equations(path: Path, problems: Problems) -> dict[str, Any] | None:
         if model.forces:
             raise ValueError("linear forces alone; `rotorid motion` follows the others")
         motion = linear_equations(model, speed, both)
-        dampers = {f"d_{name}": name for name in motion.coordinates}
-        estimate = more.get("estimate", {})
+        estimate, inputs = more.get("estimate", {}), more.get("inputs", [])
         shown = [f"{axis}{node}" for axis in "xy" for node in model.massive]
         equations = equations_of(
             motion,
-            {name: estimate[key] for key, name in dampers.items() if key in estimate},
-            [name for name in more.get("inputs", []) if name.removeprefix("f_") in motion.coordinates],
+            {name: estimate[f"d_{name}"] for name in motion.coordinates if f"d_{name}" in estimate},
+            [name for name in inputs if name.removeprefix("f_") in motion.coordinates],
             [name for name in shown if name in motion.coordinates],
         )
     except (ValueError, TypeError) as error:
-        problems.add(str(path), None, "equations", None, str(error))
-        return None
+        raise InputError([Problem(str(path), None, "equations", None, str(error))]) from None
     for name, value in more.items():
         added = isinstance(value, dict) and name != "outputs"
         equations[name] = {**equations.get(name, {}), **value} if added else value
@@ -203,7 +193,7 @@ def small_model_files(
     arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
     tables, files = support_tables(model.supports, path, ordered=True)
     data: dict[str, Any] = {
-        **{key: array.tolist() for key, array in arrays.items() if array.any()},
+        **{key: array.tolist() for key, array in arrays.items() if array.any() or "shaft" in key},
         **tables,
         **force_tables(model.forces),
         **{

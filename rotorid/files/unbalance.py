@@ -70,10 +70,9 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
     table = problems.need(read_table(path, "unbalance", COLUMNS, problems, first=True))
     missing = "one column plane or node, not both: a node or a station"
     where = table.only(("plane", "node"), "plane", missing)
-    ways = [{"unbalance"}, {"mass", "radius"}]
-    sizes = ways[0] | ways[1]
+    sizes = {"unbalance", "mass", "radius"}
     present = sizes & set(table.fields)
-    if present not in ways and table.misspelt.isdisjoint(sizes):
+    if present not in ({"unbalance"}, {"mass", "radius"}) and table.misspelt.isdisjoint(sizes):
         expected = "either a column unbalance_<unit>, or both mass_<unit> and radius_<unit>"
         table.in_header("unbalance_g_mm", expected)
     for stem in present:

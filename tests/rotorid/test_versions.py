@@ -119,10 +119,10 @@ def test_what_is_read_and_written_is_logged(tmp_path, caplog):
     """Nothing reaches a program that does not listen: there is a handler that drops it."""
     assert any(isinstance(each, logging.NullHandler) for each in logging.getLogger("rotorid").handlers)
     caplog.set_level(logging.DEBUG, "rotorid.files")
-    path = tmp_path / "copy.csv"
+    path = tmp_path / "copy.toml"
     rotorid.write_rotor(path, rotorid.read_rotor(ROTOR))
-    size = path.stat().st_size
+    shaft = tmp_path / "copy_shaft.csv"
     assert caplog.messages == [
         f"read {ROTOR}, {ROTOR.stat().st_size} bytes",
-        f"written {path}, {size} bytes",
+        *(f"written {one}, {one.stat().st_size} bytes" for one in (shaft, path)),
     ]

@@ -109,18 +109,12 @@ def test_peaks_are_those_of_the_model(cli, tmp_path):
 @pytest.mark.parametrize(
     ("shaft", "rest", "said"),
     [
-        ([[250, 0.11], [250, 50]], "", "0.11 means 0.00011 m; is this in m?"),
+        ([[250, 0.11], [250, 50]], "", "element 1: outer_diameter 0.00011 m; is this in m?"),
         ([[250, 50000], [250, 50]], "", "is this in mm?"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=2.1e5\n", "210000 Pa; is this in MPa?"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=210\n", "210 Pa; is this in GPa?"),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=7.8\n", "7.8 kg/m³; is this in g/cm³?"),
-        (
-            PLAIN[1:],
-            "[[disc]]\nnode=2\nmass_kg=490\n[[bearing]]\nnode=1\nstiffness_N_per_m=10\n",
-            "bearing 1 at node 1 of 10 N/m would sag 490 m",
-        ),
-        ([[250000, 40]] * 2, "[[bearing]]\nnode=1\nstiffness_N_per_m=1\n", "means 250 m; is this in"),
-        ([[40, 250]] * 4, "", "are length and diameter exchanged?"),
+        ([[250000, 40]] * 2, "[[bearing]]\nnode=1\nstiffness_N_per_m=1\n", "length 250 m; is this in"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=7e10\ndensity_kg_per_m3=2700\n", ""),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=0\n[[disc]]\nnode=2\nmass_kg=1\n", ""),
         ([[1000, 6]] * 4, "", ""),
@@ -137,22 +131,6 @@ def test_what_no_rotor_is_gets_one_warning_with_the_likely_unit(tmp_path, shaft,
     texts = warnings_of(tmp_path / "r.toml")
     assert len(texts) == bool(said)
     assert said in "".join(texts)
-
-
-@pytest.mark.parametrize(
-    ("labels", "warned"),
-    [
-        (("1", "2", "2"), True),
-        (("wheel 1", "wheel 1", "end"), False),
-        (("steel",) * 3, False),
-    ],
-)
-def test_an_element_label_twice_is_asked_about(tmp_path, labels, warned):
-    rows = [[label, 250, 40] for label in labels]
-    write_csv(tmp_path / "s.csv", [["element", "length_mm", "diameter_mm"], *rows])
-    texts = warnings_of(tmp_path / "s.csv")
-    assert [text for text in texts if "is a row twice here?" in text] == texts
-    assert bool(texts) is warned
 
 
 def warnings_of(path):

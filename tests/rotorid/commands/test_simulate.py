@@ -162,7 +162,7 @@ def test_what_changes_from_row_to_row_is_a_column(tmp_path):
         simulate(model, SimulateOptions(**{**options, "inputs": "F=1"}))
 
 
-@pytest.mark.filterwarnings("default:.*blow stands in initial values only")
+@pytest.mark.filterwarnings("default:.*blow. in no equation of amplitudes")
 def test_amplitudes_without_a_sensor_are_not_written(cli, tmp_path):
     """The run-down file shows readings in µm in place of the coordinates."""
     words = "--modes", "--with", "d_x7=900,d_x12=1600,d_x18=1300,m_x12=196.6167587206449"
