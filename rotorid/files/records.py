@@ -65,7 +65,7 @@ def read_record(
     Raises
     ------
     InputError
-        With all problems of the cells, or else with all contradictions between them.
+        With all problems of the file.
 
     Warns
     -----
@@ -86,7 +86,7 @@ def read_record(
     columns += [Column(name, _no_unit, (name,), False, blank=True) for name in deviations.values()]
     columns += [Column(name, _no_unit, (name,)) for name in model.inputs if name not in model.outputs]
     table = problems.need(make_table(grid, columns, problems))
-    problems.stop()
+    clear = not len(problems)  # otherwise a misspelt column would be called missing
     t = table.numbers("t")
     for late in np.flatnonzero(np.diff(t) <= 0) + 1:
         before = f"{table.shown('t', late - 1)} of row {table.rows[late - 1]}"
@@ -97,14 +97,16 @@ def read_record(
     own = {name: table.numbers(column) for name, column in deviations.items() if column in table}
     if own and sigma is not None:
         table.in_header(deviations[next(iter(own))], "no such column together with --sigma")
-    elif own and own.keys() != outputs.keys():
-        lost = listing(sorted(name + STD for name in own.keys() ^ outputs.keys()), "and")
-        table.in_header(None, f"standard deviations of all outputs or of none: {lost} stands alone or lacks")
     else:
-        for name, sizes in own.items():
-            wrong = ~np.isnan(outputs[name]) & ~(sizes > 0)
-            expected = f"a standard deviation above 0 wherever {name} was measured"
-            table.complain_where(wrong, deviations[name], expected)
+        for name in sorted(own.keys() ^ outputs.keys()) if own and clear else ():
+            column, other = (name, name + STD) if name in own else (name + STD, next(iter(own)) + STD)
+            table.in_header(
+                column, f"a column {column}, as there is {other}: deviations of all outputs or none"
+            )
+        for name in [name for name in outputs if name in own]:
+            sizes, column = own[name], deviations[name]
+            wrong = ~np.isnan(outputs[name]) & ~(sizes > 0) & ~(np.isnan(sizes) & ~table.is_blank(column))
+            table.complain_where(wrong, column, f"a standard deviation above 0 wherever {name} was measured")
     problems.stop()
     if not allow_missing:
         _warn_of_gaps(table)
@@ -151,7 +153,7 @@ def _blanked(grid: Grid, columns: set[str]) -> Grid:
 def _complain_about_outputs(
     table: Table, names: list[str], outputs: tuple[str, ...], *, allow_missing: bool
 ) -> None:
-    if not names:
+    if not names and not len(table.problems):
         table.in_header(None, f"a column for at least one output of the model: {listing(outputs)}")
     for name in names:
         blank = table.is_blank(name)

@@ -194,6 +194,8 @@ def _outcome(
 
 def _figure(ratios: pd.DataFrame) -> Figure:
     """Which share of the machines lies below a ratio to the limit, as built and at last."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     from rotorid.base.plot_style import look, on_figure, plain
 
     curves = {"as built": ratios.iloc[:, 0]}
@@ -206,7 +208,9 @@ def _figure(ratios: pd.DataFrame) -> Figure:
             ax.ecdf(values.dropna(), label=name, **look(k))
         ax.axvline(1.0, color="black", linewidth=0.8, label="limit")
         ax.set(xscale="log", xlabel="largest reading over its limit", ylabel="share of machines below")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter(NullFormatter())
         ax.legend(frameon=False)
 
     return on_figure(draw)

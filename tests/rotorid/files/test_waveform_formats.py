@@ -114,6 +114,13 @@ def test_a_bad_cell_is_named_with_its_row(kind, tmp_path):
         assert word in str(raised.value)
 
 
+def test_a_bad_cell_among_decimal_commas_is_named_with_its_row(tmp_path):
+    rows = [row.replace(",", ";").replace(".", ",") for row in ROWS]
+    refused(
+        csv(tmp_path, "\n".join(["t_s;KEY;B", *rows[:9], "0,09;?;3,5", *rows[10:]])), "row 11, column KEY"
+    )
+
+
 def test_a_sample_that_is_missing_is_found_and_rounded_times_are_even(tmp_path):
     t = np.arange(2000) / 5120.0
     rows = [f"{time:.4f},{i % 7}" for i, time in enumerate(t)]  # half a step of rounding is 0.26 of a step

@@ -101,7 +101,7 @@ def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli
         experiments = measured(omega, exact, (0.02, 0.02), (rng, 0.02))
         path = tmp_path / "modes.csv"
         path.write_bytes(csv(fitted(omega, experiments).file_table()))
-        result = identify(file, read_measurements(path, file)).identification
+        result = identify(file, read_measurements(path, file)).result
         held += sum(
             low <= TRUTH[n] <= high for n, (low, high) in zip(result.parameters, result.ci95, strict=True)
         )
