@@ -393,7 +393,7 @@ def _has_columns(
     if not stems:
         fits, column = False, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
-        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+        problems.apart({grid.source})  # that rows are longer than a title is no news
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
         fits, end = False, seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"

@@ -8,7 +8,7 @@ from cases import each_of
 from keys_in_files import with_tables
 
 import rotorid
-from rotorid.files import runs, weights
+from rotorid.files import influence, runs, weights
 from rotorid.files.toml_file import Section
 from rotorid.identify.expressions import FUNCTIONS
 from rotorid.samples import sample_data
@@ -19,7 +19,6 @@ from rotorid.tables.rotor import bearing
 from rotorid.tables.rotor import bow_table as bow
 from rotorid.tables.rotor import rotor_table as rotor
 from rotorid.tables.rotor import unbalance_table as unbalance
-from rotorid.tables.runs import influence_table as influence
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
 WORDS = {
