@@ -105,6 +105,11 @@ class Field:
     texts: tuple[str, ...]
     names: tuple[str, ...] = ()
 
+    @property
+    def heading(self) -> str:
+        """The first of its columns in the file."""
+        return self.names[0] if self.names else self.name
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
