@@ -76,15 +76,11 @@ def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: 
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
-    """The files of a folder with one file a run, in the order of their numbers; none for anything else."""
+    """The files of a folder with one file a run, step2 before step10; none for anything else."""
     if not isinstance(source, (str, Path)) or not Path(source).is_dir():
         return ()
     files = [file for file in Path(source).iterdir() if file.suffix.lower() in (".csv", ".txt", ".xlsx")]
-
-    def place(file: Path) -> list[tuple[int, str]]:
-        return [(int(part or 0), word) for word, part in re.findall("([^0-9]*)([0-9]*)", file.name)]
-
-    return tuple(sorted(files, key=place))
+    return tuple(sorted(files, key=lambda file: (len(file.stem), file.stem)))
 
 
 def read_runs_grid(
@@ -153,17 +149,19 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
-    first, rows = grids[0], list(grids[0].rows)
-    for grid in grids[1:]:
+    first = grids[0]
+    if len(grids) == 1:
+        return first
+    rows: list[Row] = []
+    for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
             problems.add(grid.source, grid.header_row, None, listing(grid.header, "and"), expected)
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
-    if len(grids) == 1:
-        return first
-    return replace(first, source=listing([grid.source for grid in grids], "and"), rows=tuple(rows), named=())
+    name = listing([grid.source for grid in grids], "and")
+    return replace(first, source=name, rows=tuple(rows), named=())
 
 
 def _names_of(columns: Columns | None) -> dict[str, str]:
