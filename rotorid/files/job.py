@@ -807,15 +807,14 @@ def _check_units(
     check: Trials, ours: Labels, runs: Source, weights: Source | None, problems: Problems
 ) -> None:
     """Complain about what does not convert into the units of the job."""
-    theirs = check.labels
-    if units.vibration(ours.vibration_unit).kind != units.vibration(theirs.vibration_unit).kind:
-        expected = (
-            f"readings in {ours.vibration_unit or 'no unit'}, as in the runs table, or converting to it"
-        )
-        problems.add(source_name(runs), None, "amplitude", theirs.vibration_unit or "no unit", expected)
-    if weights is not None and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
-        expected = f"weights in {ours.weight_unit}, as the job has, or in a unit that converts to it"
-        problems.add(source_name(weights), None, "weight", theirs.weight_unit, expected)
+    for table, column, name, unit in (
+        (runs, "amplitude", "vibration_unit", units.vibration),
+        (weights, "weight", "weight_unit", units.weight),
+    ):
+        own, other = getattr(ours, name), getattr(check.labels, name)
+        if table is not None and unit(own).kind != unit(other).kind:
+            expected = f"{column}s in {own or 'no unit'}, as the job has, or in a unit that converts to it"
+            problems.add(source_name(table), None, column, other or "no unit", expected)
 
 
 def _taken(

@@ -113,7 +113,7 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
     titles = {
         title.strip().casefold(): title for title in reversed(list(sheets)) if _holds_cells(sheets[title])
     }
-    for name, title in titles.items():
+    for name, title in titles.items() if titles.keys() & {*known} else ():
         if name not in known and not name.startswith((RESULTS, *REMARKS)):
             expected = (
                 f"a known sheet{did_you_mean(name, known)}; known are {listing(known, 'and')}, remarks go "
