@@ -517,38 +517,40 @@ def _in_model(
     settings: JobSettings, folder: Path, problems: Problems
 ) -> tuple[JobSettings, Rotor | None, tuple[Path, ...]]:
     """The settings with stations as nodes, the rotor model, and its files."""
-    parts = [*settings.planes.values(), *settings.sensors.values()]
-    if settings.rotor is None:
-        for part in parts if not settings.has("rotor") else ():
-            key = "station" if part.station else "node"
-            if part.has(key):
-                expected = f'the rotor model of this {key} too, rotor = "rotor.toml"'
-                part.complain(problems, key, expected)
-        return settings, None, ()
-    from rotorid.files.rotor import read_rotor, rotor_files
+    rotor: Rotor | None = None
+    files: tuple[Path, ...] = ()
+    if settings.rotor is not None:
+        from rotorid.files.rotor import read_rotor, rotor_files
 
-    path = folder / settings.rotor
-    try:
-        rotor = read_rotor(path)
-    except InputError as error:
-        problems.extend(error.problems)
-        return settings, None, ()
-    stations = rotor.stations
-    for part in parts:
-        if part.station is not None and part.station not in stations:
-            known, hint = listing(map(repr, stations), "and") or "none", did_you_mean(part.station, stations)
-            expected = f"a station of the rotor model{hint}; its stations are {known}"
-            part.complain(problems, "station", expected)
-        if part.node is not None and part.node > rotor.n_nodes:
-            part.complain(problems, "node", f"a node of the rotor model, from 1 to {rotor.n_nodes}")
+        path = folder / settings.rotor
+        try:
+            rotor, files = read_rotor(path), rotor_files(path)
+        except InputError as error:
+            problems.extend(error.problems)
+            return settings, None, ()
     placed = {
-        kind: {
-            name: part.model_copy(update={"node": stations.get(part.station or "", part.node)})
-            for name, part in getattr(settings, kind).items()
-        }
+        kind: {name: _placed(part, rotor, problems) for name, part in getattr(settings, kind).items()}
         for kind in ("planes", "sensors")
     }
-    return settings.model_copy(update=placed), rotor, rotor_files(path)
+    return settings.model_copy(update=placed), rotor, files
+
+
+def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Plane | Sensor:
+    """A plane or sensor with its station as a node."""
+    key = "node" if part.station is None else "station"
+    if part.node is None and part.station is None:
+        return part
+    if rotor is None:
+        part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
+        return part
+    node = part.node if part.station is None else rotor.stations.get(part.station)
+    if node is None:
+        known = listing(map(repr, rotor.stations), "and") or "none"
+        hint = did_you_mean(str(part.station), rotor.stations)
+        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
+    elif node > rotor.n_nodes:
+        part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
+    return part.model_copy(update={"node": node})
 
 
 def _planes(
