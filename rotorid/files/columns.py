@@ -77,6 +77,8 @@ class Column:
         Whether the table is unusable without it.
     blank
         Whether a cell may be empty: NaN or `""` then, and the reader of the table decides.
+    lenient
+        Whether the reader of the table decides about every cell that cannot be read.
     """
 
     stem: str
@@ -84,6 +86,7 @@ class Column:
     examples: tuple[str, ...] = ()
     required: bool = True
     blank: bool = False
+    lenient: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,7 +98,8 @@ class Column:
 class Field:
     """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
 
-    `names` has the column of the file that each cell is from, where they are several.
+    `names` has the column of the file that each cell is from, where they are several; `doubts` what was
+    expected of cells that a lenient column leaves to its reader.
     """
 
     name: str
@@ -103,7 +107,13 @@ class Field:
     cells: tuple[Cell, ...]
     numbers: FloatArray
     texts: tuple[str, ...]
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...]
+    doubts: Mapping[int, str]
+
+    @property
+    def heading(self) -> str:
+        """The first of its columns in the file."""
+        return self.names[0] if self.names else self.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +351,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     comma = decimal_comma(commas, grid.separator)
     by_stem = {column.stem: column for column in columns}
     fields = {
-        stem: _field(grid, k, unit, problems, comma=comma, blank=by_stem[stem].blank)
+        stem: _field(grid, k, unit, by_stem[stem], problems, comma=comma)
         for stem, (k, unit) in places.items()
     }
     if missing or any(column.required and column.stem not in places for column in columns):
@@ -393,7 +403,7 @@ def _has_columns(
     if not stems:
         fits, column = False, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
-        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+        problems.apart({grid.source})  # that rows are longer than a title is no news
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
         fits, end = False, seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"
@@ -412,13 +422,14 @@ def _has_columns(
 
 
 def _field(
-    grid: Grid, index: int, unit: Unit | None, problems: Problems, *, comma: bool, blank: bool
+    grid: Grid, index: int, unit: Unit | None, column: Column, problems: Problems, *, comma: bool
 ) -> Field:
     cells = tuple(row[index] for _, row in grid.rows)
     names = tuple(row[index] for row in grid.named)
     name = names[0] if len(set(names)) == 1 else grid.header[index]
     # most cells of a long table say what another one has said
-    known: dict[Cell, str | float] = {"": ""} if blank else {}
+    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    doubts: dict[int, str] = {}
     doubtful: set[str] = set()
     if unit is not None and not comma and grid.separator in (";", "\t"):
         doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), grid.header[index])
@@ -428,11 +439,13 @@ def _field(
                 known[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
         except NotANumber as error:
             where = names[place] if names else name
-            problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
+            doubts[place] = str(error)
+            if not column.lenient:
+                problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
     values = [known.get(cell, "") for cell in cells]
     numbers = np.array([math.nan if isinstance(value, str) else value for value in values], dtype=float)
     texts = tuple(value if isinstance(value, str) else "" for value in values)
-    return Field(name, unit, cells, numbers, texts, names)
+    return Field(name, unit, cells, numbers, texts, names, doubts)
 
 
 def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *, comma: bool) -> str | float:

@@ -58,6 +58,8 @@ class Conventions:
         Angle in degrees, as the job counts, of each hole by its name, for each plane that has holes.
     removed
         Planes in which material is taken away.
+    rms
+        Whether the job has limits in rms, so that mm/s alone are rms.
 
     Raises
     ------
@@ -72,6 +74,7 @@ class Conventions:
     speed: tuple[str, float] | None = None
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()
+    rms: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:

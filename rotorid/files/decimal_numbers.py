@@ -130,16 +130,3 @@ def _reason(text: str) -> str:
     if _WITH_UNIT.fullmatch(text):
         return "a number alone; write the unit in the header"
     return "a number"
-
-
-def plain_number(value: object, *, comma: bool = False) -> float | None:
-    """A finite number of a size that occurs, from a number or its text (`comma`: or with one); else None."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        return None
-    try:
-        own = comma and isinstance(value, str) and has_decimal_comma(value)
-        read = parse_number(value, comma=own) if isinstance(value, str) else float(value)
-        check_size(read)
-    except (NotANumber, OverflowError):
-        return None
-    return read

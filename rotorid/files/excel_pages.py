@@ -10,12 +10,12 @@ from typing import Any
 
 from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
-from rotorid.files.cells import BadCell, Cell, Shown, show
+from rotorid.files.cells import BadCell, Cell, Shown
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576
 _LONGEST_LIST = 255
-_WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
+_NARROWEST = 12
 
 Line = tuple[Cell | None, ...]
 """A row of cells; `""` and None are blanks."""
@@ -102,20 +102,12 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
                 put(cell, value, page.title)
                 if isinstance(value, str):
                     cell.number_format = "@"
-    for place in range(1, max((len(line) for line in page.lines), default=0) + 1):
-        sheet.column_dimensions[get_column_letter(place)].width = _width(page.lines, place)
-    for place in range(1, len(header) + 1):
+    for place, name in enumerate(header, start=1):
+        sheet.column_dimensions[get_column_letter(place)].width = max(_NARROWEST, len(str(name)) + 2)
         cell = sheet.cell(top, place)
         cell.font, cell.fill = Font(bold=True), PatternFill("solid", fgColor="FFE6E6E6")
     if top:
         sheet.freeze_panes = f"A{top + 1}"
-
-
-def _width(lines: Sequence[Line], place: int) -> float:
-    """Of a column; lines of a single cell run over the cells beside it."""
-    cells = [line[place - 1] for line in lines[:_LOOKED_AT] if len(line) > 1 and len(line) >= place]
-    texts = [show(cell) for cell in cells if cell is not None]
-    return min(max(_NARROWEST, *map(len, texts), 0) + 2, _WIDEST)
 
 
 def put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401

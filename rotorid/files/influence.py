@@ -394,8 +394,11 @@ def fit_to_readings(
     there = {"sensor": influence.sensors, "plane": influence.planes}
     for what, name, table in lacking:
         known = show_speeds(influence.speeds, rpm) if what == "speed" else listing(there[what], "and")
-        hint = did_you_mean(name.strip("'"), there.get(what, ()))
-        expected = f"coefficients of {what} {name}, as the {table} table has; there are {known}{hint}"
+        hint, where = (
+            did_you_mean(name.strip("'"), there.get(what, ())),
+            "at" if what == "speed" else f"of {what}",
+        )
+        expected = f"coefficients {where} {name}, as the {table} table has; there are {known}{hint}"
         problems.add(source, None, what, None, expected)
     if len(problems):
         return None

@@ -28,7 +28,7 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import decode
 from rotorid.files.cells import readable as why_not_readable
-from rotorid.files.decimal_numbers import decimal_comma, plain_number
+from rotorid.files.decimal_numbers import NotANumber, decimal_comma, has_decimal_comma, parse_number
 from rotorid.files.headings import read_unit, readable
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import InputError, Problem, Problems, printable
@@ -159,7 +159,7 @@ def _read_text(path: Path) -> Sampled:
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in later))
     rows = [[cell.strip() for cell in _cells(line, separator)] for line in lines]
     comma = decimal_comma((cell for row in rows[len(lines) // 2 :] for cell in row if "," in cell), separator)
-    kinds = [tuple(plain_number(cell, comma=comma) is not None for cell in row) for row in rows]
+    kinds = [tuple(_is_number(cell, comma=comma) for cell in row) for row in rows]
     usual = Counter(kind for kind in kinds if any(kind)).most_common(1)
     if not usual:
         raise refusal(path, "a table: a column a channel, a row a sample, and names above the numbers")
@@ -187,6 +187,14 @@ def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str
     return names
 
 
+def _is_number(text: str, *, comma: bool) -> bool:
+    try:
+        parse_number(text, comma=comma and has_decimal_comma(text))
+    except NotANumber:
+        return False
+    return True
+
+
 def _cells(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator), [])
 
@@ -211,8 +219,11 @@ def _numbers(
             raise refusal(path, f"rows of numbers ({reason})") from error
     numbers = np.empty((len(columns), len(frame)))
     for row, (name, place) in zip(numbers, columns.items(), strict=True):
-        row[:] = pd.to_numeric(frame[place], errors="coerce")
-        wrong = np.isnan(row) & frame[place].notna().to_numpy()
+        cells = frame[place]
+        if comma and not pd.api.types.is_numeric_dtype(cells):
+            cells = cells.str.replace(",", ".")
+        row[:] = pd.to_numeric(cells, errors="coerce")
+        wrong = np.isnan(row) & cells.notna().to_numpy()
         if wrong.any():
             at = int(np.argmax(wrong))
             raise refusal(path, "a number alone", at + above + 1, name, str(frame[place][at]))

@@ -484,6 +484,10 @@ def conventions_of(
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
+        any(
+            one.limit is not None and one.limit.unit.name.endswith("_rms")
+            for one in settings.sensors.values()
+        ),
     )
 
 
@@ -513,38 +517,40 @@ def _in_model(
     settings: JobSettings, folder: Path, problems: Problems
 ) -> tuple[JobSettings, Rotor | None, tuple[Path, ...]]:
     """The settings with stations as nodes, the rotor model, and its files."""
-    parts = [*settings.planes.values(), *settings.sensors.values()]
-    if settings.rotor is None:
-        for part in parts if not settings.has("rotor") else ():
-            key = "station" if part.station else "node"
-            if part.has(key):
-                expected = f'the rotor model of this {key} too, rotor = "rotor.toml"'
-                part.complain(problems, key, expected)
-        return settings, None, ()
-    from rotorid.files.rotor import read_rotor, rotor_files
+    rotor: Rotor | None = None
+    files: tuple[Path, ...] = ()
+    if settings.rotor is not None:
+        from rotorid.files.rotor import read_rotor, rotor_files
 
-    path = folder / settings.rotor
-    try:
-        rotor = read_rotor(path)
-    except InputError as error:
-        problems.extend(error.problems)
-        return settings, None, ()
-    stations = rotor.stations
-    for part in parts:
-        if part.station is not None and part.station not in stations:
-            known, hint = listing(map(repr, stations), "and") or "none", did_you_mean(part.station, stations)
-            expected = f"a station of the rotor model{hint}; its stations are {known}"
-            part.complain(problems, "station", expected)
-        if part.node is not None and part.node > rotor.n_nodes:
-            part.complain(problems, "node", f"a node of the rotor model, from 1 to {rotor.n_nodes}")
+        path = folder / settings.rotor
+        try:
+            rotor, files = read_rotor(path), rotor_files(path)
+        except InputError as error:
+            problems.extend(error.problems)
+            return settings, None, ()
     placed = {
-        kind: {
-            name: part.model_copy(update={"node": stations.get(part.station or "", part.node)})
-            for name, part in getattr(settings, kind).items()
-        }
+        kind: {name: _placed(part, rotor, problems) for name, part in getattr(settings, kind).items()}
         for kind in ("planes", "sensors")
     }
-    return settings.model_copy(update=placed), rotor, rotor_files(path)
+    return settings.model_copy(update=placed), rotor, files
+
+
+def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Plane | Sensor:
+    """A plane or sensor with its station as a node."""
+    key = "node" if part.station is None else "station"
+    if part.node is None and part.station is None:
+        return part
+    if rotor is None:
+        part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
+        return part
+    node = part.node if part.station is None else rotor.stations.get(part.station)
+    if node is None:
+        known = listing(map(repr, rotor.stations), "and") or "none"
+        hint = did_you_mean(str(part.station), rotor.stations)
+        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
+    elif node > rotor.n_nodes:
+        part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
+    return part.model_copy(update={"node": node})
 
 
 def _planes(
@@ -604,7 +610,7 @@ def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Prob
             continue
         hint = did_you_mean(name, known)
         expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
-        if key == "planes" and not hint:
+        if key == "planes":
             expected += f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
         problems.extend([replace(part.problem("", expected), value=name)])
 
@@ -625,6 +631,7 @@ def _limits(
 ) -> Limits | None:
     """In SI with the rotation, in the order of speeds, sensors and planes; None: nothing limited."""
     labels, most = trials.labels, np.full(len(planes), np.inf)
+    own = units.vibration(labels.vibration_unit)
     for k, plane in enumerate(planes.values()):
         if plane.max_weight is not None:
             size = in_job_units(plane.max_weight, labels.weight_unit, plane.radius)
@@ -638,9 +645,15 @@ def _limits(
     )
     residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
     for name, sensor in settings.sensors.items():
-        if name in trials.sensors and sensor.limit:
-            rows = _at_speeds(settings, sensor, "limit", trials, math.inf, problems)
-            residual[:, trials.sensors.index(name)] = rows / labels.vibration_scale
+        if name in trials.sensors and sensor.limit is not None:
+            rows = _at_speeds(settings, sensor, "limit", sensor.limit.value, trials, math.inf, problems)
+            unit = sensor.limit.unit if sensor.limit.unit.name else own
+            if unit.kind != own.kind:
+                expected = (
+                    f"an amplitude in {own.name or 'no unit'}, as the readings have, or converting to it"
+                )
+                sensor.complain(problems, "limit", expected)
+            residual[:, trials.sensors.index(name)] = rows / unit.scale
     limits = Limits(most, residual, arcs)
     return limits if limits.any else None
 
@@ -650,7 +663,7 @@ def _row_weights(
 ) -> FloatArray | None:
     """Of each reading, (S, C): that of its speed times that of its sensor; None: all 1."""
     columns = np.array([sensor.weight for sensor in sensors.values()])
-    rows = _at_speeds(settings, settings, "speed_weights", trials, 1.0, problems)
+    rows = _at_speeds(settings, settings, "speed_weights", settings.speed_weights, trials, 1.0, problems)
     for key, weights in (("sensors", columns), ("speed_weights", rows)):
         if not weights.any():
             expected = f"at least one {key.split('_')[0].rstrip('s')} with a weight above 0"
@@ -659,10 +672,15 @@ def _row_weights(
 
 
 def _at_speeds(
-    settings: JobSettings, part: Settings, key: str, trials: Trials, default: float, problems: Problems
+    settings: JobSettings,
+    part: Settings,
+    key: str,
+    numbers: Mapping[str, float],
+    trials: Trials,
+    default: float,
+    problems: Problems,
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    numbers: Mapping[str, float] = getattr(part, key)
     unit = units.SPEED[trials.labels.speed_unit]
     out = np.full(len(trials.speeds), numbers.get("", default))
     seen: dict[int, str] = {}
@@ -791,15 +809,14 @@ def _check_units(
     check: Trials, ours: Labels, runs: Source, weights: Source | None, problems: Problems
 ) -> None:
     """Complain about what does not convert into the units of the job."""
-    theirs = check.labels
-    if units.vibration(ours.vibration_unit).kind != units.vibration(theirs.vibration_unit).kind:
-        expected = (
-            f"readings in {ours.vibration_unit or 'no unit'}, as in the runs table, or converting to it"
-        )
-        problems.add(source_name(runs), None, "amplitude", theirs.vibration_unit or "no unit", expected)
-    if weights is not None and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
-        expected = f"weights in {ours.weight_unit}, as the job has, or in a unit that converts to it"
-        problems.add(source_name(weights), None, "weight", theirs.weight_unit, expected)
+    for table, column, name, unit in (
+        (runs, "amplitude", "vibration_unit", units.vibration),
+        (weights, "weight", "weight_unit", units.weight),
+    ):
+        own, other = getattr(ours, name), getattr(check.labels, name)
+        if table is not None and unit(own).kind != unit(other).kind:
+            expected = f"{column}s in {own or 'no unit'}, as the job has, or in a unit that converts to it"
+            problems.add(source_name(table), None, column, other or "no unit", expected)
 
 
 def _taken(

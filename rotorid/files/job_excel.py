@@ -70,6 +70,9 @@ class WrittenJob:
     def read(self, problems: Problems) -> JobSettings:
         """All settings; a file that is named in place of a sheet is a problem."""
         source = "" if self.path is None else str(self.path)
+        if not self.tables and self.settings.keys().isdisjoint(TABLES):
+            problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
+            problems.stop()
         read = read_settings(JobSettings, self.settings, source, problems, self.where)
         settings = problems.need(read)
         if not self.tables and "runs" not in self.settings:
@@ -110,7 +113,7 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
     titles = {
         title.strip().casefold(): title for title in reversed(list(sheets)) if _holds_cells(sheets[title])
     }
-    for name, title in titles.items():
+    for name, title in titles.items() if titles.keys() & {*known} else ():
         if name not in known and not name.startswith((RESULTS, *REMARKS)):
             expected = (
                 f"a known sheet{did_you_mean(name, known)}; known are {listing(known, 'and')}, remarks go "

@@ -305,9 +305,11 @@ class Plane(_Placed):
 class Sensor(_Placed):
     """`[sensors.NAME]`."""
 
-    limit: Limits = key(
-        "largest amplitude, in the unit of the readings; or by speed",
-        default={},
+    limit: Annotated[Quantity, of(Limits)] | None = key(
+        "largest amplitude, in the unit of the readings, or with its own, `limit_mm_s_rms`; or by speed",
+        "limit",
+        None,
+        units=units.vibration,
         expected=f'{_LIMIT}, or a table of them by speed, such as {{ "3000" = 20 }}, in a sheet 3000: 20',
         example='{ "3000" = 20, "4500" = 30 }',
     )

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
+_PEAK = re.compile("peak|pk", re.IGNORECASE)
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
@@ -75,15 +76,11 @@ def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: 
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
-    """The files of a folder with one file a run, in the order of their numbers; none for anything else."""
+    """The files of a folder with one file a run, step2 before step10; none for anything else."""
     if not isinstance(source, (str, Path)) or not Path(source).is_dir():
         return ()
     files = [file for file in Path(source).iterdir() if file.suffix.lower() in (".csv", ".txt", ".xlsx")]
-
-    def place(file: Path) -> list[tuple[int, str]]:
-        return [(int(part or 0), word) for word, part in re.findall("([^0-9]*)([0-9]*)", file.name)]
-
-    return tuple(sorted(files, key=place))
+    return tuple(sorted(files, key=lambda file: (len(file.stem), file.stem)))
 
 
 def read_runs_grid(
@@ -152,17 +149,19 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
-    first, rows = grids[0], list(grids[0].rows)
-    for grid in grids[1:]:
+    first = grids[0]
+    if len(grids) == 1:
+        return first
+    rows: list[Row] = []
+    for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
             problems.add(grid.source, grid.header_row, None, listing(grid.header, "and"), expected)
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
-    if len(grids) == 1:
-        return first
-    return replace(first, source=listing([grid.source for grid in grids], "and"), rows=tuple(rows), named=())
+    name = listing([grid.source for grid in grids], "and")
+    return replace(first, source=name, rows=tuple(rows), named=())
 
 
 def _names_of(columns: Columns | None) -> dict[str, str]:
@@ -235,6 +234,8 @@ def long_rows(
             under = below.get(h.index) if column.stem != "phase" or h.stem == "phase" else None
             if column.stem in (*NUMBERS, *pair):
                 column = _with_unit(column, under, rows, phase)
+                if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
+                    column = column._replace(unit="mm_s_rms")
             columns.append(column)
     sensors = _by_name(columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
@@ -366,7 +367,7 @@ def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Ro
 
 def is_severity(name: str) -> bool:
     """Whether a heading says that mm/s alone are rms, as of a vibration severity."""
-    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not re.search("peak|pk", name)
+    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not _PEAK.search(name)
 
 
 def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dict[str, dict[str, _Column]]:

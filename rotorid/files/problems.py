@@ -104,10 +104,6 @@ class Problems:
         self._items = [problem for problem in self._items if problem.file not in files]
         return own
 
-    def withdraw(self, file: str) -> None:
-        """Forget what was noted about a file: a better explanation follows."""
-        self._items = [problem for problem in self._items if problem.file != file]
-
     def of(self, file: str) -> list[Problem]:
         """Problems of one file so far."""
         return [problem for problem in self._items if problem.file == file]
@@ -141,8 +137,11 @@ def _message(problems: tuple[Problem, ...]) -> str:
             left -= 1
         if together and len(lines) < MOST_LINES:
             values = tuple(dict.fromkeys(quote(p.value) for p in group if p.value is not None))
-            rows = ", ".join(dict.fromkeys(str(problem.row) for problem in group[:FEW]))
-            lines.append(_line(group[0], f"rows {rows} and others ({len(group)} in all)", values))
+            rows = sorted({problem.row for problem in group if problem.row is not None})
+            first = f"{rows[0]}–{rows[-1]}"
+            if rows[-1] - rows[0] >= len(rows):
+                first = f"{', '.join(map(str, rows[:FEW]))} and others ({len(rows)} in all)"
+            lines.append(_line(group[0], f"rows {first}", values))
             left -= len(group)
     return "\n".join([*lines, *([f"and {left} more problems"] if left else [])])
 

@@ -214,7 +214,7 @@ def read_runs(
         _placed(vectors[rows], at, shape),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=words + _which_mm_s(table),
+        warnings=words + _which_mm_s(table, rms=conventions.rms),
         steps=_placed(steps[:, rows], at, shape),
         covariance=covariance,
     )
@@ -323,16 +323,10 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
     return table
 
 
-def _heading_of(table: Table) -> str:
-    """The heading of the amplitudes in the file."""
-    field = table.fields["amplitude"]
-    return field.names[0] if field.names else field.name
-
-
-def _which_mm_s(table: Table) -> tuple[str, ...]:
+def _which_mm_s(table: Table, *, rms: bool) -> tuple[str, ...]:
     """How mm/s alone are read, below a heading that is not one of this program's own."""
-    heading, unit = _heading_of(table), table.unit("amplitude").name
-    if unit == "mm_s_rms" and is_severity(heading):
+    heading, unit = table.fields["amplitude"].heading, table.unit("amplitude").name
+    if unit == "mm_s_rms" and (is_severity(heading) or (rms and "rms" not in heading.casefold())):
         return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
     if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
         return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
@@ -353,7 +347,7 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
     like_angles = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
     small = np.all(np.abs(phase) < 30) and np.any(table.steps("phase") < np.radians(0.5))
     if like_angles and np.ptp(amplitude) > 90 and small:
-        one, other = _heading_of(table), table.fields["phase"].name
+        one, other = table.fields["amplitude"].heading, table.fields["phase"].name
         key = f"amplitude_{unit.name}" if unit.name else "amplitude"
         expected = (
             "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, and "

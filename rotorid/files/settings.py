@@ -260,10 +260,12 @@ class Settings(BaseModel):
     @cache
     def usual(cls, written: str) -> str:
         """The usual name of a key; of one that is not known the name itself."""
-        for usual, key in cls.known_keys().items():
-            if written in key.variants or (callable(key.units) and written.startswith(f"{usual}_")):
-                return usual
-        return written
+        keys = cls.known_keys()
+        exact = [usual for usual, key in keys.items() if written in key.variants]
+        longer = [
+            name for name, key in keys.items() if callable(key.units) and written.startswith(f"{name}_")
+        ]
+        return next(iter([*exact, *longer]), written)
 
     @model_validator(mode="wrap")
     @classmethod

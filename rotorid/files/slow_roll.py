@@ -118,7 +118,9 @@ def make_slow_roll(
     if len(problems) > before:
         return None
     whole = np.zeros((len(vectors), len(trials.sensors)), dtype=complex)
-    whole[:, [trials.sensors.index(name) for name in given]] = vectors
+    for k, name in enumerate(given):
+        if name in trials.sensors:  # others are refused already, or are no part of these readings
+            whole[:, trials.sensors.index(name)] = vectors[:, k]
     if lacking := [name for name in trials.sensors if name not in given]:
         words.append(
             f"there is no slow-roll vector for {'sensors' if len(lacking) > 1 else 'sensor'} "

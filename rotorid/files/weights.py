@@ -20,13 +20,13 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid, show
-from rotorid.files.columns import Column, Source, Table, make_table, read_grid
-from rotorid.files.conventions import Conventions
+from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
+from rotorid.files.conventions import FULL_TURN, Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, explained, is_long, long_rows
+from rotorid.files.layout import NUMBER, WEIGHT, Unclear, explained, is_long, long_rows
 from rotorid.files.problems import Problems
-from rotorid.files.units import Unit, UnitError, one_of
+from rotorid.files.units import Unit, one_of
 
 COLUMNS = (
     Column("run"),
@@ -76,18 +76,19 @@ def read_weights(
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     if grid is None:
         return None
-    before, angle_unit = len(problems), ""
+    before = len(problems)
     with explained(grid, problems):
-        grid, angle_unit = _long(grid, conventions)
+        grid = _long(grid, conventions)
     one = runs is not None and len(runs) == 1  # whose name need not stand there
     there = {name.partition("_")[0] for name in grid.header}
-    columns = [
-        replace(c, unit=None, blank=True, required=there.isdisjoint(_PLACES)) if c.stem == "angle" else c
-        for c in COLUMNS
-    ]
-    columns[0] = replace(columns[0], required=not one)
-    columns[2] = replace(columns[2], required=there.isdisjoint(("mass", "unbalance")))
-    columns += [Column(stem, required=False, blank=True) for stem in _BESIDE if stem in there]
+    columns = (
+        Column("run", required=not one),
+        COLUMNS[1],
+        replace(COLUMNS[2], required=there.isdisjoint(("mass", "unbalance"))),
+        COLUMNS[3],
+        replace(COLUMNS[4], required=there.isdisjoint(_PLACES), lenient=True),
+        *(Column(stem, required=False, blank=True, lenient=True) for stem in _BESIDE if stem in there),
+    )
     table = make_table(grid, columns, problems) if len(problems) == before else None
     if table is None:
         return None
@@ -104,13 +105,7 @@ def read_weights(
     known = {name.casefold(): name for name in runs or ()} | {name: name for name in runs or ()}
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
     run = [known.get(name, known.get(name.casefold(), name)) for name in names]
-    try:
-        unit = one_of(units.ANGLE)(angle_unit) if angle_unit else None
-    except UnitError as error:
-        name = table.fields["angle"].name
-        problems.add(table.source, table.header_row, name, name, str(error))
-        return None
-    angle = _angles(table, conventions, unit)
+    angle = _angles(table, conventions)
     planes = tuple(dict.fromkeys(name for name in plane if name))
     values = conventions.labels.weight_from(size, angle)
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
@@ -129,8 +124,8 @@ def read_weights(
     return Weights(planes, total, table.unit(what), tuple(seen))
 
 
-def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
-    """The table with one row a weight, as far as its columns are clear, and the unit of its angles."""
+def _long(grid: Grid, conventions: Conventions) -> Grid:
+    """The table with one row a weight, as far as its columns are clear."""
     headings = read_headings(grid.header, weights=True)
     stems = [heading.stem for heading in headings if heading.stem not in ("", "note")]
     sizes = {"mass", "unbalance"} & {*stems}
@@ -144,22 +139,21 @@ def _long(grid: Grid, conventions: Conventions) -> tuple[Grid, str]:
             headings = headings if wide else [replace(h, sensor="") for h in headings]
             grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
             grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
-    header = [name.partition("_") for name in grid.header]
-    places = {k for k, (stem, *_) in enumerate(header) if stem in _PLACES}
-    told = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
-    filled = [k for k, (stem, *_) in enumerate(header) if stem in told]
-    kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in filled)]
-    rows = ((n, tuple(show(c) if k in places else c for k, c in enumerate(r))) for n, r in grid.rows)
-    every = tuple(rows)
-    names = ("angle" if part[0] == "angle" else name for name, part in zip(grid.header, header, strict=True))
-    named = grid.named or (grid.header,) * len(every)
-    grid = replace(
-        grid,
-        header=tuple(names),
-        rows=tuple(every[k] for k in kept),
-        named=tuple(named[k] for k in kept),
-    )
-    return grid, next((unit for stem, _, unit in header if stem == "angle"), "")
+    header = [name.partition("_")[0] for name in grid.header]
+    filled = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
+    places = [k for k, stem in enumerate(header) if stem in filled]
+    kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in places)]
+    named = tuple(grid.named[k] for k in kept if grid.named)
+    grid = replace(grid, rows=tuple(grid.rows[k] for k in kept), named=named)
+    if "angle" not in grid.header:
+        return grid
+    at = grid.header.index("angle")
+    texts = [show(row[at]) for _, row in grid.rows]
+    plain = [abs(float(text.replace(",", "."))) for text in texts if _PLAIN.fullmatch(text)]
+    if any(plain) and max(plain) <= math.tau:
+        heading = next(heading for heading in headings if heading.stem == "angle")
+        raise Unclear(f"its unit too, such as '{heading.name} (deg)'", heading)
+    return replace(grid, header=(*grid.header[:at], "angle_deg", *grid.header[at + 1 :]))
 
 
 def _with_units(grid: Grid, at: Mapping[str, int]) -> Grid:
@@ -180,40 +174,30 @@ def _size_name(name: str, size: str) -> str:
     return f"{kind}_{unit}" if unit else kind
 
 
-def _angles(table: Table, conventions: Conventions, unit: Unit | None) -> FloatArray:
+def _angles(table: Table, conventions: Conventions) -> FloatArray:
     """Angle of each weight, rad; NaN and a problem where there is none."""
-    angle, plain = np.full(len(table), math.nan), np.zeros(len(table), dtype=bool)
     places = [stem for stem in _PLACES if stem in table]
-    for i in range(len(table)):
-        stem = next((stem for stem in places if table.texts(stem)[i]), places[0])
-        written = table.texts(stem)[i]
+    degree, angle = units.ANGLE["deg"], table.numbers("angle").copy()
+    clear = "angle" not in table or table.unit("angle") != UNCLEAR
+    for i in np.flatnonzero(np.isnan(angle)).tolist() if clear else ():
+        stem = next((stem for stem in places if table.shown(stem, i)), places[0])
         try:
-            degrees = _by_name(table, i, stem, written, conventions)
-            plain[i] = degrees is None
-            if degrees is None:
-                degrees = parse_number(written.replace(",", ".") if _PLAIN.fullmatch(written) else written)
-            angle[i] = degrees
+            angle[i] = degree.to_si(_by_name(table, i, stem, conventions))
         except NotANumber as error:
             table.complain(i, stem, str(error))
-    largest = np.abs(angle[plain]).max(initial=0.0, where=np.isfinite(angle[plain]))
-    if unit is None and 0 < largest <= math.tau:
-        name = table.fields["angle"].name
-        table.problems.add(
-            table.source, table.header_row, name, name, f"its unit too, such as '{name} (deg)'"
-        )
-    half = np.where(plain & (unit == units.ANGLE["rad"]), math.pi, 180.0)
-    wrong = np.abs(angle) > 2 * half
+    wrong = np.abs(angle) > FULL_TURN
     table.complain_where(wrong, places[0], "an angle from -360 to 360 degrees")
     for i, action in enumerate(table.texts("action") if "action" in table else ()):
         if action.casefold() in ("remove", "removed"):
-            angle[i] = (angle[i] + half[i]) % (2 * half[i])
+            angle[i] = degree.to_si((angle[i] * degree.scale + 180.0) % 360.0)
         elif action.casefold() not in ("", "add", "added"):
             table.complain(i, "action", "add or remove")
-    return np.where(wrong, math.nan, angle * math.pi / half)
+    return np.where(wrong, math.nan, angle)
 
 
-def _by_name(table: Table, i: int, stem: str, written: str, conventions: Conventions) -> float | None:
-    """The angle in degrees of 90°, a clock, a hole, a blade or a position; None: a number of the angle."""
+def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float:
+    """The angle in degrees of 90°, a clock, a hole, a blade or a position."""
+    written = table.shown(stem, i)
     if match := _ANGLE.fullmatch(written):
         return parse_number(match[1].replace(",", "."))
     clock = _CLOCK.fullmatch(written)
@@ -223,7 +207,7 @@ def _by_name(table: Table, i: int, stem: str, written: str, conventions: Convent
     if stem == "clock" and written:
         raise NotANumber("a time of the clock face, such as 10:20")
     if not written or (stem != "hole" and match is None):
-        return None
+        raise NotANumber(table.fields[stem].doubts.get(i, "an angle"))
     hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:

@@ -40,9 +40,9 @@ def test_another_dress_is_the_same_answer(runs):
 
 @pytest.mark.parametrize("fault", ["a row is dropped", "a number is misread", "a traceback"])
 def test_a_defect_would_be_found(runs, monkeypatch, fault):
-    from rotorid.files import columns, text_file
+    from rotorid.files import cells, columns
 
-    make_grid, parse_number = text_file.make_grid, columns.parse_number
+    make_grid, parse_number = cells.make_grid, columns.parse_number
     if fault == "a row is dropped":  # those of labels that begin with #, as it once was
         mutant = runs.data.replace(b"initial", b"#1")
 
@@ -50,7 +50,7 @@ def test_a_defect_would_be_found(runs, monkeypatch, fault):
             rows = [row for row in rows if not row[1] or not row[1][0].startswith("#")]
             return make_grid(source, rows, *rest, **options)
 
-        monkeypatch.setattr(text_file, "make_grid", without)
+        monkeypatch.setattr(cells, "make_grid", without)
     elif fault == "a number is misread":
         mutant = b"sep=;\n" + runs.data.replace(b",", b";").replace(b".", b",")
         monkeypatch.setattr(
@@ -58,5 +58,5 @@ def test_a_defect_would_be_found(runs, monkeypatch, fault):
         )
     else:
         mutant = runs.data + b"\n"
-        monkeypatch.setattr(text_file, "make_grid", lambda *_, **__: {}["x"])
+        monkeypatch.setattr(cells, "make_grid", lambda *_, **__: {}["x"])
     assert judge("table", runs, mutant)[0] == (REFUSED if fault == "a row is dropped" else FINDING)

@@ -92,7 +92,7 @@ def test_a_table_of_a_later_version(tmp_path):
     job, path = rotorid.read_job(JOB), tmp_path / "w.csv"
     rotorid.write_influence(path, balancing.estimate_influence(job.trials))
     text = path.read_text(encoding="utf-8-sig")
-    assert rotorid.read_influence(path).planes == job.planes
+    assert rotorid.read_influence(path).planes == tuple(job.planes)
     path.write_text(f"# schema_version = {SCHEMA_VERSION + 1}\n{text}", encoding="utf-8")
     with pytest.raises(rotorid.InputError, match=LATER):
         rotorid.read_influence(path)

@@ -141,8 +141,8 @@ def test_stored_coefficients(folder, stored, job):
     ("column", "value", "words"),
     [
         ("sensor", "C", "coefficients of sensor 'C', as the runs table has; there are A and B"),
-        ("speed_rpm", 1100, "coefficients of speed 1100 rpm, as the runs table has"),
-        ("amplitude_um_pp", None, "coefficients in mm_s or a unit"),
+        ("speed_rpm", 1100, "coefficients at 1100 rpm, as the runs table has; there are 1000 rpm"),
+        ("amplitude_um_pp", None, "coefficients in mm_s or a unit that converts, as the runs"),
     ],
 )
 def test_coefficients_that_do_not_fit(folder, stored, column, value, words):

@@ -250,3 +250,32 @@ def test_bad_limits_of_the_command_line(job, mass, limits, words):
     with pytest.raises(ValueError) as caught:
         limited(job(HEAD), mass, limits)
     assert words in str(caught.value)
+
+
+def test_a_limit_in_a_unit_of_its_own(job):
+    um_pp = 0.5e-6
+    assert job(sensor("limit_mm_pp = 0.004")).limits.residual[0, 0] == pytest.approx(4 * um_pp)
+    found = complaints(job, sensor("limit_mm_s_rms = 4"))
+    the_only(found, "job.toml", None, "sensors.A.limit_mm_s_rms", "4", "an amplitude in um_pp")
+
+
+@pytest.mark.parametrize(
+    ("line", "unit", "said"),
+    [("limit_mm_s_rms = 2.8", "mm_s_rms", "mm/s rms"), ("limit = 2.8", "mm_s", "mm/s peak")],
+)
+def test_mm_s_alone_are_rms_where_a_limit_is(job, folder, line, unit, said):
+    write_csv(folder / "runs.csv", [["run", "rpm", "sensor", "mm/s", "phase (deg)"], *RUNS[1:]])
+    read = job(sensor(line))
+    assert read.trials.labels.vibration_unit == unit
+    assert read.limits.residual[0, 0] == pytest.approx(2.8e-3 * (2**0.5 if unit == "mm_s_rms" else 1.0))
+    assert any(f"is read as {said}" in text for text in read.trials.warnings)
+
+
+def test_a_file_of_something_else_has_one_message(job):
+    found = complaints(job, 'shaft = "shaft.csv"\n[[bearing]]\nnode = 1\n')
+    the_only(found, "job.toml", None, "runs", None, "a job, which names the runs table")
+
+
+def test_a_forgotten_row_of_weights_is_named(job):
+    found = complaints(job, HEAD + "[planes.P2]\nradius_mm = 100\n")
+    the_only(found, "job.toml", None, "planes.P2", "P2", "there is no trial weight in plane 'P2'")

@@ -155,7 +155,7 @@ def test_a_check_with_nothing_mounted(job, folder):
 
 BAD_CHECKS = [
     (3, "sensor", "C", "check.csv", "sensor", "C", "a sensor of the job; there are A and B"),
-    (1, "amplitude_um_pp", "amplitude_mm_s", "check.csv", "amplitude", "mm_s", "readings in um_pp"),
+    (1, "amplitude_um_pp", "amplitude_mm_s", "check.csv", "amplitude", "mm_s", "amplitudes in um_pp"),
     (2, "phase_deg", "x", "check.csv", "phase_deg", "x", "a number"),
 ]
 
