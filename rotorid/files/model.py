@@ -134,9 +134,7 @@ class ModelFile(Settings):
     outputs: Texts = key('name = "expression" of states; default: the states', default={})
     initial: Texts = key(
         'name = number, or an expression of parameters, or `"record"`: the first sample of the output that '
-        "equals this state, with its error (a parameter `NAME_0` of each record); `t0`: the time they belong "
-        'to, in s, perhaps before the record, or `"first"`: the first time of each record (the default, '
-        "which asks where a record does not begin at 0)",
+        "equals this state, with its error (a parameter `NAME_0` of each record)",
         default={},
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
@@ -299,8 +297,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
     is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
     `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
     record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
-    records has for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first");
-    `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
+    records has for itself. `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
     output, with factors to be estimated for every record. Without states the outputs are functions of the
     time.
 
