@@ -57,8 +57,7 @@ def model_files(
     ValueError
         For masses that are not positive, and forces where no mass stands.
     """
-    from rotorid.files.model import equations_of
-    from rotorid.files.small_model import linear_equations, small_model_files
+    from rotorid.files.small_model import equations_of, linear_equations, small_model_files
     from rotorid.files.toml_writing import toml_bytes
 
     at = ", ".join(map(str, result.nodes))

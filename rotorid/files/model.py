@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from rotorid.base.suggestions import did_you_mean
@@ -23,19 +22,17 @@ from rotorid.base.text import listing
 from rotorid.files.forces import whole
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
+from rotorid.files.small_model import FORCE, small_equations
 from rotorid.files.toml_file import MOST_NAMES, read_toml
 from rotorid.identify import expressions
 from rotorid.identify.expressions import is_name
 
 if TYPE_CHECKING:
-    from fem import Motion
     from rotorid.identify.amplitudes import AmplitudeErrors
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.operator_model import HarmonicModel
 
 Pairs = dict[str, tuple[float, float]]
-FORCE = "f_"
-"""Before the name of a coordinate: the amplitude of the force on it, where the file names no forces."""
 _EXAMPLE = '"(m*p**2 + b*p + c)*X = F"'
 _ESTIMATE = (
     'names to estimate, estimate = ["c", "b"], or [estimate] with name = starting value (empty where a model '
@@ -58,8 +55,9 @@ def _name(value: str) -> str:
 
 
 def _expression(value: object) -> object:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if number or (isinstance(value, str) and value.strip()):
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= expressions.LARGEST:
+        return float(value)
+    if isinstance(value, str) and value.strip():
         return value
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
 
@@ -360,8 +358,6 @@ def read_ode_model(path: str | Path) -> OdeModel:
 
 def _read(path: Path) -> ModelFile:
     """What stands in a model file, or of a small model its linear equations; raises its problems."""
-    from rotorid.files.small_model import small_equations
-
     source, problems = str(path), Problems()
     data = problems.need(read_toml(path, problems))
     if {"masses_kg", "shaft_stiffness_N_per_m"} & data.keys():
@@ -449,63 +445,3 @@ def _scaled(text: str, file: ModelFile) -> tuple[str, str]:
     if symbol.is_Symbol and scale.is_Rational:
         return symbol.name, f"{scale.p}/{scale.q}" if scale.q != 1 else str(scale.p)
     return "", ""
-
-
-def equations_of(
-    motion: Motion,
-    dampers: Mapping[str, float],
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] | None = None,
-) -> dict[str, Any]:
-    """M y'' + C y' + K y = f as a model file has it, with dampers to the ground that are to be estimated.
-
-    Coordinates with neither mass nor damping, behind the others, are eliminated: K = K₁₁ − K₁₂ K₂₂⁻¹ K₂₁.
-
-    Parameters
-    ----------
-    motion
-        Matrices and names of the displacements, of one plane or both.
-    dampers
-        {displacement: starting value of its damper, N·s/m}; the parameter of `x7` is called `d_x7`. Empty:
-        nothing is estimated.
-    inputs
-        Forces that are measured: `f_x7` on the displacement `x7`. Records then need a column of each. Without
-        inputs `read_harmonic_model` takes a force on every coordinate.
-    outputs
-        What is measured: displacements `x7` or velocities `v_x7`. Default: all displacements.
-
-    Raises
-    ------
-    ValueError
-        Matrices that are not finite, coordinates that nothing holds, names that do not exist.
-    """
-    M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
-    if not np.isfinite(matrices).all():
-        raise ValueError("M, C or K holds numbers that are not finite: such a model cannot be written")
-    free = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [name not in dampers for name in motion.coordinates]
-    on, off = np.flatnonzero(~free), np.flatnonzero(free)
-    if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
-        raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
-    bent = np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
-    M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K - K[:, off] @ bent @ np.eye(len(K))[on]))
-    names, damping = [motion.coordinates[i] for i in on], C.astype(object)
-    allowed = {f"{kind}{name}" for name in names for kind in ("", "v_", FORCE)}
-    for name in (*dampers, *inputs, *(outputs or ())):
-        if name not in allowed:
-            raise ValueError(f"no {name!r} in this model: it has {listing(names, 'and')}")
-    for i, name in enumerate(names):
-        if name in dampers:
-            damping[i, i] = f"{damping[i, i]!r} + d_{name}" if damping[i, i] else f"d_{name}"
-    data: dict[str, Any] = {
-        "speed_rad_s": float(motion.speed),
-        "inputs": [*inputs],
-        "coordinates": names,
-        "M": M.tolist(),
-        "C": damping.tolist(),
-        "K": K.tolist(),
-        "force": {name.removeprefix(FORCE): name for name in inputs},
-        "outputs": {name: name for name in outputs or ()},
-        "bounds": {f"d_{name}": [0.0, math.inf] for name in dampers},
-    }
-    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
-    return {name: part for name, part in data.items() if part} | {"estimate": estimate}

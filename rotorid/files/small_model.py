@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -15,6 +16,7 @@ from pydantic import Field, PlainValidator
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
+from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached, support_tables
 from rotorid.files.forces import Place, Places, each, force_tables, whole
@@ -24,11 +26,13 @@ from rotorid.files.toml_file import read_toml
 from rotorid.files.toml_writing import toml_bytes
 from rotorid.reduction import SmallModel
 
+FORCE = "f_"
+"""Before the name of a coordinate: the force on it."""
 _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
 def _numbers(value: object) -> FloatArray:
-    with suppress(TypeError, ValueError):
+    with suppress(TypeError, ValueError, OverflowError):
         array = np.array(value, dtype=float)
         if array.size and np.isfinite(array).all() and array.ndim:
             return array
@@ -157,10 +161,68 @@ def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Moti
     return model.motion(speed, plane)
 
 
+def equations_of(
+    motion: Motion,
+    dampers: Mapping[str, float],
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """M y'' + C y' + K y = f as a model file has it, with dampers to the ground that are to be estimated.
+
+    Coordinates with neither mass nor damping, behind the others, are eliminated: K = K₁₁ − K₁₂ K₂₂⁻¹ K₂₁.
+
+    Parameters
+    ----------
+    motion
+        Matrices and names of the displacements, of one plane or both.
+    dampers
+        {displacement: starting value of its damper, N·s/m}; the parameter of `x7` is called `d_x7`. Empty:
+        nothing is estimated.
+    inputs
+        Forces that are measured: `f_x7` on the displacement `x7`. Records then need a column of each. Without
+        inputs `read_harmonic_model` takes a force on every coordinate.
+    outputs
+        What is measured: displacements `x7` or velocities `v_x7`. Default: all displacements.
+
+    Raises
+    ------
+    ValueError
+        Matrices that are not finite, coordinates that nothing holds, names that do not exist.
+    """
+    M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
+    if not np.isfinite(matrices).all():
+        raise ValueError("M, C or K holds numbers that are not finite: such a model cannot be written")
+    free = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [name not in dampers for name in motion.coordinates]
+    on, off = np.flatnonzero(~free), np.flatnonzero(free)
+    if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
+        raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
+    bent = np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
+    M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K - K[:, off] @ bent @ np.eye(len(K))[on]))
+    names, damping = [motion.coordinates[i] for i in on], C.astype(object)
+    allowed = {f"{kind}{name}" for name in names for kind in ("", "v_", FORCE)}
+    for name in (*dampers, *inputs, *(outputs or ())):
+        if name not in allowed:
+            raise ValueError(f"no {name!r} in this model: it has {listing(names, 'and')}")
+    for i, name in enumerate(names):
+        if name in dampers:
+            damping[i, i] = f"{damping[i, i]!r} + d_{name}" if damping[i, i] else f"d_{name}"
+    data: dict[str, Any] = {
+        "speed_rad_s": float(motion.speed),
+        "inputs": [*inputs],
+        "coordinates": names,
+        "M": M.tolist(),
+        "C": damping.tolist(),
+        "K": K.tolist(),
+        "force": {name.removeprefix(FORCE): name for name in inputs},
+        "outputs": {name: name for name in outputs or ()},
+        "bounds": {f"d_{name}": [0.0, math.inf] for name in dampers},
+    }
+    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
+    return {name: part for name, part in data.items() if part} | {"estimate": estimate}
+
+
 def small_equations(path: Path) -> dict[str, Any]:
     """The linear equations of a small model as keys of a model file."""
-    from rotorid.files.model import equations_of
-
     model, more = _read(path)
     speed, both = more.pop("speed_rad_s", 0.0), more.pop("both_planes", False)
     try:

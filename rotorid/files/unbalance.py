@@ -112,7 +112,9 @@ def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
     size = table.numbers("bow")
     table.must_be("bow", size >= 0, "a number not below 0")
     nodes, vectors = _vectors(table, "node", size, rotor)
-    table.once("node", nodes, "a node that stands in no other row (it stands in row {})")
+    table.once(
+        "node", [node or None for node in nodes], "a node that stands in no other row (it stands in row {})"
+    )
     if len(nodes) < 3:
         table.as_whole("node", "three nodes or more: any two lie on a straight line")
     problems.stop()

@@ -117,7 +117,10 @@ FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (_POUND_FORCE
 TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "min": (60.0, 1.0)})
 VELOCITY = _table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)})
 VISCOSITY = _table("viscosity", {"Pa_s": (1.0, 1.0), "mPa_s": (1.0, 1e3), "cP": (1.0, 1e3)})
-CUBIC_STIFFNESS = _table("cubic stiffness", {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0)})
+CUBIC_STIFFNESS = _table(
+    "cubic stiffness",
+    {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0), "lbf_per_in3": (_POUND_FORCE * 1e12, 254.0**3)},
+)
 
 _PEAK = {
     **LENGTH,

@@ -15,7 +15,7 @@ from repetitions import FULL
 from timedomain_cases import motion_in
 
 import fem
-from rotorid.files.model import equations_of
+from rotorid.files.small_model import equations_of
 from rotorid.files.toml_writing import toml_bytes
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments

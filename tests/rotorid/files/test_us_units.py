@@ -72,12 +72,16 @@ pedestal_mass_lb = 100
 pedestal_stiffness_lbf_per_in = [1e6, 2e6]
 [[bearing]]
 node = 3
-stiffness_N_per_m = 1e7
+table = "b.csv"
+[[cubic_spring]]
+node = 2
+cubic_stiffness_lbf_per_in3 = 2e3
 """
 
 
 def read_file(folder, text):
     (folder / "shaft.csv").write_text("length_in,diameter_in\n10,2\n12,2\n")
+    (folder / "b.csv").write_text("speed_rpm,kxx_lbf_per_in,kyy_lbf_per_in\n0,1e5,2e5\n9000,2e5,2e5\n")
     (folder / "rotor.toml").write_text(text)
     return read_rotor(folder / "rotor.toml")
 
@@ -94,7 +98,9 @@ def test_a_rotor_file_in_us_units(tmp_path):
     np.testing.assert_allclose(np.diag(first.stiffness), np.array([1e5, 2e5]) * FORCE / INCH, rtol=1e-14)
     np.testing.assert_allclose(first.damping, 50 * FORCE / INCH, rtol=1e-14)
     np.testing.assert_allclose(first.pedestal.stiffness, np.array([1e6, 2e6]) * FORCE / INCH, rtol=1e-14)
-    assert second.stiffness == 1e7
+    k = [[[1e5, 0], [0, 2e5]], [[2e5, 0], [0, 2e5]]]
+    np.testing.assert_allclose(second.table[0], np.array(k) * FORCE / INCH, rtol=1e-14)
+    np.testing.assert_allclose(rotor.forces[0].cubic_stiffness, 2e3 * FORCE / INCH**3, rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from timedomain_cases import motion_in
 
 import fem
 from fem import state_space as of_motion
-from rotorid.files.model import equations_of
+from rotorid.files.small_model import equations_of
 from rotorid.files.toml_writing import toml_bytes
 from rotorid.identify.ode import ode_model
 from rotorid.identify.second_order import second_order, state_space
