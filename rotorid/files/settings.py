@@ -312,6 +312,8 @@ class Settings(BaseModel):
             properties |= dict.fromkeys(names, plain[usual])
             if callable(key.units):
                 schema.setdefault("patternProperties", {})[f"^{usual}_"] = plain[usual]
+            elif usual in required and len(names) == 1:
+                schema.setdefault("required", []).append(usual)
             elif usual in required:
                 one_of_them = {"anyOf": [{"required": [name]} for name in names]}
                 schema.setdefault("allOf", []).append(one_of_them)
