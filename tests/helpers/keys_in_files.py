@@ -16,6 +16,7 @@ TABLES = {
     "key of [key_phasor]": job_keys.KEY_PHASOR,
     "key of [slow_roll.SENSOR]": job_keys.VECTOR,
     "key of [columns]": job_keys.COLUMNS,
+    "key of [sheet]": job_keys.SHEET,
     "key of [planes.NAME]": job_keys.PLANE,
     "key of [sensors.NAME]": job_keys.SENSOR,
     "key of a model file for harmonic tests": harmonic_file.HARMONIC,

@@ -6,7 +6,7 @@ import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -98,6 +98,9 @@ class Job:
         Its direction, degrees with the rotation from the model's x.
     machine, machine_type, date
         What was balanced, of which type, and when; empty and None where the job does not say.
+    sheet
+        What it says for the balancing sheet: machine, place, date, engineer, instrument, and zero, where 0°
+        stands in polar plots; empty where it says nothing.
     """
 
     trials: Trials
@@ -125,6 +128,7 @@ class Job:
     machine: str = ""
     machine_type: str = ""
     date: datetime.date | None = None
+    sheet: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def used(self) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ WEIGHTS = "weights"
 """In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
 READINGS = ("runs", "check", "slow_roll")
 """Those that are runs tables."""
+ZEROS = ("right", "top")
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
 MOST_HOLES = 1000
 SAME_DEG = 1e-4
@@ -407,6 +408,19 @@ COLUMNS = (
     Key("phase_deg", TEXT, "or `phase_rad`", units.ANGLE),
     Key("repeat", TEXT, "of repeated readings"),
 )
+SHEET = (
+    Key("machine", value_kinds.LABEL, "what was balanced; default: `machine` of the job", default=""),
+    Key("place", value_kinds.LABEL, "where it stands", default=""),
+    Key("date", value_kinds.DATE, "when it was balanced; default: `date` of the job"),
+    Key("engineer", value_kinds.LABEL, "who balanced it", default=""),
+    Key("instrument", value_kinds.LABEL, "with what, its number", default=""),
+    Key(
+        "zero",
+        value_kinds.choice(ZEROS),
+        "where 0° stands in the polar plots of the sheet; default: right, analysers have it at the top",
+        default="right",
+    ),
+)
 JOB = (
     Key(
         "runs",
@@ -478,6 +492,7 @@ JOB = (
     Key("machine", value_kinds.LABEL, "its name or serial number, for `rotorid fleet`", default=""),
     Key("machine_type", value_kinds.LABEL, "its type, for the same", default=""),
     Key("date", value_kinds.DATE, "when it was balanced, for the same"),
+    Key("sheet", value_kinds.table(SHEET), "the head of the balancing sheet and its polar plots, see below"),
 )
 CELLS = {name: key.kind.cell for keys in (JOB, PLANE, SENSOR) for key in keys for name in key.names}
 CELLS["station"] = "name"

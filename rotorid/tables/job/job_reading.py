@@ -108,5 +108,6 @@ def job_of(
             machine=said["machine"],
             machine_type=said["machine_type"],
             date=said["date"],
+            sheet=said["sheet"] or {},
         )
     )
