@@ -21,7 +21,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
-from rotorid.base.text import capital, figures, listing
+from rotorid.base.text import capital, figures
 
 WORTH = 0.9
 """Of the vibration in the check run: what a trim has to stay below."""
@@ -71,23 +71,29 @@ class LeftToDo(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What to do; what is mounted."""
+        """What to do; what is mounted, and the trim in each plane."""
         c = self.correction
-        mounted = [c.labels.weight_at(w) if w else "nothing" for w in self.there]
+        columns = [
+            Column("plane", self.planes, str),
+            Column("mounted", [c.labels.weight_at(w) if w else "nothing" for w in self.there], str),
+        ]
         what = capital(self.word)
-        if self.word == "trim" and self.pieces is not None:
-            what += f": {self.pieces.in_holes()}"
-        elif self.word == "trim":
-            at = c.places(self.planes, self.trim)
-            each = [
-                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(float(abs(w)))} at "
-                f"{at[p]:.1f}° in plane {plane!r}"
-                for p, (plane, w) in enumerate(zip(self.planes, self.trim, strict=True))
-                if w
-            ]
-            what += f": {listing(each, 'and')}"
-        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
-        return Answer(f"{what}; {self.why}.", text(columns, width=COLUMNS))
+        if self.word == "trim":
+            what = "Trim" if self.pieces is None else f"Trim with pieces, in {c.labels.weight_in}"
+            columns.append(Column("trim", self._trims(), str))
+        return Answer(f"{what}; {self.why}.", text(columns, left=3, width=COLUMNS))
+
+    def _trims(self) -> list[str]:
+        """What to add in each plane, or to take away, in words."""
+        c = self.correction
+        if self.pieces is not None:
+            chosen = dict(zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True))
+            return [chosen.get(plane, "nothing") for plane in self.planes]
+        sizes, places = c.labels.weight(self.trim)[0], c.places(self.planes, self.trim)
+        words = ["take away" if plane in c.remove else "add" for plane in self.planes]
+        each = zip(words, sizes, places, strict=True)
+        unit = c.labels.weight_in
+        return [f"{do} {figures(size)} {unit} at {at:.1f}°" if size else "nothing" for do, size, at in each]
 
 
 def after_check_run(

@@ -64,8 +64,10 @@ def of_plane(p: int) -> dict[str, Any]:
 
 
 def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = np.inf) -> None:
-    """Radii from 0 (to `most` at most), their numbers away from the vectors."""
-    polar.set_rlabel_position(float(shown(-np.sum(vectors))[1]))
+    """Radii from 0 (to `most` at most), their numbers farthest from the vectors."""
+    angles = np.sort(shown(np.atleast_1d(vectors))[1])
+    gaps = np.diff([*angles, angles[0] + 360.0])
+    polar.set_rlabel_position(float(angles[k := int(gaps.argmax())] + gaps[k] / 2))
     polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
 
 
@@ -131,6 +133,8 @@ def draw_readings(
             draw_line(polar, shown, change, ":", color=look["color"])
     from_zero(polar, shown, values)
     polar.plot([], [], color=QUIET, label="closed lines: 95 % of one reading")
+    if first is not None:
+        polar.plot([], [], ":", color=QUIET, label=f"dotted: change from {cut(first, 24)}")
     legend_above(polar, 2, height=-0.08)
     return polar
 

@@ -72,8 +72,8 @@ class Balance(Outcome):
         from rotorid.report.balance import balance_report
 
         words = self.answer.judgement
-        made = self.result, self.mounted, self.left
-        return balance_report(self.to_dict(), made, self.influence, self.job, self.provenance, words)
+        made = self.result, self.mounted, self.check, self.left
+        return balance_report(self.to_dict(), made, self.job, self.provenance, words)
 
 
 @command
@@ -213,10 +213,10 @@ def _answer(parts: Mapping[str, Any], job: Job, influence: Influence) -> Answer:
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
     limits = [] if verdict is None else [verdict.answer]
     if left is not None:  # the verdict and what is left to do; the weights of the bare rotor are tables
-        first, cause = [one.judgement for one in (*limits, left.answer)], []
+        first, cause = [one.judgement for one in (left.answer, *limits)], []
         if check is not None:
-            first.insert(-1, check.headline)
-            cause.append(sentence(check.verdict))
+            first.append(check.headline)
+            cause += [] if check.explained else [sentence(check.verdict)]
         if job.check_pieces is not None:
             pieces = job.check_pieces.in_holes()
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")

@@ -10,13 +10,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.tables import Table, html
+from rotorid.base.text import figures
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.report.document import Document
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
@@ -35,12 +34,7 @@ def render_report(
     provenance: Mapping[str, Any],
     **context: object,
 ) -> bytes:
-    """Make a sheet: a template that extends base.html, filled from the JSON document of a result.
-
-    The template gets `document`, `title`, `warnings`, `provenance`, `context`, and the functions
-    `show("corrections.0.mass", digits=4)`, which prints a number of the document (`Document.show`),
-    `found("corrections.0.mass")`, what it holds there. The document itself, with its provenance, lies in the
-    sheet as JSON in the element "result".
+    """Make a sheet: a template that extends base.html; the document lies in it as JSON, in "result".
 
     Parameters
     ----------
@@ -51,7 +45,7 @@ def render_report(
     title
         Heading of the sheet and title of the page.
     warnings
-        Sentences, printed before everything else.
+        Sentences.
     provenance
         Program version, input files, date and options, as every JSON document has them.
     context
@@ -64,16 +58,23 @@ def render_report(
     jinja2.UndefinedError
         If the template names something that the context does not hold.
     """
-    whole = Document({**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)})
-    page = _environment().get_template(template)
-    text = page.render(
-        document=whole.data,
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    whole = {**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)}
+    pages = Environment(
+        loader=PackageLoader("rotorid.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    pages.filters["figures"] = figures
+    text = pages.get_template(template).render(
+        document=whole,
         title=title,
         warnings=list(warnings),
         provenance=provenance,
-        json_text=json_inside(whole.data),
-        show=whole.show,
-        found=whole.found,
+        json_text=json_inside(whole),
         **context,
     )
     return text.encode("utf-8", "replace")  # names of files may be anything
@@ -169,16 +170,4 @@ def inline_svg(figure: Figure, title: str) -> Markup:
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" viewBox="{view}" '
         f'style="width:100%;max-width:{figure.get_figwidth():.2f}in;height:auto;stroke-linejoin:round;'
         f'stroke-linecap:butt">{body}</svg>'
-    )
-
-
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("rotorid.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
     )

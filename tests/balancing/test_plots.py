@@ -88,7 +88,13 @@ def test_all_planes_side_by_side():
         remove=("right",),
     )
     pieces = SimpleNamespace(mountings=(MOUNTED, None, None, None))
-    every = SimpleNamespace(correction=correction, holes=(HOLES, None, None, None), discrete=pieces)
+    every = SimpleNamespace(
+        correction=correction,
+        holes=(HOLES, None, None, None),
+        discrete=pieces,
+        weights=correction.weights,
+        on_top_of=None,
+    )
     figure = mounted_discs(every)
     assert [ax.get_title() for ax in figure.axes] == [
         "left: add, g",
@@ -149,7 +155,7 @@ def test_readings_of_the_runs_and_trial_weights():
     covariance = np.broadcast_to(1e-16 * np.eye(2), (len(one.runs), 1, 1, 2, 2))
     ax = draw_readings(one, covariance, one.runs[0])
     changes = [line for line in ax.lines if line.get_linestyle() == ":"]
-    assert len(changes) == len(one.runs)
+    assert len(changes) == len(one.runs) + 1  # and that of the legend
     assert changes[-1].get_ydata()[-1] == pytest.approx(
         np.abs(one.mean[-1, 0, 0]) * one.labels.vibration_scale
     )
