@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _HOLES, _NUMBERS, _TEXTS, _ARROW, _SIDE, _EDGE = 0.84, 0.63, 1.08, 0.46, 1.95, 1.42
 """Radii of holes, their numbers, what stands around the disc and the longest arrow; half of the picture."""
+_LINE, _NUMBERED = 0.22, 16
+"""Height of a line of text below; holes that all have their numbers."""
 
 
 def draw_disc(  # noqa: PLR0913
@@ -106,7 +108,9 @@ def draw_disc(  # noqa: PLR0913
     arrows(ax, 0.0, size * zero * on_paper(labels, [*shown.values()]), [name[-6:-1] for name in shown])
     lines = [f"like adding, {line}" if remove else line for line in lines]
     lines += ["hatched arcs: nothing goes there"] if forbidden else []
-    ax.text(0, -_EDGE, "\n".join(lines), ha="center", va="top", fontsize=TEXT)
+    bottom = -_EDGE - _LINE * len(lines)
+    ax.set_ylim(bottom, _EDGE)
+    ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)
     return ax
 
 
@@ -210,7 +214,7 @@ def _draw_holes(ax: Axes, holes: Holes, ways: ComplexArray, scale: float) -> Non
         _circle(ax, _HOLES * way, min(0.05, _HOLES / count), fc="white")
         if taken:
             _circle(ax, _HOLES * way, scale * np.sqrt(taken), fc="0.85", hatch="////")
-        if h % (count // 25 + 1) == 0:
+        if h % (count // (_NUMBERED + 1) + 1) == 0:
             inside = _NUMBERS * way
             ax.text(
                 inside.real,

@@ -47,7 +47,7 @@ def polar_axes(ax: Axes | None, sign: int, title: str) -> PolarAxes:
     polar = cast("PolarAxes", ax)
     polar.set_theta_direction(1 if sign > 0 else -1)
     polar.tick_params(labelsize=TEXT, pad=0)
-    polar.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+    polar.yaxis.set_major_locator(MaxNLocator(4, prune="both"))
     polar.set_title(title, fontsize="medium", pad=10)
     return polar
 
@@ -67,8 +67,9 @@ def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = 
     """Radii from 0 (to `most` at most), their numbers farthest from the vectors."""
     angles = np.sort(shown(np.atleast_1d(vectors))[1])
     gaps = np.diff([*angles, angles[0] + 360.0])
-    polar.set_rlabel_position(float(angles[k := int(gaps.argmax())] + gaps[k] / 2))
-    polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
+    middle = float(angles[k := int(gaps.argmax())] + gaps[k] / 2)
+    polar.set_rlabel_position(45.0 * (middle // 45.0) + 22.5 if gaps[k] > 90.0 else middle)  # none at 90°
+    polar.set_rlim(0, min(1.05 * polar.get_rmax(), most), auto=True)
 
 
 def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike) -> None:
