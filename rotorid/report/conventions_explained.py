@@ -81,22 +81,20 @@ def phase_figure(labels: Labels) -> Figure:
 
     figure = Figure(figsize=(3.4, 2.1), layout="constrained")
     ax = figure.add_subplot()
+    text: dict[str, Any] = {"fontsize": 9.0, "ha": "center"}
     ax.axis("off")
-    turn = np.linspace(-100.0, 560.0, 600)
-    peak = _SAMPLE if labels.phase == "lag" else -_SAMPLE
+    turn, peak = np.linspace(-100.0, 560.0, 600), _SAMPLE if labels.phase == "lag" else -_SAMPLE
     ax.plot(turn, np.cos(np.radians(turn - peak)), color="black", lw=1.5)
     ax.plot([-100, 575], [0, 0], color="0.5", lw=0.7)
-    text: dict[str, Any] = {"fontsize": 9.0, "ha": "center"}
-    ax.text(585, 0, "time", fontsize=9, va="center")
-    pulse = np.array([-12, -6, 0, 6, 12]), np.array([-1.75, -1.75, -1.35, -1.75, -1.75])
     for at in (0.0, 360.0):
-        ax.plot([at, at], [-1.75, 1.5], color="0.5", lw=0.7, ls=":")
-        ax.plot(at + pulse[0], pulse[1], "k-")
+        ax.plot([at, at], [-1.35, 1.5], color="0.5", lw=0.7, ls=":")
+        ax.plot([at - 12, at - 6, at, at + 6, at + 12], [-1.75, -1.75, -1.35, -1.75, -1.75], "k-")
         ax.text(at, -1.8, "pulse", va="top", **text)
-    ax.plot([360 + peak] * 2, [1.0, 1.5], color="0.5", lw=0.7, ls=":")
     first, last = sorted((360.0, 360.0 + peak))  # the arrow points as time runs
+    ax.plot([360 + peak] * 2, [1.0, 1.5], color="0.5", lw=0.7, ls=":")
     ax.annotate("", (last, 1.38), (first, 1.38), arrowprops={"arrowstyle": "-|>", "lw": 1.2})
     ax.text((first + last) / 2, 1.5, f"phase {_SAMPLE:g}° ({labels.phase})", va="bottom", **text)
-    ax.text(-100, 1.12, "reading of\na sensor", fontsize=9, va="bottom")
+    ax.text(0, 1.12, "reading of\na sensor", va="bottom", **text)
+    ax.text(620, 0, "time", va="center", **text)
     ax.set(xlim=(-110, 660), ylim=(-2.15, 1.95))
     return figure

@@ -151,8 +151,7 @@ def inline_svg(figure: Figure, title: str) -> Markup:
         figure.savefig(stream, format="svg", metadata={"Date": None}, facecolor="white")
     text = stream.getvalue()
     head = re.search(r"<svg\b[^>]*>", text, re.DOTALL)
-    if head is None:  # pragma: no cover - matplotlib always writes one
-        raise ValueError("the figure could not be drawn")
+    assert head is not None  # matplotlib always writes one
     body = text[head.end() : text.rindex("</svg>")]
     for unwanted in (r"<metadata>.*?</metadata>", r"<style\b.*?</style>", r"<!--.*?-->"):
         body = re.sub(unwanted, "", body, flags=re.DOTALL)
@@ -164,10 +163,10 @@ def inline_svg(figure: Figure, title: str) -> Markup:
     )
     body = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}", body)
     body = re.sub(r"\n\s*", "\n", body)
-    box = re.search(r'viewBox="([^"]*)"', head.group())
-    view = box.group(1) if box else f"0 0 {figure.get_figwidth() * 72:g} {figure.get_figheight() * 72:g}"
+    wide, high = figure.get_size_inches()
     return Markup(
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" viewBox="{view}" '
-        f'style="width:100%;max-width:{figure.get_figwidth():.2f}in;height:auto;stroke-linejoin:round;'
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" '
+        f'viewBox="0 0 {wide * 72:g} {high * 72:g}" '
+        f'style="width:100%;max-width:{wide:.2f}in;height:auto;stroke-linejoin:round;'
         f'stroke-linecap:butt">{body}</svg>'
     )
