@@ -77,23 +77,24 @@ class LeftToDo(Answered):
             Column("plane", self.planes, str),
             Column("mounted", [c.labels.weight_at(w) if w else "nothing" for w in self.there], str),
         ]
-        what = capital(self.word)
-        if self.word == "trim":
-            what = "Trim" if self.pieces is None else f"Trim with pieces, in {c.labels.weight_in}"
-            columns.append(Column("trim", self._trims(), str))
-        return Answer(f"{what}; {self.why}.", text(columns, left=3, width=COLUMNS))
-
-    def _trims(self) -> list[str]:
-        """What to add in each plane, or to take away, in words."""
-        c = self.correction
-        if self.pieces is not None:
-            chosen = dict(zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True))
-            return [chosen.get(plane, "nothing") for plane in self.planes]
-        sizes, places = c.labels.weight(self.trim)[0], c.places(self.planes, self.trim)
-        words = ["take away" if plane in c.remove else "add" for plane in self.planes]
-        each = zip(words, sizes, places, strict=True)
-        unit = c.labels.weight_in
-        return [f"{do} {figures(size)} {unit} at {at:.1f}°" if size else "nothing" for do, size, at in each]
+        lines = []
+        if self.word == "trim" and self.pieces is not None:
+            each = zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True)
+            lines += ["", f"Trim with pieces, in {c.labels.weight_in}:"]
+            lines += [
+                f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
+            ]
+        elif self.word == "trim":
+            sizes, places = c.labels.weight(self.trim)[0], c.places(self.planes, self.trim)
+            do = ["take away" if plane in c.remove else "add" for plane in self.planes]
+            words = [
+                f"{do[p]} {figures(sizes[p])} {c.labels.weight_in} at {at:.1f}°"
+                for p, at in enumerate(places)
+            ]
+            cells = [word if size else "nothing" for word, size in zip(words, sizes, strict=True)]
+            columns.append(Column("trim", cells, str))
+        table = text(columns, left=len(columns), width=COLUMNS)
+        return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]))
 
 
 def after_check_run(

@@ -17,7 +17,7 @@ from rotorid.report.options import file_of
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
-    from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.commands.balance import BalanceOptions
     from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource

@@ -175,7 +175,7 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
     given = options.holes or ""
     if isinstance(given, int) or (isinstance(given, str) and given.strip().isdecimal()):
         if not 1 <= int(given) <= _MOST:
-            raise ValueError(f"--holes {given}: the number of equally spaced holes is 1 to {_MOST}")
+            raise ValueError(f"--holes {given}: give the number of equally spaced holes, 1 to {_MOST}")
         angles = equal_holes(int(given), np.radians(degrees(options.first_hole or 0.0, "--first-hole")))
     else:
         angles = np.radians(_listed(given))
