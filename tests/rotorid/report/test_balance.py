@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from balance_sheets import DATA, hard, on_top, parts_of, sheet_of
+from golden.test_brief import FORBIDDEN
 from sheets import disagreements
 
 from balancing.plots import plane_figure, residual_figure
@@ -66,6 +67,14 @@ def test_nothing_of_the_result_is_left_out(made):
         assert {f"{part}.holes.{i}.mass", f"{part}.holes.{i}.plane"} & keys
     for i in range(len(document.get("verdict", {"rows": []})["rows"])):
         assert {f"verdict.rows.{i}.size", f"verdict.rows.{i}.limit"} <= keys
+
+
+def test_it_says_nothing_that_no_answer_says(made):
+    text, *_ = made
+    assert (
+        re.findall(FORBIDDEN, " ".join(re.sub("<script.*</script>|<[^>]*>", " ", text, flags=re.S).split()))
+        == []
+    )
 
 
 def test_it_refers_to_nothing_outside_and_ids_are_unique(made):
