@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     """A job, its file, or a runs table and a weights table."""
 
 
-def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
-    """A job that has been read, or what is to be read."""
+def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | None]:
+    """The job with the limits of the options, and what it was read from; None: it had been read already."""
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.tables.job.job_data import Overrides
@@ -36,25 +36,23 @@ def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     stated = (options.phase, options.angles, options.amplitude_error, options.phase_error)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-        return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
+        source = JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
+        return _read(source, options), source
     if any(value is not None for value in (stored, *stated)):
         raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
-    return job
+    return limited(job, options.max_mass, options.limit), None
 
 
-def read_source(source: Job | JobSource, options: BalanceOptions) -> Job:
-    """The job, with the limits of the options."""
+def _read(source: JobSource, options: BalanceOptions) -> Job:
+    """The job of these files, with the limits of the options."""
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.job_as_written import JobSource
 
-    if isinstance(source, JobSource):
-        files, overrides = source.files, asdict(source.overrides)
-        single = len(files) == 1 and source.influence is None
-        if single and files[0].suffix.lower() in (".toml", ".xlsx"):
-            source = read_job(files[0], **overrides)
-        else:
-            source = job_from_files(files, influence=source.influence, **overrides)
-    return limited(source, options.max_mass, options.limit)
+    files, overrides = source.files, asdict(source.overrides)
+    if len(files) == 1 and source.influence is None and files[0].suffix.lower() in (".toml", ".xlsx"):
+        read = read_job(files[0], **overrides)
+    else:
+        read = job_from_files(files, influence=source.influence, **overrides)
+    return limited(read, options.max_mass, options.limit)
 
 
 def with_limits_of(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
@@ -128,7 +126,7 @@ def correct_job(
         influence,
         runs,
         planes,
-        _speeds(job, options),
+        None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit),
         refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
         method=options.method,
         limits=job.limits_of(influence.planes),
@@ -136,10 +134,6 @@ def correct_job(
         strength=options.ridge,
         remove=sorted(job.remove),
     )
-
-
-def _speeds(job: Job, options: BalanceOptions) -> list[float] | None:
-    return None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
 
 
 def with_other_conventions(
@@ -160,7 +154,7 @@ def with_other_conventions(
         overrides = replace(source.overrides, phase=other.phase, angles=other.angles)
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
-                again = read_source(replace(source, overrides=overrides), options)
+                again = _read(replace(source, overrides=overrides), options)
                 found = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue
