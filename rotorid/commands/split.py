@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rotorid.commands.option_quantities import Amount, Vector
 
 _WAYS = ("holes", "two", "drill")
-_OF_HOLES = ("first_hole", "pieces", "per_hole", "taken")
+_OF_HOLES = ("pieces", "per_hole", "taken")
 _APART, _MOST = 1e-3, 1000
 """Degrees between holes that count as one; holes at most."""
 _GOOD_ENOUGH = 0.2
@@ -35,9 +35,7 @@ class SplitOptions:
     Attributes
     ----------
     holes : N|DEG,DEG,…
-        Number of equally spaced holes, or their angles, ascending.
-    first_hole : DEG
-        Angle of hole 1 of equally spaced ones; default: 0.
+        Number of equally spaced holes from 0°, or the angles of holes, ascending.
     pieces : 10g,20g
         Available pieces; without them amounts are free.
     per_hole : N from 1
@@ -57,7 +55,6 @@ class SplitOptions:
     """
 
     holes: str | int | Sequence[float] | None = None
-    first_hole: float | None = None
     pieces: str | Sequence[float] | None = None
     per_hole: int | None = None
     taken: str | Mapping[str, float] | None = None
@@ -68,7 +65,7 @@ class SplitOptions:
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "mounted radius angles",
-        "Holes": "holes pieces per_hole first_hole taken",
+        "Holes": "holes pieces per_hole taken",
         "Instead of holes": "two drill",
     }
     to: ClassVar[Sequence[str]] = USUAL
@@ -176,7 +173,7 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
     if isinstance(given, int) or (isinstance(given, str) and given.strip().isdecimal()):
         if not 1 <= int(given) <= _MOST:
             raise ValueError(f"--holes {given}: give the number of equally spaced holes, 1 to {_MOST}")
-        angles = equal_holes(int(given), np.radians(degrees(options.first_hole or 0.0, "--first-hole")))
+        angles = equal_holes(int(given))
     else:
         angles = np.radians(_listed(given))
     taken: dict[str, str | float] = pairs(

@@ -16,7 +16,7 @@ from rotorid.base.tables import Column, Table, html
 from rotorid.base.text import figures, sentence
 from rotorid.files import units
 from rotorid.report import conventions_explained
-from rotorid.report.page import every_warning, inline_svg, render_report
+from rotorid.report.page import block, every_warning, inline_svg, render_report
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -38,8 +38,8 @@ _SOURCES = {
 }
 _HEAD = ("machine", "place", "date", "engineer", "instrument")
 _TWO, _THREE, _FOUR = (partial(figures, digits=n) for n in (2, 3, 4))
-_RUNS, LONG = 4, 10**6
-"""Runs whose readings stand side by side; rows of the longest table that stands whole."""
+LONG = 10**6
+"""Rows of the longest table that stands whole."""
 
 
 def balance_report(
@@ -111,7 +111,7 @@ def balance_report(
         readings=_readings(document, result, check),
         verdict=html(_verdict(document, labels)) if "verdict" in document else "",
         planes=_planes(result, job),
-        runs=[html(table, LONG) for table in _runs(job)],
+        runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
         trial_radii=bool(job.trial_radii),
         slow_roll=job.slow_roll is not None,
@@ -271,10 +271,8 @@ def _planes(c: Correction, job: Job) -> Markup | str:
     }
     facts: dict[str, tuple[Mapping[str, Any], Callable[[Any], str]]] = {
         "radius, mm": (job.radii, lambda radius: f"{radius * 1e3:.6g}"),
-        "of trial weights": (job.trial_radii, lambda radius: f"{radius * 1e3:.6g}"),
         f"at most, {c.labels.weight_in}": (limits["max_weight"], _FOUR),
         "holes": ({plane: len(holes.angles) for plane, holes in job.holes.items()}, str),
-        "node of the model": (job.plane_nodes, str),
         "nothing from": (arcs, str),
     }
     more = [Column(name, [of.get(p) for p in c.planes], shown) for name, (of, shown) in facts.items()]
@@ -282,19 +280,15 @@ def _planes(c: Correction, job: Job) -> Markup | str:
     return html(Table("", (Column("plane", c.planes), *more))) if more else ""
 
 
-def _runs(job: Job) -> list[Table]:
-    """Means of the readings of the runs, a few side by side."""
-    trials, tables = job.trials, []
-    labels, count = trials.labels, len(trials.speeds) * len(trials.sensors)
+def _runs(job: Job) -> Table:
+    """Means of the readings of the runs."""
+    trials, labels = job.trials, job.trials.labels
     speeds = [labels.speed_number(speed) for speed in trials.speeds for _ in trials.sensors]
-    places = [Column(labels.speed_in, speeds), Column("sensor", trials.sensors * len(trials.speeds))]
-    for k in range(0, len(trials.runs), _RUNS):
-        columns = [*places]
-        for run, readings in zip(trials.runs[k : k + _RUNS], trials.mean[k : k + _RUNS], strict=True):
-            size, phase = (part.reshape(count) for part in labels.vibration(readings))
-            columns += [Column(run, size, "{:.4g}".format), Column("at", phase, degrees)]
-        tables.append(Table("", tuple(columns)))
-    return tables
+    columns = [Column(labels.speed_in, speeds), Column("sensor", trials.sensors * len(trials.speeds))]
+    for run, readings in zip(trials.runs, trials.mean, strict=True):
+        size, phase = labels.vibration(readings.ravel())
+        columns += [Column(run, size, "{:.4g}".format), Column("at", phase, degrees)]
+    return Table("", tuple(columns))
 
 
 def _mounted_in_runs(job: Job) -> list[tuple[str, str]]:

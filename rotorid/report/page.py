@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.tables import Table, html
+from rotorid.base.tables import LONG, Table, html
 from rotorid.base.text import figures
 from rotorid.base.versions import SCHEMA_VERSION
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 WIDTH, LETTERS = 6.0, 9.0
 """Of a picture on a page: inches and points."""
-ABREAST = 9
+ABREAST = 10
 """Columns of a table that stand side by side."""
 
 
@@ -91,7 +91,7 @@ def every_warning(document: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(every))
 
 
-def block(table: Table | str) -> Markup:
+def block(table: Table | str, longest: int = LONG) -> Markup:
     """A table, those too wide in parts that repeat its first two columns; or text as it stands."""
     from markupsafe import Markup
 
@@ -99,7 +99,7 @@ def block(table: Table | str) -> Markup:
         return Markup("<pre>{}</pre>").format(table)
     first, others, step = table.columns[:2], table.columns[2:], ABREAST - 2
     parts = [(*first, *others[k : k + step]) for k in range(0, max(len(others), 1), step)]
-    return Markup("\n").join(html(Table(table.name, part, table.note)) for part in parts)
+    return Markup("\n").join(html(Table(table.name, part, table.note), longest) for part in parts)
 
 
 def drawn(draw: Callable[[], Figure], caption: str) -> Markup:
