@@ -34,7 +34,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.registry import Method, find
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import capital, listing
+from rotorid.base.text import capital, figures, listing
 from rotorid.regression import RCOND
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class Unbalance(Answered):
             replace(size, name="unbalance", shown="{:.4g}".format),
             unit,
             angle,
-            Column("std", std, lambda one: f"± {NORMAL_RADIUS * one:.2g}", "95 %"),
+            Column("std", std, lambda one: f"± {figures(NORMAL_RADIUS * one, 2)}", "95 %"),
             Column("own_share", self.own_share),
             Column("determined", self.determined),
         )

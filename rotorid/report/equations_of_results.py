@@ -13,7 +13,9 @@ from balancing import Correction
 from rotorid.base.text import counted
 from rotorid.identify import Experiments, HarmonicModel, Identification
 from rotorid.identify.combinations import CONSTANT, ONE, Monomial, Polynomial, expression, times
-from rotorid.identify.expression_functions import usual
+from rotorid.identify.expression_functions import real, usual
+from rotorid.identify.expressions import names, parse
+from rotorid.identify.ode import OdeModel
 from rotorid.identify.result_records import Fit
 from rotorid.reduction import Reduction, design
 from rotorid.regression.linear import stretch
@@ -170,7 +172,7 @@ def _sensitivities(found: Fit) -> Equations:
         slopes = [usual(f.diff(symbol)) for symbol in (*x, by)]
         return [*zip(slopes, (*S, 1), strict=True)]
 
-    rates, initial, observed = model.rates, model.initial, model.observed
+    rates, initial, observed = _as_written(model)
     for theta in thetas:
         S = [Symbol(f"∂{state}/∂{theta}") for state in x]
         for i, (s, f, start) in enumerate(zip(S, rates, initial, strict=True)):
@@ -187,3 +189,13 @@ def _sensitivities(found: Fit) -> Equations:
     return Equations(
         title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values, notes
     )
+
+
+def _as_written(model: OdeModel) -> list[list[Expression]]:
+    """Rates, initial values, outputs: with the names of the known where the model still has its own texts."""
+    groups = {"state": model.states, "initial": model.states, "output": model.outputs}
+    read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
+    written = {name for group in read for e in group for name in names(e)}
+    if {*model.parameters} <= written and not model.inertia:
+        return read
+    return [[*model.rates], [*model.initial], [*model.observed]]
