@@ -173,9 +173,8 @@ class Balance(Outcome):
         """The balancing sheet: one HTML file."""
         from rotorid.report.balance import balance_report
 
-        words = self.answer.judgement
-        made = self.result, self.mounted, self.check, self.left
-        return balance_report(self.to_dict(), made, self.job, self.provenance, words)
+        made = self.result, self.mounted, self.check, self.left, self.verdict
+        return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
 
 @command

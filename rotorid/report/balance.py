@@ -16,13 +16,14 @@ from rotorid.base.tables import Column, Table, html
 from rotorid.base.text import figures, sentence
 from rotorid.files import units
 from rotorid.report import conventions_explained
-from rotorid.report.page import block, every_warning, inline_svg, render_report
+from rotorid.report.page import block, inline_svg, render_report
 
 if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted
+    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict
+    from rotorid.base.answer import Answer
     from rotorid.tables import Job
 
     Headings = Mapping[str, tuple[str, Callable[[Any], str]]]
@@ -44,10 +45,10 @@ LONG = 10**6
 
 def balance_report(
     document: Mapping[str, Any],
-    made: tuple[Correction, Mounted | None, CheckComparison | None, LeftToDo | None],
+    made: tuple[Correction, Mounted | None, CheckComparison | None, LeftToDo | None, Verdict | None],
     job: Job,
     provenance: Mapping[str, Any],
-    judgement: str,
+    answer: Answer,
 ) -> bytes:
     """Make the sheet of a balancing job: one HTML file that needs nothing else.
 
@@ -56,13 +57,14 @@ def balance_report(
     document
         What `rotorid balance --json` prints, without its provenance; the sheet holds it.
     made
-        What it is made of: the correction, pieces in holes, check runs, what is left to do after these.
+        What it is made of: the correction, pieces in holes, check runs, what is left to do after these, what
+        limits say.
     job
         Of the correction.
     provenance
         Program version, input files with hashes, date and options.
-    judgement
-        What to do: the lines of the answer's.
+    answer
+        What to do, and warnings.
 
     Raises
     ------
@@ -71,7 +73,7 @@ def balance_report(
     """
     from balancing.plots import residual_figure
 
-    result, mounted, check, left = made
+    result, mounted, check, left, verdict = made
     labels = result.labels
     known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: known[s] for s in result.sensors if s in known}
@@ -83,9 +85,9 @@ def balance_report(
         "balance.html",
         document,
         title=f"Balancing sheet: {', '.join(filter(None, names))}",
-        warnings=[sentence(words) for words in every_warning(document)],
+        warnings=list(map(sentence, answer.warnings)),
         provenance=provenance,
-        judgement=judgement.splitlines(),
+        judgement=answer.judgement.splitlines(),
         head={**dict.fromkeys(_HEAD, ""), "machine": job.machine, "date": job.date or ""}
         | {key: value for key, value in job.sheet.items() if key in _HEAD and value},
         labels=labels,
@@ -109,7 +111,7 @@ def balance_report(
         holes="" if plain else _holes(document, labels, "mounting" if left is None else "left_to_do"),
         stays=_if_run_stays(result) if plain else "",
         readings=_readings(document, result, check),
-        verdict=html(_verdict(document, labels)) if "verdict" in document else "",
+        verdict="" if verdict is None else block("\n\n".join([verdict.answer.found, *verdict.answer.tables])),
         planes=_planes(result, job),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
@@ -246,21 +248,6 @@ def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:
     rows = [row["speed_rpm"] for row in _at(document, path)]
     values = [None if speed is None else speed * scale for speed in rows]
     return Column(labels.speed_in, values, "{:.6g}".format, f"{path}.*.speed_rpm", scale)
-
-
-def _verdict(document: Mapping[str, Any], labels: Labels) -> Table:
-    """Sizes beside their limits."""
-    path, rows = "verdict.rows", document["verdict"]["rows"]
-    what = [f"{row['kind']} {row['name']}, {row['unit'].replace('_', '·')}".rstrip(", ") for row in rows]
-    speed = [_speed(document, path, labels)] if any(row["speed_rpm"] is not None for row in rows) else []
-    numbers: Headings = {
-        "size": ("value", _THREE),
-        "low": ("95 % from", _THREE),
-        "high": ("to", _THREE),
-        "limit": ("limit", _FOUR),
-        "verdict": ("verdict", str),
-    }
-    return Table("", (Column("what", what), *speed, *_columns(document, path, numbers)))
 
 
 def _planes(c: Correction, job: Job) -> Markup | str:

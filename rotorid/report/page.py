@@ -80,17 +80,6 @@ def render_report(
     return text.encode("utf-8", "replace")  # names of files may be anything
 
 
-def every_warning(document: Mapping[str, Any]) -> list[str]:
-    """All warnings of a document and its parts, in the order of the document, each once."""
-    every: list[str] = []
-    for key, value in document.items():
-        if key == "warnings":
-            every += map(str, value)
-        elif isinstance(value, Mapping):
-            every += every_warning(value)
-    return list(dict.fromkeys(every))
-
-
 def block(table: Table | str, longest: int = LONG) -> Markup:
     """A table, those too wide in parts that repeat its first two columns; or text as it stands."""
     from markupsafe import Markup
