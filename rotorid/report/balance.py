@@ -112,7 +112,7 @@ def balance_report(
         stays=_if_run_stays(result) if plain else "",
         readings=_readings(document, result, check),
         verdict="" if verdict is None else block("\n\n".join([verdict.answer.found, *verdict.answer.tables])),
-        planes=_planes(result, job),
+        radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
         trial_radii=bool(job.trial_radii),
@@ -248,23 +248,6 @@ def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:
     rows = [row["speed_rpm"] for row in _at(document, path)]
     values = [None if speed is None else speed * scale for speed in rows]
     return Column(labels.speed_in, values, "{:.6g}".format, f"{path}.*.speed_rpm", scale)
-
-
-def _planes(c: Correction, job: Job) -> Markup | str:
-    """What is known of the planes."""
-    limits = c.limits_document() or {"max_weight": {}, "forbidden_deg": {}}
-    arcs = {
-        plane: ", ".join(f"{a:g}° to {b:g}°" for a, b in of) for plane, of in limits["forbidden_deg"].items()
-    }
-    facts: dict[str, tuple[Mapping[str, Any], Callable[[Any], str]]] = {
-        "radius, mm": (job.radii, lambda radius: f"{radius * 1e3:.6g}"),
-        f"at most, {c.labels.weight_in}": (limits["max_weight"], _FOUR),
-        "holes": ({plane: len(holes.angles) for plane, holes in job.holes.items()}, str),
-        "nothing from": (arcs, str),
-    }
-    more = [Column(name, [of.get(p) for p in c.planes], shown) for name, (of, shown) in facts.items()]
-    more = [column for column in more if any(column.texts)]
-    return html(Table("", (Column("plane", c.planes), *more))) if more else ""
 
 
 def _runs(job: Job) -> Table:

@@ -142,9 +142,8 @@ def inline_svg(figure: Figure, title: str) -> Markup:
     head = re.search(r"<svg\b[^>]*>", text, re.DOTALL)
     assert head is not None  # matplotlib always writes one
     body = text[head.end() : text.rindex("</svg>")]
-    for unwanted in (r"<metadata>.*?</metadata>", r"<style\b.*?</style>", r"<!--.*?-->"):
-        body = re.sub(unwanted, "", body, flags=re.DOTALL)
-    body = body.replace("xlink:href=", "href=")
+    unwanted = r"<metadata>.*?</metadata>|<style\b.*?</style>|<!--.*?-->|xlink:(?=href=)"
+    body = re.sub(unwanted, "", body, flags=re.DOTALL)
     prefix = "f" + hashlib.sha256((title + body).encode("utf-8", "replace")).hexdigest()[:10] + "-"
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(
