@@ -85,13 +85,13 @@ class LeftToDo(Answered):
                 f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
             ]
         elif self.word == "trim":
-            sizes, places = c.labels.weight(self.trim)[0], c.places(self.planes, self.trim)
-            do = ["take away" if plane in c.remove else "add" for plane in self.planes]
-            words = [
-                f"{do[p]} {figures(sizes[p])} {c.labels.weight_in} at {at:.1f}°"
-                for p, at in enumerate(places)
+            each = zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
+            cells = [
+                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(abs(w))} at {at:.1f}°"
+                if w
+                else "nothing"
+                for plane, w, at in each
             ]
-            cells = [word if size else "nothing" for word, size in zip(words, sizes, strict=True)]
             columns.append(Column("trim", cells, str))
         table = text(columns, left=len(columns), width=COLUMNS)
         return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]))

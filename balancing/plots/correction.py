@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 _NAMED, _SPEEDS, _LETTERS = 40, 12, 70
 """Readings that have room for the names of their sensors; speeds that have; letters of a title's line."""
-_MARK = 0.05
-"""Radius of a mark, of that of the polar picture."""
+_REGIONS = "95 % regions: closed lines, or smaller than the marks"
 
 
 def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
@@ -90,16 +89,13 @@ def weights(c: Correction, ax: Axes | None = None, check: CheckComparison | None
     polar = polar_axes(ax, labels.angles_on_paper, f"Weights on the bare rotor, {labels.weight_in}")
     largest = np.abs(c.weights).max()
     styles: dict[str, tuple[str, float]] = {}
-    reached: list[float] = []
     for p, (plane, place) in enumerate(zip(c.planes, c.places(c.planes, c.weights), strict=True)):
         name = f"{cut(plane, 24)}: {labels.weight_at(c.weights[p])}"
         name += f", or remove at {place:.1f}°" if plane in c.remove else ""
         draw_line(polar, shown, [0, c.weights[p]], lw=2, label=name, **of_plane(p))
         lines = []
         if c.region_known:
-            edge = c.region([p]).edge(181)
-            lines.append((edge, STYLES[p % 4], 1.2, "closed lines: 95 % regions"))
-            reached.append(float(np.abs(edge - c.weights[p]).max()))
+            lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, _REGIONS))
         if check is not None and plane in check.planes:
             there = check.weights[-1, check.planes.index(plane)]
             draw_line(polar, shown, [there], "o", mfc="white", ms=9, mew=1.5, color=of_plane(p)["color"])
@@ -123,8 +119,6 @@ def weights(c: Correction, ax: Axes | None = None, check: CheckComparison | None
         polar.plot([], [], "o", mfc="white", color=QUIET, label=words)
     # a region far larger than the weights would hide them: it may leave the picture
     from_zero(polar, shown, c.weights, 4 * largest * labels.weight_scale or 1.0)
-    if reached and min(reached) * labels.weight_scale < _MARK * polar.get_rmax():
-        polar.plot([], [], " ", label="a 95 % region that is not seen is smaller than its mark")
     return polar
 
 

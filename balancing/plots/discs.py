@@ -137,30 +137,19 @@ def draw_plane(
     zero
         Where 0° stands: 1 to the right, 1j at the top.
     """
-    p = c.planes.index(plane)
-    wanted, mounting, loose = complex(c.weights[p]), None, complex(c.weights[p])
+    p, mounting = c.planes.index(plane), None
+    wanted = loose = c.weights[p]
     if mounted is not None:
         holes, mounting = mounted.holes[p], mounted.discrete.mountings[p]
-        loose = 0j if mounting is not None else complex(mounted.weights[p])
+        loose = mounted.weights[p] if mounting is None else 0.0
         if mounted.on_top_of is not None:
-            wanted = complex(c.to_add[c.mounted.planes.index(plane)])
-    arcs = () if c.limits is None else c.limits.forbidden[p]
-    look: dict[str, Any] = {"remove": plane in c.remove, "forbidden": arcs, "zero": zero}
-    each = (loose,) if loose else ()
-    return draw_disc(ax, plane, holes, mounting, c.labels, weight=wanted, loose=each, **look)
-
-
-def plane_figure(
-    c: Correction,
-    plane: str,
-    mounted: Mounted | None = None,
-    holes: Holes | None = None,
-    zero: complex = 1.0,
-) -> Figure:
-    """A new small figure of one plane; see `draw_plane`."""
-    figure = new_figure(3.1, 3.4)
-    draw_plane(figure.add_subplot(), c, plane, mounted, holes, zero)
-    return figure
+            wanted = c.to_add[c.mounted.planes.index(plane)]
+    look: dict[str, Any] = {"remove": plane in c.remove, "weight": complex(wanted), "zero": zero}
+    look |= {
+        "loose": [complex(loose)] if loose else [],
+        "forbidden": c.limits.forbidden[p] if c.limits else (),
+    }
+    return draw_disc(ax, plane, holes, mounting, c.labels, **look)
 
 
 def mounted_discs(m: Mounted) -> Figure:

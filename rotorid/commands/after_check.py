@@ -11,7 +11,7 @@ from rotorid.fleet.proposals import pieces_mounted
 
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
-    from rotorid.commands.balance import BalanceOptions
+    from rotorid.commands.balance_solution import BalanceOptions
     from rotorid.tables import Job
 
 

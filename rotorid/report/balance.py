@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.tables import degrees
+from rotorid.base.plot_style import new_figure
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table, html
 from rotorid.base.text import figures, sentence
@@ -118,6 +118,11 @@ def balance_report(
         trial_radii=bool(job.trial_radii),
         slow_roll=job.slow_roll is not None,
     )
+
+
+def degrees(angle: float) -> str:
+    """An angle as text, 0 ≤ angle < 360."""
+    return f"{round(angle, 1) % 360:.1f}°"
 
 
 def _at(document: Mapping[str, Any], path: str) -> Sequence[Mapping[str, Any]]:
@@ -273,7 +278,7 @@ def _mounted_in_runs(job: Job) -> list[tuple[str, str]]:
 
 def _discs(result: Correction, job: Job, mounted: Mounted | None, left: LeftToDo | None) -> dict[str, Figure]:
     """A picture of each plane with what goes into it; none where nothing does after a check run."""
-    from balancing.plots import plane_figure
+    from balancing.plots import draw_plane
 
     zero = 1j if job.sheet.get("zero") == "top" else 1.0
     if left is not None:
@@ -283,6 +288,7 @@ def _discs(result: Correction, job: Job, mounted: Mounted | None, left: LeftToDo
         trim = np.array([add[plane] for plane in left.correction.planes])
         mounted = left.pieces
         result = left.correction if mounted else replace(left.correction, weights=trim)
-    return {
-        plane: plane_figure(result, plane, mounted, job.holes.get(plane), zero) for plane in result.planes
-    }
+    figures = {plane: new_figure(3.1, 3.4) for plane in result.planes}
+    for plane, figure in figures.items():
+        draw_plane(figure.add_subplot(), result, plane, mounted, job.holes.get(plane), zero)
+    return figures

@@ -139,7 +139,9 @@ def test_limits_arcs_and_many_readings():
     limits = Limits(max_weight=most, residual=residual, forbidden=((), ((0.5, 1.0),), ()))
     figure = correction_figure(correct(influence, limits=limits))
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {"closed lines: 95 % regions", "dashed circles: largest weights"} < set(names)
+    assert {"95 % regions: closed lines, or smaller than the marks", "dashed circles: largest weights"} < set(
+        names
+    )
     assert "thick arcs: nothing can be mounted" in names
     [arc] = [line for line in figure.axes[0].lines if line.get_linewidth() == 5 and len(line.get_xdata())]
     assert np.ptp(arc.get_xdata()) == pytest.approx(1.0)

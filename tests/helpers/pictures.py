@@ -65,7 +65,8 @@ def outcome_of(name):
 
 def figures_of(name):
     """New figures of a command, by their captions; those of a balancing sheet, too."""
-    from balancing.plots import plane_figure, residual_figure
+    from balancing.plots import draw_plane, residual_figure
+    from rotorid.base.plot_style import new_figure
 
     made = outcome_of(name)
     figures = {caption or "picture": draw() for caption, draw in made.pictures.items()}
@@ -73,9 +74,9 @@ def figures_of(name):
         figures["readings"] = residual_figure(made.result, made.mounted, made.check)
         for plane in made.result.planes:
             for where, zero in (("right", 1.0), ("top", 1j)):
-                figures[f"plane {plane}, 0° {where}"] = plane_figure(
-                    made.result, plane, made.mounted, made.job.holes.get(plane), zero
-                )
+                figure = figures[f"plane {plane}, 0° {where}"] = new_figure(3.1, 3.4)
+                holes = made.job.holes.get(plane)
+                draw_plane(figure.add_subplot(), made.result, plane, made.mounted, holes, zero)
     return figures
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from balance_sheets import DATA, hard, on_top, parts_of, sheet_of
 from golden.test_brief import FORBIDDEN
+from matplotlib.figure import Figure
 from sheets import disagreements
 
-from balancing.plots import plane_figure, residual_figure
+from balancing.plots import draw_plane, residual_figure
 
 JOBS = {
     "checked": ("turbo_job/checked.toml", {}),
@@ -123,7 +124,7 @@ def test_the_head_is_that_of_the_job(tmp_path):
     assert text.index("A. Rotor") < text.index('id="judgement"') < text.index('id="weights"')
     # 0° at the top: the mark stands there, and the wanted weight a quarter of a turn further on
     for zero, turned in ((1.0, 0.0), (1j, 90.0)):
-        ax = plane_figure(report.result, "left", zero=zero).axes[0]
+        ax = draw_plane(Figure().add_subplot(), report.result, "left", zero=zero)
         (mark,) = [complex(*line.get_xydata()[0]) for line in ax.lines]
         assert np.degrees(np.angle(mark)) == pytest.approx(turned)
         place = next(complex(*patch.center) for patch in ax.patches if patch.get_facecolor()[0] == 0.2)
@@ -216,10 +217,8 @@ def test_pieces_are_drawn_in_their_holes():
 
     _, report = parts_of(DATA / "turbo_job" / "holes.toml", split=True)
     for plane in report.result.planes:
-        drawn = plane_figure(report.result, plane, mounted=report.mounted)
-        full = [
-            p for p in drawn.axes[0].patches if isinstance(p, Circle) and p.get_facecolor()[:3] == (0.2,) * 3
-        ]
+        drawn = draw_plane(Figure().add_subplot(), report.result, plane, report.mounted)
+        full = [p for p in drawn.patches if isinstance(p, Circle) and p.get_facecolor()[:3] == (0.2,) * 3]
         rows = [row for row in report.mounted.to_dict()["holes"] if row["plane"] == plane]
         angles = sorted(np.degrees(np.angle(complex(*p.center))) % 360 for p in full)
         assert angles == pytest.approx(sorted(row["angle_deg"] for row in rows), abs=1e-6)
