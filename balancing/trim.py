@@ -85,12 +85,13 @@ class LeftToDo(Answered):
                 f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
             ]
         elif self.word == "trim":
-            each = zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
+            places = c.places(self.planes, self.trim).tolist()
+            add = zip(self.planes, self.trim.tolist(), places, strict=True)
             cells = [
                 f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(abs(w))} at {at:.1f}°"
                 if w
                 else "nothing"
-                for plane, w, at in each
+                for plane, w, at in add
             ]
             columns.append(Column("trim", cells, str))
         table = text(columns, left=len(columns), width=COLUMNS)
