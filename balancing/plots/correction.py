@@ -150,7 +150,7 @@ def amplitudes(
         label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
         ax.plot(beside, after, "o", color="black", ms=4.5, label=label)
         if check is not None:
-            ax.plot(places + 0.2, achieved, "*", color="black", ms=8, mec="white", label="achieved")
+            ax.plot(places + 0.2, achieved, "*", color="black", ms=9, mec="white", mew=0.5, label="achieved")
         elif c.limits is not None and np.isfinite(c.limits.residual).any():
             limit = c.limits.residual.ravel() * labels.vibration_scale
             ax.hlines(limit, places - 0.45, places + 0.45, color="black", lw=2.2, label="limit")
