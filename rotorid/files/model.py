@@ -297,9 +297,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
     `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
     record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
-    records has for itself. `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
-    output, with factors to be estimated for every record. Without states the outputs are functions of the
-    time.
+    records has for itself. `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several)
+    of the sensors to every output, with factors to be estimated for every record. Without states the outputs
+    are functions of the time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the

@@ -184,8 +184,8 @@ def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
     assert document["convention_test"]["verdict"] == "contradicted"
     assert document["warnings"][0].startswith("these runs contradict 'lead'")
     first = " ".join(cli("balance", job).out.partition("\n\n")[0].split())
-    assert first.startswith("Not as predicted: ")
-    assert "Take off what is mounted; the bare rotor had" in first
+    assert first.startswith("Take off what is mounted; the bare rotor had")
+    assert "Not as predicted: " in first
 
 
 def test_stored_coefficients(cli, tmp_path):

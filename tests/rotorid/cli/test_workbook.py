@@ -79,7 +79,7 @@ def test_the_form(cli, tmp_path):
         (("--template", "form.csv"), "the name must end in .xlsx"),
         (("--template", "there.xlsx"), "exists already, and may be filled in"),
         (("--template", "none/form.xlsx"), "does not exist"),
-        ((TURBO / "job.toml", "--template", "form.xlsx"), "leave the job away"),
+        ((TURBO / "job.toml", "--template", "form.xlsx"), "--template, without a job"),
         ((), "give a job"),
     ],
 )
