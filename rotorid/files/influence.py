@@ -316,6 +316,11 @@ def _document(influence: Influence) -> dict[str, Any]:
 def influence_frame(influence: Influence) -> pd.DataFrame:
     """Influence coefficients as the table that `read_influence` reads, in their units and conventions.
 
+    Parameters
+    ----------
+    influence
+        Coefficients of S speeds, C sensors and P planes.
+
     Returns
     -------
     pandas.DataFrame

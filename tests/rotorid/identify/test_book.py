@@ -147,7 +147,7 @@ def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_tho
         (("--loss", "none"), "soft_l1"),
         (("--amplitude-error", "-1"), "from 0 to 1000"),
         (("--phase-error", "-1"), "from 0 to 360"),
-        (("--phase-error", "nan"), "a finite number"),
+        (("--phase-error", "nan"), "takes a number up to"),
         (("--amplitude-error", "0"), "greater than zero"),
         (("--plot", "x.gif"), ".png, .svg, .pdf"),
     ],

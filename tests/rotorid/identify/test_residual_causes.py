@@ -135,7 +135,6 @@ def test_a_file_asks_for_nuisance_terms(tmp_path):
     assert model.parameters == ("k", "c", "offset_x", *hums)
     data = record(0, extra=HUM + 0.1)
     assert within(fit(model, [data, data]))
-    for hum, place in (("-50", "nuisance.hum_Hz"), ("[5, 5]", "hum")):
-        path.write_text(text.format(hum=hum))
-        with pytest.raises(ValueError, match=place):
-            read_ode_model(path)
+    path.write_text(text.format(hum="-50"))
+    with pytest.raises(ValueError, match=r"nuisance\.hum_Hz"):
+        read_ode_model(path)
