@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import singledispatch
 
 import numpy as np
@@ -145,14 +144,37 @@ def _(found: Reduction) -> Equations:
 
 @equations_of.register
 def _(found: Fit) -> Equations:
-    """Sensitivities, [F] (3.6), (3.7), and M θ = Y of the last step of quasilinearization, [Q] (2.28)."""
-    shown = _sensitivities(found)
-    if found.regression is None:
-        return shown
-    K, Y = found.regression
-    labels = [f"M{j + 1}" for j in range(len(found.model.parameters))]
-    title = f"{shown.title}, and M θ = Y of the last iteration, [Q] (2.28)"
-    return replace(shown, title=title, names=("M", "θ", "Y"), rows=labels, matrix=K.T @ K, right=K.T @ Y)
+    """[F] (3.6), (3.7), or of quasilinearization (2.17) to (2.28) of [Q]."""
+    return _sensitivities(found) if found.regression is None else _linear_about_last(found)
+
+
+def _linear_about_last(found: Fit) -> Equations:
+    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
+    model = found.model
+    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
+    if model.inertia:
+        raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
+    rates, _, _ = _as_written(model)
+    rows: list[Row] = []
+    for i, f in enumerate(rates):
+        rows += [Row("f_x", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in x]
+        rows += [Row("f_θ", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in thetas]
+    for i, f in enumerate(rates):
+        slopes = [usual(f.diff(by)) for by in x]
+        for j, theta in enumerate(thetas):
+            G = [Symbol(f"G{p + 1}{j + 1}") for p in range(len(x))]
+            terms = [*zip(slopes, G, strict=True), (usual(f.diff(theta)), 1)]
+            rows.append(Row("G", [(1, Symbol(f"dG{i + 1}{j + 1}/dt"))], terms))
+        D = [Symbol(f"D{p + 1}") - by for p, by in enumerate(x)]
+        known = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
+        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (known, 1)]))
+    K, Y = found.regression or (np.zeros((0, 0)), np.zeros(0))
+    labels = [f"M{j + 1}" for j in range(len(thetas))]
+    title = "x = G θ + D about the last trajectory x, θ, [Q] (2.17)–(2.24), and M θ = Y, (2.28)"
+    notes = ["G and D begin with G θ + D = x(t0); M and Y are those of the last iteration"]
+    return Equations(
+        title, rows, ("M", "θ", "Y"), labels, model.parameters, K.T @ K, K.T @ Y, found.estimate.values, notes
+    )
 
 
 def _sensitivities(found: Fit) -> Equations:

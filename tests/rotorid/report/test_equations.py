@@ -302,13 +302,21 @@ def simulated(model, n=60):
     return Record(t, dict(zip(model.outputs, found.y.T, strict=True)))
 
 
-def test_quasilinearization_shows_its_last_step():
-    """M θ = Y, [Q] (2.28), of the last iteration."""
+def test_quasilinearization_shows_its_own_equations():
+    """f_x, f_θ, G and D of [Q] (2.17) to (2.22) in symbols, and M θ = Y, (2.28), of the last iteration."""
     paths = (FIT / "quasilinearization" / name for name in ("model.toml", "record.csv"))
     options = FitOptions(method="quasilinearization", integrator="sequential-heun")
     found = fit(*paths, options)
     shown = found.equations
-    assert "∂x2/∂theta3" in " ".join(written(shown, "rate"))
+    assert "∂f1/∂x2 = theta1" in written(shown, "f_x")
+    assert "∂f2/∂theta3 = x2" in written(shown, "f_θ")
+    assert "dG23/dt = theta2·G13 + theta3·G23 + x2" in written(shown, "G")
+    x, theta = sympy.symbols("x1 x2"), sympy.symbols("theta1:4")
+    D1, D2 = sympy.symbols("D1 D2")
+    f = theta[1] * x[0] + theta[2] * x[1] + sympy.cos(sympy.Symbol("t"))
+    (row,) = [row for row in shown.symbolic if row.name == "D" and "dD2" in row.written()]
+    expected = f + theta[1] * (D1 - x[0]) + theta[2] * (D2 - x[1]) - theta[1] * x[0] - theta[2] * x[1]
+    assert sympy.simplify(side(row.right) - expected) == 0
     np.testing.assert_allclose(np.linalg.solve(shown.matrix, shown.right), found.result.values, rtol=1e-6)
 
 
