@@ -17,13 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 from rotorid.base.text import listing
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.combinations import (
+    ONE,
+    Monomial,
     Polynomial,
     only_determined,
     sum_words,
+    times,
     why_several,
 )
 from rotorid.identify.operator_model import HarmonicModel, products_of_powers
@@ -140,43 +143,69 @@ class LinearFit:
 def linear_fit(model: HarmonicModel, rows: Rows) -> LinearFit:
     """Regression of the equations, and the parameters that follow.
 
+    Unknowns that may all be multiplied by one factor, for the right sides of their rows are 0, are estimated
+    as ratios to one of them, which is 1 in the rows.
+
     Raises
     ------
     ValueError
-        If every multiple of some unknowns fits.
+        If every multiple of some unknowns fits and none of them, a single product, can be the reference.
     """
-    combos, (K, Y, *_) = model.combinations, rows
-    _check_scale(model, rows)
-    alike = len({*combos.words}) < len(combos.words)  # in six digits
-    estimate = least_squares(K, Y, names=None if alike else combos.words, rcond=RCOND)
-    picks = np.eye(K.shape[1]) if estimate.full_rank else np.array(echelon(estimate.row_space))
-    picks = picks.reshape(-1, K.shape[1])
-    matrix, spread = picks @ np.pad(combos.rows, ((0, 0), (1, 0))), estimate.solution_covariance
+    names, monomials, reasons = [*model.combinations.words], [ONE, *model.monomials], list[str]()
+    unknowns, exponents = np.pad(model.combinations.rows, ((0, 0), (1, 0))), model.exponents
+    kept, m = np.ones(len(names), dtype=bool), len(monomials)
+    for loose in _scaled_together(model, rows):
+        words = (
+            f"every multiple of {listing([names[i] for i in loose], 'and')} fits, for no known term that is "
+        )
+        words += "not zero stands in their equations"
+        reference = _reference(rows.K, loose, unknowns)
+        if reference is None:
+            raise ValueError(f"{words}: make one of them known (the others are then relative to it)")
+        reasons.append(f"{words}: no experiment of this kind tells more than ratios; make one of them known")
+        at = int(np.flatnonzero(unknowns[reference])[0])
+        ratios = np.zeros((len(unknowns), m))
+        ratios[loose] = unknowns[loose, :m] / unknowns[reference, at]
+        unknowns[loose] = 0
+        unknowns = np.hstack((unknowns, ratios))
+        exponents = np.vstack((exponents, exponents[:m] - exponents[at]))
+        inverse = tuple((name, -power) for name, power in monomials[at])
+        monomials += [times(above, inverse) for above in monomials[:m]]
+        kept[reference] = False
+        for i in loose:
+            names[i] = sum_words(_polynomial(monomials, unknowns[i]))
+    rows = rows._replace(K=rows.K[:, kept], Y=rows.Y - rows.K[:, ~kept].sum(axis=1))
+    names, unknowns = [name for name, one in zip(names, kept, strict=True) if one], unknowns[kept]
+    alike = len({*names}) < len(names)  # in six digits
+    estimate = least_squares(rows.K, rows.Y, names=None if alike else names, rcond=RCOND)
+    picks = np.eye(len(names)) if estimate.full_rank else np.array(echelon(estimate.row_space))
+    picks = picks.reshape(-1, len(names))
+    matrix, spread = picks @ unknowns, estimate.solution_covariance
     system = System(
         names=model.parameters,
-        exponents=model.exponents,
+        exponents=exponents,
         matrix=matrix,
         values=picks @ estimate.solution,
         covariance=None if spread is None else picks @ spread @ picks.T,
     )
-    words = [
-        combos.words[alone[0]] if len(alone := np.flatnonzero(pick)) == 1 else sum_words(polynomial)
-        for pick, polynomial in zip(picks, (_polynomial(model, row) for row in matrix), strict=True)
+    words_of = [
+        names[alone[0]] if len(alone := np.flatnonzero(pick)) == 1 else sum_words(_polynomial(monomials, row))
+        for pick, row in zip(picks, matrix, strict=True)
     ]
-    recovery, reasons = recover(system), list[str]()
-    for i, name in enumerate(words if not recovery.solutions else ()):
+    recovery = recover(system)
+    for i, name in enumerate(words_of if not recovery.solutions else ()):
         if name in model.parameters:
             j = model.parameters.index(name)
-            recovery.values[j], recovery.gain[j] = system.values[i], np.eye(len(words))[i]
+            recovery.values[j], recovery.gain[j] = system.values[i], np.eye(len(words_of))[i]
     if recovery.undetermined.any():
         lost = np.array(model.parameters)[recovery.undetermined].tolist()
-        reasons.append(only_determined(model.parameters, lost, words))
+        reasons.append(only_determined(model.parameters, lost, words_of))
     if not estimate.full_rank:
         reasons.append(
-            f"these experiments determine {estimate.rank} of the {K.shape[1]} combinations that the model "
+            f"these experiments determine {estimate.rank} of the {len(names)} combinations that the model "
             "could show"
         )
-    return LinearFit(estimate, rows, system, tuple(words), recovery, (*reasons, *recovery.reasons))
+    return LinearFit(estimate, rows, system, tuple(words_of), recovery, (*reasons, *recovery.reasons))
 
 
 def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
@@ -221,8 +250,8 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
     return Rows(parts[used][:, :-1], parts[used][:, -1], used.reshape(n, -1), tuple(left_out))
 
 
-def _check_scale(model: HarmonicModel, rows: Rows) -> None:
-    """Refuse unknowns that may all be multiplied by one factor, for the right sides of their rows are 0.
+def _scaled_together(model: HarmonicModel, rows: Rows) -> list[IntArray]:
+    """Groups of unknowns that may all be multiplied by one factor, for the right sides of their rows are 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
     """
@@ -232,17 +261,23 @@ def _check_scale(model: HarmonicModel, rows: Rows) -> None:
     np.logical_or.at(holds, model.equation, model.of_unknowns != 0)
     known = np.bincount(np.nonzero(rows.used)[1] // 2, rows.Y != 0, len(holds)) > 0
     count, part = connected_components(holds @ holds.T)
-    for k in range(count):
-        loose = [model.combinations.words[i] for i in np.flatnonzero(holds[part == k].any(axis=0))]
-        if loose and not known[part == k].any():
-            raise ValueError(
-                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
-                "in their equations: make one of them known (the others are then relative to it)"
-            )
+    groups = [
+        np.flatnonzero(holds[part == k].any(axis=0)) for k in range(count) if not known[part == k].any()
+    ]
+    return [group for group in groups if len(group)]
 
 
-def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
-    return {model.monomials[j - 1]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
+def _reference(K: FloatArray, group: IntArray, unknowns: FloatArray) -> int | None:
+    """The first unknown of a group that is a single product and surely not zero, if others are beside it."""
+    scale = np.linalg.norm(K[:, group], axis=0)
+    share = np.abs(np.linalg.svd(K[:, group] / np.where(scale == 0, 1.0, scale))[2][-1])
+    single = (unknowns[group] != 0).sum(axis=1) == 1
+    fit = group[single & (share > 0.1 * share.max())]
+    return int(fit[0]) if len(fit) and len(group) > 1 else None
+
+
+def _polynomial(monomials: Sequence[Monomial], row: FloatArray) -> Polynomial:
+    return {monomials[int(j)]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
 
 
 def several(solutions: Sequence[FloatArray]) -> BoolArray:
@@ -278,7 +313,7 @@ def recover(system: System) -> Recovery:
     gain[undetermined] = np.nan
     reasons = why_several(solutions, system.names, np.flatnonzero(lost & ~undetermined).tolist())
     values = np.where(lost, np.nan, solutions[0])
-    degrees = ((system.matrix != 0) * system.exponents.sum(axis=1)).max(axis=1)
+    degrees = ((system.matrix != 0) * np.abs(system.exponents).sum(axis=1)).max(axis=1)
     return Recovery(
         tuple(solutions), undetermined, values, gain, bool(degrees.prod() <= MOST), tuple(reasons)
     )

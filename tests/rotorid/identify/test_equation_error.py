@@ -155,18 +155,29 @@ def test_one_experiment_cannot_tell_stiffness_from_mass():
     assert combination.value == pytest.approx(10.0 - 0.0025 * 1000.0, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("equations", "loose"),
-    [(["(m*p**2 + c)*X = k*F"], "m, c and k"), (["(3*p**2 + c)*X = F", "(T*p + K)*Y = k*X"], "T, K and k")],
-)
-def test_equations_without_a_known_term_are_refused(equations, loose):
-    """Each multiple of their unknowns fits; regression of noisy data would give zeros."""
-    names = [name for name in ("m", "c", "T", "K", "k") if name in " ".join(equations)]
-    model = harmonic_model(equations, estimate=names)
-    given = {"F": 1.0, "X": [1.0, 0.5, 0.1], "Y": [0.2, 0.1, 0.05]}
-    data = {name: given[name] for name in model.signals}
-    with pytest.raises(ValueError, match=f"every multiple of {loose} fits.*make one of them known"):
-        identify(model, experiments(model, [1, 2, 3], data, free=False))
+def test_equations_without_a_known_term_determine_ratios():
+    model = harmonic_model(["(m*p**2 + c)*X = k*F"], estimate=["m", "c", "k"])
+    found = identify(model, experiments(model, [1, 2, 3], {"F": 1.0, "X": [1.0, 0.5, 0.1]}, free=False))
+    assert not found.identifiable
+    assert found.estimate.rank == 2
+    assert [c.words for c in found.combinations] == ["c/m", "k/m"]
+    assert "every multiple of m, c and k fits" in found.unidentifiable[0]
+    assert found.to_dict()["parameters"]["m"]["value"] is None
+
+
+def test_unknowns_of_an_equation_without_a_known_term_are_not_zero_but_undetermined():
+    """The second equation may be multiplied by any number; noisy data would give zeros for T, K and k."""
+    model = harmonic_model(["(m*p**2 + c)*X = F", "(T*p + K)*Y = k*X"], estimate=["m", "c", "T", "K", "k"])
+    w, load = np.array([1.0, 2.0, 3.0]), {"F": np.ones(3, dtype=complex)}
+    exact = model.predict(np.array([1.0, 20.0, 0.5, 2.0, 3.0]), w, load)
+    data = experiments(model, w, {**load, "X": exact["X"], "Y": np.round(exact["Y"], 3)}, free=False)
+    found = identify(model, data)
+    np.testing.assert_allclose(found.linear.recovery.values[:2], [1.0, 20.0], rtol=1e-9)
+    np.testing.assert_allclose(found.values[:2], [1.0, 20.0], rtol=5e-3)
+    assert np.isnan(found.values[2:]).all()
+    assert found.estimate.rank == 4
+    assert {c.words: round(c.value, 1) for c in found.combinations} == {"K/T": 4.0, "k/T": 6.0}
+    assert "every multiple of T, K and k fits" in found.unidentifiable[0]
 
 
 def test_free_vibration_drops_damping_and_says_so():

@@ -159,7 +159,7 @@ def test_undamped_rows_that_one_force_cannot_tell_apart():
     # without damping one force cannot tell the first row from itself plus a share of the second
     apart = [whole[0], whole[1].replace("m12", "m21").replace("k12", "k21")]
     other = harmonic_model(apart, estimate=[*names, "m21", "k21"])
-    with pytest.raises(ValueError, match="every multiple of m22, k22, m21 and k21 fits"):
-        identify(other, experiments(other, w, {"F": 1.0, **z}, free=False))
+    found = identify(other, experiments(other, w, {"F": 1.0, **z}, free=False))
+    assert not found.identifiable
     np.testing.assert_allclose(identify(model, experiments(model, w, {"F": 1.0, **z}, free=False)).values[:2],
                                [5.0, 9e3], rtol=1e-6)  # fmt: skip
