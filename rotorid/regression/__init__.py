@@ -1,6 +1,6 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
-from rotorid.regression.estimate import Estimate, coverage_factor, region_radius
+from rotorid.regression.estimate import Estimate, coverage_factor
 from rotorid.regression.linear import (
     RCOND,
     covariance_root,
@@ -24,7 +24,6 @@ __all__ = [
     "echelon",
     "gain",
     "least_squares",
-    "region_radius",
     "solution",
     "solution_and_rank",
     "stack",

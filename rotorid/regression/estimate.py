@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, rows
 from rotorid.base.text import error_figures, percent, sentence, table
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Uncertain:
@@ -42,9 +39,7 @@ class Uncertain:
     @property
     def std(self) -> FloatArray | None:
         """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
-        if self.covariance is None:
-            return None
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+        return None if self.covariance is None else np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def coverage_factor(self) -> float | None:
@@ -62,11 +57,10 @@ class Uncertain:
     @property
     def correlation(self) -> FloatArray | None:
         """Correlation matrix (n, n); None where errors are unknown."""
-        std = self.std
-        if self.covariance is None or std is None:
+        if self.covariance is None:
             return None
-        scale = np.where(std > 0, std, 1.0)
-        return np.asarray(self.covariance / np.outer(scale, scale))
+        std = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(*[np.where(std > 0, std, 1.0)] * 2))
 
 
 def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, ...]:
@@ -224,15 +218,11 @@ class Estimate(Answered, Uncertain):
             }
         )
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
-        return frame(parameter_columns(self.names, self))
-
-    def misfit(self) -> str:
-        """Words where residuals so large are improbable (0.1 %) for the stated errors; else none."""
+    def misfit(self, chance: float = 1e-3) -> str:
+        """Words where residuals so large are less probable than this for the stated errors; else none."""
         from scipy.special import chdtrc
 
-        if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > 1e-3:
+        if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > chance:
             return ""
         ratio = float(np.sqrt(self.chi_square / self.dof))
         return f"residuals are {ratio:.2g} times as large as the stated errors explain"
@@ -244,10 +234,7 @@ class Estimate(Answered, Uncertain):
 
     def told(self, at_bounds: Sequence[str] = (), why: Mapping[str, str] | None = None) -> Answer:
         """The answer with words beside parameters: that they stand at a bound, or what a prior says."""
-        notes = []
-        if self.chi_square is not None and self.dof > 0:
-            ratio = np.sqrt(self.chi_square / self.dof)
-            notes.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
+        notes = [words] if (words := self.misfit(1.0)) else []
         if self.covariance is None and self.dof <= 0:
             notes.append("no intervals: no errors are stated and there are no more equations than parameters")
         beside = {**(why or {}), **dict.fromkeys(at_bounds, "at its bound")}
@@ -273,13 +260,6 @@ def coverage_factor(dof: float | None) -> float | None:
     if dof is None:
         return float(ndtri(0.975))
     return float(stdtrit(dof, 0.975)) if dof > 0 else None
-
-
-def region_radius(dof: float | None, n: int = 2) -> float:
-    """Radius of the joint 95 % region of n numbers, in standard deviations (n = 2, stated errors: 2.448)."""
-    from scipy.special import chdtri, fdtri
-
-    return float(np.sqrt(chdtri(n, 0.05) if dof is None else n * fdtri(n, dof, 0.95)))
 
 
 def value_digits(value: float, std: float | None) -> int:

@@ -54,8 +54,6 @@ def stretch(a: ArrayLike) -> FloatArray:
            [ 2.,  1.]])
     """
     z = np.asarray(a, dtype=complex)
-    if z.ndim == 0:
-        raise ValueError("stretch takes a vector or matrices, not a number")
     if z.ndim == 1:
         return np.ascontiguousarray(z).view(np.float64)
     *more, m, n = z.shape
@@ -83,10 +81,7 @@ def unstretch(v: ArrayLike) -> ComplexArray:
     ValueError
         For another shape.
     """
-    pairs = np.ascontiguousarray(v, dtype=np.float64)
-    if not pairs.shape or pairs.shape[-1] % 2:
-        raise ValueError(f"a stretched vector has Re, Im pairs; got shape {pairs.shape}")
-    return pairs.view(np.complex128)
+    return np.ascontiguousarray(v, dtype=np.float64).view(np.complex128)
 
 
 def stack(a: ArrayLike) -> FloatArray:
@@ -105,7 +100,7 @@ def stack(a: ArrayLike) -> FloatArray:
     return np.stack((z.real, z.imag), axis=1).reshape(2 * z.shape[0], *z.shape[1:])
 
 
-def least_squares(  # noqa: PLR0915
+def least_squares(
     K: ArrayLike,
     Y: ArrayLike,
     *,
@@ -126,12 +121,11 @@ def least_squares(  # noqa: PLR0915
     names
         Of the n unknowns; default θ1, θ2, ….
     weights
-        Weight of each squared residual, ≥ 0, shape of Y; a row of weight 0 is left out. Default: 1/σ² with
-        `sigma`, else 1.
+        Weight of each squared residual, ≥ 0, shape of Y; a row of weight 0 is left out. Default: 1. Without
+        `sigma` only.
     sigma
-        Stated errors of Y: one standard deviation of each entry, shape of Y or scalar, > 0 (of real and
-        imaginary part alike, for complex Y); or the covariance matrix of the (stretched) Y, which then also
-        weights the rows.
+        Stated errors of Y, which weight the rows: one standard deviation of each entry, shape of Y or scalar,
+        > 0 (of real and imaginary part alike, for complex Y); or the covariance matrix of the (stretched) Y.
     rcond
         Scaled singular values below `rcond` times the largest count as zero.
 
@@ -155,70 +149,40 @@ def least_squares(  # noqa: PLR0915
       a              1.05   0.11   11   -0.370597   2.4706
       b              1.95  0.087  4.4     0.84961  3.05039
     """
-    A, y, labels, doubled = _real_problem(K, Y, names)
+    A, y, labels = _real_problem(K, Y, names)
     m, n = A.shape
-    row, covariance_y = _row_errors(sigma, m, doubled)
-    w = _row_weights(weights, m, doubled)
-    if covariance_y is not None:
-        if w is not None:
-            raise ValueError("give either weights or a covariance matrix of Y, not both")
-        white = np.linalg.solve(np.linalg.cholesky(covariance_y), np.column_stack((A, y)))
-        scaled_A, scaled_y, error_scale = white[:, :n], white[:, n], np.ones(m)
-    else:
-        root = np.sqrt(w) if w is not None else (1.0 / row if row is not None else np.ones(m))
-        scaled_A, scaled_y = A * root[:, None], y * root
-        # standard deviation of a weighted row: stated, or 1 (in units of s) by the meaning of weights
-        error_scale = root * row if row is not None else np.ones(m)
-
-    norms = np.linalg.norm(scaled_A, axis=0)
+    white = _whitened(np.column_stack((A, y)), weights, sigma, m // len(np.asarray(Y)))
+    white_A, white_y = white[:, :n], white[:, n]
+    norms = np.linalg.norm(white_A, axis=0)
     scale = np.where(norms > 0, norms, 1.0)
-    U, s, Vt = np.linalg.svd(scaled_A / scale, full_matrices=False)
-    rank = int(np.count_nonzero(s > rcond * s[0])) if s.size and s[0] > 0 else 0
-    pinv_rows = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
-    solution = pinv_rows @ scaled_y
+    U, s, Vt = np.linalg.svd(white_A / scale, full_matrices=False)
+    rank = int(np.count_nonzero(s > rcond * s[0])) if s[0] > 0 else 0
+    inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
+    x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
-    solution = solution + pinv_rows @ (scaled_y - scaled_A @ solution)
-    residuals = y - A @ solution
-    weighted = scaled_y - scaled_A @ solution
-
-    active = m if w is None else int(np.count_nonzero(w))
-    dof = active - rank
-    stated = row is not None or covariance_y is not None
-    spread = pinv_rows * error_scale
+    x = x + inverse @ (white_y - white_A @ x)
+    left = white_y - white_A @ x
+    chi_square, stated = float(left @ left), sigma is not None
+    dof = (m if weights is None else int(np.count_nonzero(white.any(axis=1)))) - rank
     covariance: FloatArray | None = None
-    if stated:
-        covariance = spread @ spread.T
-    elif dof > 0:
-        covariance = spread @ spread.T * float(weighted @ weighted) / dof
-    chi_square: float | None = None
-    if stated:
-        used = error_scale > 0
-        chi_square = float(np.sum((weighted[used] / error_scale[used]) ** 2))
-
-    row_space = Vt[:rank] * scale
-    values, full_covariance = solution.copy(), covariance
-    if rank < n:
-        null = _null_share(Vt[:rank])
-        lost = null > WORD_TOLERANCE
-        values[lost] = np.nan
-        if covariance is not None:
-            covariance = covariance.copy()
-            covariance[lost, :] = covariance[:, lost] = np.nan
-    condition = float(s[0] / s[-1]) if rank == n and m >= n else float("inf")
+    if stated or dof > 0:
+        covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof)
+    # length of each unit vector's part outside the row space
+    lost = np.linalg.norm(np.eye(n) - Vt[:rank].T @ Vt[:rank], axis=0) > WORD_TOLERANCE
     return Estimate(
         names=labels,
-        values=values,
-        solution=solution,
-        covariance=covariance,
-        residuals=residuals,
+        values=np.where(lost, np.nan, x),
+        solution=x,
+        covariance=None if covariance is None else np.where(lost[:, None] | lost, np.nan, covariance),
+        residuals=y - A @ x,
         dof=dof,
         rank=rank,
-        condition_number=condition,
+        condition_number=float(s[0] / s[-1]) if rank == n else float("inf"),
         singular_values=s,
         errors_stated=stated,
-        chi_square=chi_square,
-        row_space=row_space,
-        solution_covariance=full_covariance,
+        chi_square=chi_square if stated else None,
+        row_space=Vt[:rank] * scale,
+        solution_covariance=covariance,
     )
 
 
@@ -287,63 +251,37 @@ def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
 
 def _real_problem(
     K: ArrayLike, Y: ArrayLike, names: Sequence[str] | None
-) -> tuple[FloatArray, FloatArray, tuple[str, ...], bool]:
+) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """The equations, real, and names of their unknowns."""
     A, y = np.asarray(K), np.asarray(Y)
-    if A.ndim != 2 or y.ndim != 1 or A.shape[0] != y.shape[0]:
-        raise ValueError(f"K must be (m, n) and Y (m,); got {A.shape} and {y.shape}")
-    if 0 in A.shape:
-        raise ValueError(f"there is nothing to estimate: K has shape {A.shape}")
+    if A.ndim != 2 or A.shape[:1] != y.shape or 0 in A.shape:
+        raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
     n = A.shape[1]
     labels = tuple(names) if names is not None else tuple(f"θ{i + 1}" for i in range(n))
     if len(labels) != n or len(set(labels)) != n:
         raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
-    doubled = np.iscomplexobj(A) or np.iscomplexobj(y)
-    if doubled:
+    if np.iscomplexobj(A) or np.iscomplexobj(y):
         A, y = stretch(A), stretch(y)
         labels = tuple(f"{part} {name}" for name in labels for part in ("Re", "Im"))
     A, y = A.astype(np.float64), y.astype(np.float64)
     if not (np.isfinite(A).all() and np.isfinite(y).all()):
-        raise ValueError("K and Y must be finite; found NaN or infinity")
-    return A, y, labels, doubled
+        raise ValueError("K and Y must be finite")
+    return A, y, labels
 
 
-def _row_errors(
-    sigma: ArrayLike | None, m: int, doubled: bool
-) -> tuple[FloatArray | None, FloatArray | None]:
-    if sigma is None:
-        return None, None
-    s = np.asarray(sigma, dtype=np.float64)
-    if not np.isfinite(s).all():
-        raise ValueError("the stated errors must be finite")
-    if s.ndim == 2:
-        if s.shape != (m, m):
-            raise ValueError(f"the covariance of Y must have shape ({m}, {m}); got {s.shape}")
-        return None, s
-    row = _per_row(s, m, doubled, "sigma")
-    if (row <= 0).any():
-        raise ValueError("every stated error must be greater than zero")
-    return row, None
-
-
-def _row_weights(weights: ArrayLike | None, m: int, doubled: bool) -> FloatArray | None:
-    if weights is None:
-        return None
-    w = _per_row(np.asarray(weights, dtype=np.float64), m, doubled, "weights")
-    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise ValueError("weights must be finite, not negative, and not all zero")
-    return w
-
-
-def _per_row(values: FloatArray, m: int, doubled: bool, what: str) -> FloatArray:
-    if values.ndim == 0:
-        return np.full(m, float(values))
-    expanded = np.repeat(values, 2) if doubled else values
-    if expanded.shape != (m,):
-        raise ValueError(f"{what} must have one entry per row of Y; got shape {values.shape}")
-    return expanded
-
-
-def _null_share(rows: FloatArray) -> FloatArray:
-    """Length of each unit vector's part outside the row space (n,), from orthonormal rows."""
-    n = rows.shape[1]
-    return np.asarray(np.linalg.norm(np.eye(n) - rows.T @ rows, axis=0))
+def _whitened(rows: FloatArray, weights: ArrayLike | None, sigma: ArrayLike | None, parts: int) -> FloatArray:
+    """Rows (m, n + 1) of equal weight; each entry of Y stands in so many `parts`."""
+    if weights is None and sigma is None:
+        return rows
+    if weights is not None and sigma is not None:
+        raise ValueError("give either weights or errors of Y, not both")
+    each = np.asarray(weights if sigma is None else sigma, dtype=np.float64)
+    m, lowest = len(rows), each.min(initial=np.inf)
+    if not np.isfinite(each).all() or (each.ndim < 2 and (lowest < 0 or (sigma is not None and lowest == 0))):
+        raise ValueError("errors must be finite and greater than zero, weights finite and not negative")
+    if each.ndim == 2 and each.shape == (m, m) and sigma is not None:
+        return np.asarray(np.linalg.solve(np.linalg.cholesky(each), rows))
+    if each.ndim > 1 or (each.ndim and len(each) * parts != m):
+        raise ValueError(f"weights and errors need one entry per row of Y, {m // parts}; got {each.shape}")
+    each = np.broadcast_to(np.repeat(each, parts) if each.ndim else each, m)
+    return np.asarray(rows * (np.sqrt(each) if sigma is None else 1.0 / each)[:, None])

@@ -20,7 +20,7 @@ from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.prior import Prior
 from rotorid.regression.robust import LOSSES
-from rotorid.regression.search import Function, Search, drive, inside, polish
+from rotorid.regression.search import Function, Search, inside
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
@@ -91,11 +91,8 @@ class NonlinearEstimate:
     @property
     def end_warnings(self) -> tuple[str, ...]:
         """What a user must know of the end of the search before trusting the numbers."""
-        found = [] if self.converged else [self.message]
-        found += [self.bound_warning] if self.at_bounds else []
-        if self.converged and not self.estimate.full_rank:
-            found.append(self.estimate.describe_rank())
-        return tuple(found)
+        rank = self.estimate.describe_rank() if self.converged and not self.estimate.full_rank else ""
+        return tuple(filter(None, ("" if self.converged else self.message, self.bound_warning, rank)))
 
 
 def nonlinear_least_squares(  # noqa: PLR0913
@@ -173,20 +170,20 @@ def nonlinear_least_squares(  # noqa: PLR0913
         if loss != "linear":
             raise ValueError("a prior or a ridge needs --loss linear: a robust loss would discount it, too")
         residual, jacobian = prior.beside(residual, jacobian)
-    search = Search(residual, jacobian, loss)
-    left = False
-    if near and loss == "linear":
-        x, judged, left = polish(search, first, lower, upper, labels, sigma_stated)
-        ok, why = True, ""
+    search = Search(labels, residual, jacobian, lower, upper, sigma_stated)
+    x, ended, left = first, near and loss == "linear", False
+    if ended:
+        x, judged, left = search.polish(first)
     if not left:
-        search.path.clear()
-        search.costs.clear()
-        x, ok, why = drive(search, first, lower, upper, loss, sigma_stated, max_iterations)
-        x, judged, left = polish(search, x, lower, upper, labels, sigma_stated)
-    converged = ok and left
-    if ok and not left:
+        x, ended = search.drive(first, loss, max_iterations)
+        x, judged, left = search.polish(x)
+    converged = ended and left
+    if not ended:
+        tried = counted(max_iterations, "evaluation")
+        why = f"not converged after {tried}: raise max_iterations or start nearer"
+    elif not left:
         why = "the minimum was not reached: the last step is not yet small"
-    elif converged:
+    else:
         why = f"converged in {counted(len(search.path) - 1, 'iteration')}"
     if not converged:
         judged = replace(judged, covariance=None, solution_covariance=None)
