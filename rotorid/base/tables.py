@@ -1,4 +1,4 @@
-"""Tables of results, told once: named columns, and one writer each for terminal, CSV, Excel, HTML and pandas.
+"""Tables of results, told once: named columns, and one writer each for terminal, CSV, HTML and pandas.
 
 >>> speeds = Table(
 ...     "critical speeds",
@@ -26,7 +26,6 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.json import cell
@@ -165,52 +164,12 @@ def csv(table: Table) -> bytes:
     return csv_bytes([table.note] if table.note else [], table.headings, table.rows)
 
 
-def excel(*tables: Table) -> bytes:
-    """A workbook (.xlsx) with a sheet for each table."""
-    import openpyxl
-    from openpyxl.packaging.custom import IntProperty
-    from openpyxl.styles import Font
-
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    book.properties.creator = "rotorid"
-    book.properties.created = book.properties.modified = now().replace(tzinfo=None)
-    book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
-    for table in tables:
-        sheet = book.create_sheet(table.name[:LONGEST_TITLE])
-        above = [(f"# {table.note}",)] if table.note else []
-        for number, row in enumerate([*above, table.headings, *table.rows], start=1):
-            for place, value in enumerate(row, start=1):
-                written = sheet.cell(number, place)
-                if isinstance(value, str):
-                    written.value = one_line(value)
-                    written.data_type = "s"  # never a formula
-                else:
-                    written.value = value
-        for written in sheet[len(above) + 1]:
-            written.font = Font(bold=True)
-        sheet.freeze_panes = f"A{len(above) + 2}"
-    return workbook_bytes(book)
-
-
 def workbook_bytes(book: Any) -> bytes:  # noqa: ANN401
-    """A workbook as a file; no temporary files are made, which a full disk would break off."""
-    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
-    from openpyxl.worksheet._writer import WorksheetWriter
+    """A workbook as a file, the same bytes for the same cells and date."""
     from openpyxl.writer.excel import ExcelWriter
 
-    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
-        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
-            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
-            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
-            writer = WorksheetWriter(ws, part)
-            writer.write()
-            ws._rels = writer._rels
-            self._archive.writestr(ws.path[1:], part.getvalue())
-            self.manifest.append(ws)
-
     stream = io.BytesIO()
-    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
+    ExcelWriter(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
     return stream.getvalue()
 
 
@@ -237,47 +196,42 @@ def html(table: Table, longest: int = LONG) -> Markup:
     count = len(table.columns[0].values)
     rows = evenly(count, count if count <= longest else THINNED)
     notes = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
-    shown = [[column.heading, *(text or NOTHING for text in column.texts)] for column in table.columns]
-    wide = len(shown) > NARROW or sum(max(map(len, texts)) for texts in shown) > LETTERS
-    numbers = [Markup("") if column.words else Markup(' class="n"') for column in table.columns]
-    heads = Markup("").join(
-        Markup("<th{}>{}</th>").format(*pair) for pair in zip(numbers, table.headings, strict=True)
-    )
-    cells = [
-        [
-            Markup('<td{} data-label="{}">{}</td>').format(number, column.heading, text)
-            for text in _cells(column, rows)
-        ]
-        for number, column in zip(numbers, table.columns, strict=True)
-    ]
-    body = Markup("\n").join(
-        Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*cells, strict=True)
-    )
-    kind = Markup(' class="blocks"') if wide else Markup("")
     words = " ".join(filter(None, notes))
-    note = Markup('\n<p class="note">{}</p>').format(words) if words else Markup("")
-    caption = Markup("<caption>{}</caption>\n").format(table.name) if table.name else ""
-    return Markup("<table{}>\n{}<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>{}").format(
-        kind, caption, heads, body, note
-    )
+    heads, cells = [], []
+    for column in table.columns:
+        kind = {} if column.words else {"class": "n"}
+        heads.append(_tag("th", column.heading, kind))
+        kind |= {"data-label": column.heading}
+        texts = column.texts
+        cells.append([_tag("td", _number(column, row, texts[row] or NOTHING), kind) for row in rows])
+    letters = sum(max(map(len, (column.heading, *column.texts))) for column in table.columns)
+    wide = len(heads) > NARROW or letters > LETTERS
+    return _tag(
+        "table",
+        Markup("\n{}{}\n<tbody>\n{}\n</tbody>\n").format(
+            _tag("caption", table.name, {}) + "\n" if table.name else "",
+            _tag("thead", _tag("tr", Markup("").join(heads), {}), {}),
+            Markup("\n").join(_tag("tr", Markup("").join(row), {}) for row in zip(*cells, strict=True)),
+        ),
+        {"class": "blocks"} if wide else {},
+    ) + ("\n" + _tag("p", words, {"class": "note"}) if words else "")
 
 
-def _cells(column: Column, rows: Sequence[int]) -> list[Markup]:
-    from markupsafe import Markup, escape
+def _tag(name: str, content: str, attributes: Mapping[str, str]) -> Markup:
+    from markupsafe import Markup
 
-    shown = column.texts
-    texts = [shown[row] or NOTHING for row in rows]
+    each = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in attributes.items())
+    return Markup("<{0}{1}>{2}</{0}>").format(name, each, content)
+
+
+def _number(column: Column, row: int, text: str) -> str:
+    """A cell; a number with its place in the document."""
     if column.words:
-        return [escape(text) for text in texts]
-    texts = [text.replace("-", "\N{MINUS SIGN}") for text in texts]
-    if not column.key:
-        return [escape(text) for text in texts]
-    factor = Markup("") if column.scale == 1.0 else Markup(' data-scale="{}"').format(repr(column.scale))
-    places = [column.key.replace("*", str(row)) for row in rows]
-    return [
-        Markup('<span data-key="{}"{}>{}</span>').format(place, factor, text)
-        for place, text in zip(places, texts, strict=True)
-    ]
+        return text
+    text = text.replace("-", "\N{MINUS SIGN}")
+    scale = {} if column.scale == 1.0 else {"data-scale": repr(column.scale)}
+    key = column.key.replace("*", str(row))
+    return _tag("span", text, {"data-key": key, **scale}) if key else text
 
 
 def frame(table: Table) -> pd.DataFrame:
@@ -285,11 +239,6 @@ def frame(table: Table) -> pd.DataFrame:
     import pandas as pd
 
     return pd.DataFrame({column.heading: list(column.values) for column in table.columns})
-
-
-def file_bytes(path: Path, table: Table) -> bytes:
-    """What a file of this name (.csv or .xlsx) holds."""
-    return excel(table) if path.suffix.lower() == ".xlsx" else csv(table)
 
 
 def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:

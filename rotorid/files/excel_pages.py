@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from rotorid.base.tables import workbook_bytes
+from rotorid.base.tables import LONGEST_TITLE, Table, workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.files.cells import BadCell, Cell, Shown
 
@@ -64,6 +64,15 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
         sheet.sheet_view.tabSelected = page.title == shown
     book.active = book.sheetnames.index(shown)
     return workbook_bytes(book)
+
+
+def tables_bytes(*tables: Table) -> bytes:
+    """A workbook (.xlsx) with a page for each table; a note stands above the header."""
+    pages = []
+    for table in tables:
+        notes = [(f"# {table.note}",)] if table.note else []
+        pages.append(Page(table.name[:LONGEST_TITLE], [*notes, tuple(table.headings), *table.rows]))
+    return book_bytes(pages, pages[0].title)
 
 
 def keep_cells(book: Any) -> None:  # noqa: ANN401

@@ -161,7 +161,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     if first.shape != (n,) or n == 0 or len(set(labels)) != n or not np.isfinite(first).all():
         raise ValueError(f"{n} different names need as many finite starting values; got {list(first)}")
     find(LOSSES, loss, "loss")
-    lower, upper = _limits(bounds, labels)
+    lower, upper = _limits(bounds or {}, labels)
     first = inside(first, lower, upper)
     r0 = np.asarray(residual(first), dtype=np.float64)
     if r0.ndim != 1 or not np.isfinite(r0).all():
@@ -199,14 +199,13 @@ def nonlinear_least_squares(  # noqa: PLR0913
     )
 
 
-def _limits(bounds: Bounds | None, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    for name, (low, high) in (bounds or {}).items():
-        if name not in names:
-            raise ValueError(f"bounds are given for {name!r}, which is not estimated: {', '.join(names)}")
-        i = names.index(name)
-        lower[i] = -np.inf if low is None else low
-        upper[i] = np.inf if high is None else high
-        if not lower[i] < upper[i]:
-            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low}, {high}")
+def _limits(bounds: Bounds, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper bounds (n,), infinite where there are none."""
+    if others := bounds.keys() - {*names}:
+        raise ValueError(f"bounds are given for {min(others)!r}, which is not estimated: {', '.join(names)}")
+    limits = np.array([bounds.get(name, (None, None)) for name in names], dtype=float)
+    lower, upper = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
+    for name, low, high in zip(names, lower, upper, strict=True):
+        if not low < high:
+            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low:g}, {high:g}")
     return lower, upper

@@ -125,11 +125,8 @@ class PriorEffect:
     def warnings(self) -> tuple[str, ...]:
         """The prior that all the rest contradicts most; that a ridge has no intervals."""
         if self.rows.ridge:
-            (rms, rms_now), (condition, now) = self.residual_rms, self.condition_numbers
             return (
-                f"--ridge {self.rows.ridge:g} biases the estimate by nobody knows how much: no intervals. "
-                f"Residual rms {rms_now:.3g}, condition number {now:.3g}; without it, linearised, {rms:.3g} "
-                f"and {condition:.3g}",
+                f"--ridge {self.rows.ridge:g} biases the estimate by nobody knows how much: no intervals",
             )
         far = np.nan_to_num(np.abs(self.away))
         i = int(np.argmax(far / self.limit))
@@ -156,17 +153,19 @@ class PriorEffect:
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
-        numbers = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
+        numbers = np.transpose([self.rows.value, self.rows.std, self.share, self.away])
         keys = ("value", "std", "data_share", "deviation")
-        each = (dict(zip(keys, four, strict=True)) for four in numbers)
-        told = {
+        part = {
             "lambda": self.rows.ridge or None,
-            "parameters": dict(zip(self.rows.own, each, strict=True)),
+            "parameters": {
+                name: dict(zip(keys, row, strict=True))
+                for name, row in zip(self.rows.own, numbers, strict=True)
+            },
             "data_alone": self.alone or None,
             "condition_number": dict(zip(("without", "with"), self.condition_numbers, strict=True)),
             "residual_rms": dict(zip(("without", "with"), self.residual_rms, strict=True)),
         }
-        return plain({"ridge" if self.rows.ridge else "prior": told})
+        return plain({"ridge" if self.rows.ridge else "prior": part})
 
 
 def effect(

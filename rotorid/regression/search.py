@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -158,15 +159,12 @@ class Search:
 
 def together(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
     """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
-    last: dict[bytes, tuple[AnyArray, ...]] = {}
 
-    def at(x: FloatArray) -> tuple[AnyArray, ...]:
-        if (key := x.tobytes()) not in last:
-            last.clear()
-            last[key] = both(x)
-        return last[key]
+    @lru_cache(maxsize=1)
+    def at(numbers: bytes) -> tuple[AnyArray, ...]:
+        return both(np.frombuffer(numbers))
 
-    return lambda x: at(x)[0], lambda x: at(x)[1]
+    return lambda x: at(x.tobytes())[0], lambda x: at(x.tobytes())[1]
 
 
 def search_from(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import COLUMNS, LINES, Answer, Answered
-from rotorid.base.tables import Column, Table, file_bytes, frame, terminal
+from rotorid.base.tables import Column, Table, csv, frame, terminal
 from rotorid.base.text import capital, listing
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.report.options import changed, checked, plain
@@ -130,7 +130,13 @@ class Outcome(Answered):
     def written(self, path: Path, option: str = "") -> Written:
         """What `--output`, or another option, writes to a file of this name."""
         build = self.files.get(option or path.suffix.lower())
-        return file_bytes(path, self.table()) if build is None else build(path)
+        if build is not None:
+            return build(path)
+        if path.suffix.lower() != ".xlsx":
+            return csv(self.table())
+        from rotorid.files.excel_pages import tables_bytes
+
+        return tables_bytes(self.table())
 
     def figure(self) -> Figure:
         """The main picture; ValueError where there is none."""
