@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,21 +60,7 @@ def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
     return array
 
 
-class Attached(Protocol):
-    """Anything with a node and a name."""
-
-    @property
-    def node(self) -> int:
-        """Node number, from 1."""
-        ...
-
-    @property
-    def name(self) -> str:
-        """For messages."""
-        ...
-
-
-def attachment(item: Attached) -> str:
+def attachment(item: Any) -> str:  # noqa: ANN401  all that has a node and a name
     """Check the node of something attached to a rotor; returns "disc 'wheel' at node 3" for messages."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(item).__name__).lower()
     what = words + (f" {item.name!r}" if item.name else "")

@@ -59,10 +59,9 @@ def numbered(name: str, values: NDArray[Any]) -> tuple[Column, ...]:
 
 def rows(columns: Sequence[Column]) -> list[dict[str, Any]]:
     """One dict a row, of JSON types."""
-    cells = [cell(column.values) for column in columns]
-    return [
-        dict(zip((column.name for column in columns), row, strict=True)) for row in zip(*cells, strict=True)
-    ]
+    names = [column.name for column in columns]
+    cells = (cell(column.values) for column in columns)
+    return [dict(zip(names, row, strict=True)) for row in zip(*cells, strict=True)]
 
 
 def frame(columns: Sequence[Column]) -> pd.DataFrame:
@@ -74,13 +73,9 @@ def frame(columns: Sequence[Column]) -> pd.DataFrame:
 
 def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
     """The columns that are printed, all but the first `left` aligned to the right; nothing stays blank."""
-    printed = [
-        [column.name if column.title is None else column.title, *map(_shown(column.shown), column.values)]
-        for column in columns
-        if column.shown is not None
-    ]
+    printed = []
+    for each in columns:
+        if (shown := each.shown) is not None:
+            cells = ["" if value is None or value != value else shown(value) for value in each.values]
+            printed.append([each.name if each.title is None else each.title, *cells])
     return table([list(row) for row in zip(*printed, strict=True)], left, width)
-
-
-def _shown(shown: Callable[[Any], str]) -> Callable[[Any], str]:
-    return lambda value: "" if value is None or value != value else shown(value)

@@ -11,18 +11,12 @@ _S = TypeVar("_S", bound=str)
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
     """The known name nearest to a misspelt one, or None."""
-    names = list(known)
-    folded = {candidate.casefold(): candidate for candidate in reversed(names)}
-    longer = next(
-        (candidate for candidate in names if candidate.casefold().startswith(f"{name.casefold()}_")), None
-    )
-    if longer is not None:
-        return longer  # only the unit is missing
-    close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
-    if close:
-        return folded[close[0]]
-    begun = [candidate for candidate in folded if len(name) > 2 and candidate.startswith(name.casefold())]
-    return folded[begun[0]] if len(begun) == 1 else None
+    word, names = name.casefold(), {each.casefold(): each for each in reversed([*known])}
+    unit_missing = [each for each in names if each.startswith(f"{word}_")][-1:]
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    begun = [each for each in names if len(name) > 2 and each.startswith(word)]
+    nearest = unit_missing or close or begun
+    return names[nearest[0]] if nearest and (nearest is not begun or len(begun) == 1) else None
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

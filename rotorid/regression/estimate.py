@@ -63,43 +63,43 @@ class Uncertain:
         return np.asarray(self.covariance / np.outer(*[np.where(std > 0, std, 1.0)] * 2))
 
 
-def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, ...]:
+def parameter_columns(names: Sequence[str], numbers: Uncertain) -> tuple[Column, ...]:
     """Parameter, value, std and the 95 % interval: one row a parameter, NaN where unknown."""
     unknown = np.full(len(names), np.nan)
-    std, ci95 = found.std, found.ci95
+    std, ci95 = numbers.std, numbers.ci95
     low, high = (unknown, unknown) if ci95 is None else ci95.T
     return (
         Column("parameter", names),
-        Column("value", found.values),
+        Column("value", numbers.values),
         Column("std", unknown if std is None else std),
         Column("ci95_low", low),
         Column("ci95_high", high),
     )
 
 
-def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str]) -> str:
+def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, str]) -> str:
     """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
-    for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, found)), strict=True):
+    for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, numbers)), strict=True):
         digits = value_digits(value, std)
-        numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
+        texts = [f"{x:.{digits}g}" for x in (value, *ends)]
         share = percent(std / abs(value)) if value else ""
         reason = "" if np.isnan(value) else why.get(name, "")
         error = "" if np.isnan(std) else error_figures(std)
-        cells = [name, numbers[0], error, share, *numbers[1:], reason]
+        cells = [name, texts[0], error, share, *texts[1:], reason]
         lines.append(["" if cell == "nan" else cell for cell in cells])
-    told = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    shown = table([list(line) for line in zip(*told, strict=True)], width=COLUMNS).splitlines()
-    blank = {k: name for k, name in enumerate(names, 1) if np.isnan(found.values[k - 1])}
+    filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
+    shown = table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS).splitlines()
+    blank = {k: name for k, name in enumerate(names, 1) if np.isnan(numbers.values[k - 1])}
     place = max((len(shown[k].rstrip()) for k in blank), default=0)
     for k, name in blank.items():  # the words stand beside the name, where a number would begin
         shown[k] = f"{shown[k].rstrip():<{place}}  {why.get(name, 'not determined')}"
     return "\n".join(shown)
 
 
-def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
+def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
-    table = rows(parameter_columns(names, found))
+    table = rows(parameter_columns(names, numbers))
     return {
         row["parameter"]: {
             "value": row["value"],
@@ -191,10 +191,10 @@ class Estimate(Answered, Uncertain):
             n, condition = len(self.names), self.condition_number
             who = "the parameter is" if n == 1 else f"all {n} parameters are"
             return f"{who} determined (condition number {condition:.3g})"
-        known = [n for n in self.names if n not in self.undetermined]
-        known += [c.words for c in self.combinations]
-        verb = "is" if len(known) == 1 else "are"
-        seen = f"only {' and '.join(known)} {verb} determined" if known else "nothing is determined"
+        determined = [n for n in self.names if n not in self.undetermined]
+        determined += [c.words for c in self.combinations]
+        verb = "is" if len(determined) == 1 else "are"
+        seen = f"only {' and '.join(determined)} {verb} determined" if determined else "nothing is determined"
         missing = ", ".join(self.undetermined)
         one = "itself is" if len(self.undetermined) == 1 else "themselves are"
         return f"{seen}; {missing} by {one} not (rank {self.rank} of {len(self.names)})"
@@ -238,9 +238,9 @@ class Estimate(Answered, Uncertain):
         if self.covariance is None and self.dof <= 0:
             notes.append("no intervals: no errors are stated and there are no more equations than parameters")
         beside = {**(why or {}), **dict.fromkeys(at_bounds, "at its bound")}
-        found = [parameter_text(self.names, self, beside)]
-        found += [f"  {c.line()}" for c in self.combinations]
-        return Answer(sentence(self.describe_rank()), "\n".join(found), notes=tuple(notes))
+        lines = [parameter_text(self.names, self, beside)]
+        lines += [f"  {c.line()}" for c in self.combinations]
+        return Answer(sentence(self.describe_rank()), "\n".join(lines), notes=tuple(notes))
 
 
 def coverage_factor(dof: float | None) -> float | None:

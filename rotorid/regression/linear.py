@@ -237,8 +237,8 @@ def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tu
     K = np.asarray(A)
     size = np.linalg.norm(K, axis=0)
     scale = np.where(size > 0, size, 1.0)
-    found, _, rank, _ = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)
-    return (found.T / scale).T, int(rank)
+    x, _, rank, _ = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)
+    return (x.T / scale).T, int(rank)
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
@@ -277,8 +277,11 @@ def _whitened(rows: FloatArray, weights: ArrayLike | None, sigma: ArrayLike | No
         raise ValueError("give either weights or errors of Y, not both")
     each = np.asarray(weights if sigma is None else sigma, dtype=np.float64)
     m, lowest = len(rows), each.min(initial=np.inf)
-    if not np.isfinite(each).all() or (each.ndim < 2 and (lowest < 0 or (sigma is not None and lowest == 0))):
-        raise ValueError("errors must be finite and greater than zero, weights finite and not negative")
+    good = np.isfinite(each).all() and each.any()
+    if not good or (each.ndim < 2 and (lowest < 0 or (sigma is not None and lowest == 0))):
+        raise ValueError(
+            "errors must be finite and greater than zero, weights finite, not negative, not all 0"
+        )
     if each.ndim == 2 and each.shape == (m, m) and sigma is not None:
         return np.asarray(np.linalg.solve(np.linalg.cholesky(each), rows))
     if each.ndim > 1 or (each.ndim and len(each) * parts != m):

@@ -144,12 +144,12 @@ class PriorEffect:
         with_it = f"With the {which} {words[0].lower()}{words[1:]}"
         return f"{with_it}\nWithout it {self.alone}." if self.alone else words
 
-    def apart(self, found: Estimate, *, stated: bool) -> Estimate:
+    def apart(self, estimate: Estimate, *, stated: bool) -> Estimate:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         if self.rows.ridge:
-            found = replace(found, covariance=None, solution_covariance=None)
+            estimate = replace(estimate, covariance=None, solution_covariance=None)
         chi_square = float(self.best @ self.best) if stated else None
-        return replace(found, errors_stated=stated, chi_square=chi_square, dof=len(self.best) - self.rank)
+        return replace(estimate, errors_stated=stated, chi_square=chi_square, dof=len(self.best) - self.rank)
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""

@@ -73,18 +73,18 @@ def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomE
     together, `group` (J,) the number of its group, from 0 without gaps.
     """
     jobs, n = np.bincount(group), y.shape[1]
-    groups, own = np.zeros((len(jobs), n)), np.zeros((len(jobs), *error.shape[1:]))
+    groups, errors = np.zeros((len(jobs), n)), np.zeros((len(jobs), *error.shape[1:]))
     np.add.at(groups, group, y / jobs[group, None])
-    np.add.at(own, group, error / jobs[group, None, None, None] ** 2)
+    np.add.at(errors, group, error / jobs[group, None, None, None] ** 2)
     within, several = np.zeros((n, n)), jobs[group] > 1
     if several.any():
         dof = int(several.sum() - (jobs > 1).sum())
         left = np.tensordot(1 - 1 / jobs[group], error, 1) / dof
         within = _without(shrunk((y - groups[group])[several], dof), _in_blocks(left))
     mean = groups.mean(axis=0)
-    left = _in_blocks(own.mean(axis=0)) + within * np.mean(1 / jobs)
+    left = _in_blocks(errors.mean(axis=0)) + within * np.mean(1 / jobs)
     between = _without(shrunk(groups - mean, len(jobs) - 1), left)
-    return RandomEffects(mean, between, within, groups, own, jobs)
+    return RandomEffects(mean, between, within, groups, errors, jobs)
 
 
 def shrunk(off: FloatArray, dof: int) -> FloatArray:
@@ -161,15 +161,15 @@ def _distances(
     y: FloatArray, error: FloatArray, group: IntArray, inside: BoolArray, folds: int
 ) -> FloatArray:
     """Squared distance of each job from those inside, its group's own fold left out if there are several."""
-    found = np.empty(len(y))
+    distances = np.empty(len(y))
     fold = group % folds
     for k in np.unique(fold).tolist():
         rest = inside & (fold != k) if folds > 1 else inside
         number = np.unique(group[rest], return_inverse=True)[1]
         effects = random_effects(y[rest], error[rest], number)
         for j in np.flatnonzero(fold == k).tolist():
-            found[j] = effects.distance(y[j], error[j])
-    return found
+            distances[j] = effects.distance(y[j], error[j])
+    return distances
 
 
 def _in_blocks(pairs: FloatArray) -> FloatArray:

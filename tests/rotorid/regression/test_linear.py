@@ -267,6 +267,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
         ({"K": [[1.0]], "Y": [1.0], "sigma": np.eye(2)}, "one entry per row"),
         ({"K": [[1.0]], "Y": [1.0], "sigma": np.nan}, "finite"),
         ({"K": [[1.0]], "Y": [1.0], "weights": [-1.0]}, "not negative"),
+        ({"K": [[1.0]], "Y": [1.0], "weights": [0.0]}, "not all 0"),
         ({"K": [[1.0]], "Y": [1.0], "weights": [1.0], "sigma": 1.0}, "not both"),
     ],
 )
