@@ -15,7 +15,6 @@ from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
 from rotorid.regression.normal_matrix import normal_matrix
-from rotorid.regression.prior import prior_rows
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_ode_model
 
@@ -319,13 +318,6 @@ def test_without_data_options_are_refused_that_nothing_would_look_at():
     harmonic = sample_data() / "identify" / "task_5_1" / "model.toml"
     with pytest.raises(ValueError, match="--loss belongs to DATA"):
         work_harmonic(harmonic, None, IdentifyOptions(loss="huber"))
-
-
-def test_no_rows_change_nothing():
-    none = prior_rows(("a", "b"), {})
-    J = np.arange(6.0).reshape(3, 2)
-    assert len(none) == 0
-    assert (none.below(J) == J).all()
 
 
 MODEL = """outputs = { y = "a + b*t" }
