@@ -11,8 +11,8 @@ import numpy as np
 
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import plain
-from rotorid.base.result import Column, rows
+from rotorid.base.json import cell, plain
+from rotorid.base.result import Column
 from rotorid.base.text import error_figures, percent, sentence, table
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
 
@@ -87,26 +87,23 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
         reason = "" if np.isnan(value) else why.get(name, "")
         error = "" if np.isnan(std) else error_figures(std)
         cells = [name, texts[0], error, share, *texts[1:], reason]
-        lines.append(["" if cell == "nan" else cell for cell in cells])
+        lines.append(["" if text == "nan" else text for text in cells])
     filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
     shown = table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS).splitlines()
-    blank = {k: name for k, name in enumerate(names, 1) if np.isnan(numbers.values[k - 1])}
-    place = max((len(shown[k].rstrip()) for k in blank), default=0)
-    for k, name in blank.items():  # the words stand beside the name, where a number would begin
-        shown[k] = f"{shown[k].rstrip():<{place}}  {why.get(name, 'not determined')}"
+    blank = np.flatnonzero(np.isnan(numbers.values)).tolist()
+    wide = max((len(names[k]) for k in blank), default=0)
+    for k in blank:  # the words stand beside the name, where a number would begin
+        shown[k + 1] = f"  {names[k]:<{wide}}  {why.get(names[k], 'not determined')}"
     return "\n".join(shown)
 
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
-    table = rows(parameter_columns(names, numbers))
     return {
-        row["parameter"]: {
-            "value": row["value"],
-            "std": row["std"],
-            "ci95": None if row["ci95_low"] is None else [row["ci95_low"], row["ci95_high"]],
-        }
-        for row in table
+        name: {"value": value, "std": std, "ci95": None if low is None else [low, high]}
+        for name, value, std, low, high in zip(
+            *(cell(column.values) for column in parameter_columns(names, numbers)), strict=True
+        )
     }
 
 
