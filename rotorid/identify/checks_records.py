@@ -1,9 +1,9 @@
 """What must be known of a fit to time records before its numbers are used, the worst first.
 
-The model does not describe the record; its residuals are no noise, or hum; steps from sample to sample are
-too coarse; times cannot be as stated. A series is one output of one record. A column c beside the
-sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares, with c⊥ its part outside them. So hum is looked for
-in a periodogram that gives back what the parameters have taken of a sinusoid, beside a resonance most of it.
+The model does not describe the record; its residuals are no noise, or hum; times cannot be as stated. A series
+is one output of one record. A column c beside the sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares,
+with c⊥ its part outside them. So hum is looked for in a periodogram that gives back what the parameters have
+taken of a sinusoid, beside a resonance most of it.
 
 Where records do not determine every parameter: the outputs depend on them by the coefficients of the
 equations alone, in dx/dt = −(a + b) x + g h u by a + b and g h. A coefficient, or a product or quotient of
@@ -22,8 +22,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import RTOL, Iterations, Problem, at
-from rotorid.identify.simulation import STEPWISE
+from rotorid.identify.record_residuals import Iterations, Problem, at
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.normal_matrix import normal_matrix
@@ -50,9 +49,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     """The estimate of a fit, without intervals where these would mislead, and what else `Fit` says of it."""
     estimate, theta, linear = path.estimate, path.estimate.solution, loss == "linear"
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
-    judged: dict[str, Any] = dict.fromkeys(
-        ("integration_change", "autocorrelation", "prior", "normal_matrix")
-    )
+    judged: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
     try:
         r, J = estimate.residuals, problem.jacobian(theta)
     except SimulationError as error:
@@ -69,8 +66,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
-    change, integration = _integration(problem, estimate, J)
-    words += [integration, poor, cause, path.bound_warning]
+    words += [poor, cause, path.bound_warning]
     if path.converged:
         estimate = combined(problem, estimate)
         words += ["" if estimate.full_rank or poor else estimate.describe_rank()]
@@ -90,7 +86,6 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         "estimate": _widened(estimate, factor if sound else None),
         "reliable": sound and factor == 1,
         "warnings": [*words, _fast(problem, theta)],
-        "integration_change": change,
         "autocorrelation": rho,
         "prior": prior,
         "normal_matrix": normal_matrix(estimate.names, path.regression[0] if path.regression else J),
@@ -210,7 +205,7 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     ), shift > FAR
 
 
-# -- errors of the outputs, of coarse steps and of the times
+# -- errors of the outputs and of the times
 
 
 def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[str, float]:
@@ -241,23 +236,6 @@ def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: b
         )
     if why := estimate.misfit():
         yield f"{why}: intervals are too narrow, or the model does not quite describe the record"
-
-
-def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[FloatArray | None, str]:
-    """Change of the parameters with error control instead of steps from sample to sample (n,), and words."""
-    theta = estimate.solution
-    if problem.runs[0].integrator not in STEPWISE:
-        return None, ""
-    missed = problem.residual(theta) - problem.again("auto", RTOL, problem.errors).residual(theta)
-    change = solution(problem.prior.below(J), np.append(missed, np.zeros(len(problem.prior))), rcond=RCOND)
-    limit = 1e-8 * np.abs(theta)
-    if estimate.std is not None:
-        limit = np.maximum(limit, 0.1 * np.nan_to_num(estimate.std))
-    j = int(np.argmax(np.abs(change) / np.maximum(limit, 1e-300)))
-    far = f"{estimate.names[j]} by about {change[j]:.2g}"
-    far += "" if estimate.std is None else f" (standard deviation {estimate.std[j]:.2g})"
-    worse = abs(change[j]) > limit[j]
-    return change, f"a more accurate integration would change {far}" if worse else ""
 
 
 def _fast(problem: Problem, theta: FloatArray) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import PurePath
 from typing import Any, TypeVar
 
 import numpy as np
@@ -115,21 +114,6 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
         have = ", ".join(record.inputs) or "none"
         raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
     return np.array([record.inputs[name] for name in model.inputs]).reshape(-1, len(record)).T
-
-
-def record_names(names: Sequence[str]) -> list[str]:
-    """Short names of records that tell them apart: without their folders, numbers where they are the same.
-
-    Examples
-    --------
-    >>> record_names(["a/run_1.csv", "a/run_2.csv"]), record_names(["a/x.csv", "b/x.csv"])
-    (['run_1.csv', 'run_2.csv'], ['a/x.csv', 'b/x.csv'])
-    >>> record_names(["the record", "the record"])
-    ['record 1', 'record 2']
-    """
-    numbers = [f"record {k + 1}" for k in range(len(names))]
-    ways = [PurePath(name).name or name for name in names], [*names], numbers
-    return next(way for way in ways if len({*way}) == len(names))
 
 
 def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
