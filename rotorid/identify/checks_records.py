@@ -1,7 +1,8 @@
 """What must be known of a fit to time records before its numbers are used, the worst first.
 
-The model does not describe the record; its residuals are no noise, or hum; times cannot be as stated. A series
-is one output of one record. A column c beside the sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares,
+The model does not describe the record; its residuals are no noise, or hum; times cannot be as stated. A
+series is one output of one record. A column c beside the sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of
+squares,
 with c⊥ its part outside them. So hum is looked for in a periodogram that gives back what the parameters have
 taken of a sinusoid, beside a resonance most of it.
 

@@ -30,7 +30,7 @@ class Record:
     inputs
         Measured inputs by name, shape (n,) each, without gaps; straight lines between samples.
     sigma
-        Standard deviations of outputs by name, a number or shape (n,); None: unknown.
+        Standard deviations of outputs by name, shape (n,), or a number for all samples; None: unknown.
     name
         For messages.
     axis
@@ -51,46 +51,28 @@ class Record:
     axis: Shown = SECONDS
 
     def __post_init__(self) -> None:
-        name, t = self.name, _column(self.t, f"{self.name}: the times")
+        name, t = self.name, _column(self.t, f"{self.name}: the times", np.shape(self.t))
         if not len(t):
             raise ValueError(f"{name} has no samples")
-        for i in np.flatnonzero(~np.isfinite(t))[:1]:
-            raise ValueError(f"{name}: the time in row {i + 1} is missing or infinite")
         for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
             raise ValueError(
-                f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}; "
-                "sort the rows, merge samples of one time, or use one record for each run"
+                f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}"
             )
-        object.__setattr__(self, "t", t)
-        for kind in ("outputs", "inputs"):
-            columns = {key: _column(x, f"{name}: {key}") for key, x in getattr(self, kind).items()}
-            object.__setattr__(self, kind, columns)
-            for key, column in columns.items():
-                if len(column) != len(t):
-                    raise ValueError(f"{name}: {key} has {len(column)} values, but there are {len(t)} times")
-                for i in np.flatnonzero(np.isinf(column))[:1]:
-                    raise ValueError(f"{name}: {key} is infinite in row {i + 1}; leave missing samples empty")
-                if kind == "inputs" and np.isnan(column).any():
-                    raise ValueError(
-                        f"{name}: the input {key} is missing at t = {t[np.isnan(column)][0]:g}; an input "
-                        "needs a value at every time"
-                    )
-        if self.sigma is not None:
-            object.__setattr__(self, "sigma", {key: self._deviation(key, x) for key, x in self.sigma.items()})
+        outputs, inputs, sigma = (
+            {key: _column(x, f"{name}: {key}", t.shape, gaps) for key, x in (columns or {}).items()}
+            for columns, gaps in ((self.outputs, True), (self.inputs, False), (self.sigma, True))
+        )
+        for key, std in sigma.items():
+            if key not in outputs:
+                raise ValueError(f"{name}: a standard deviation is given for {key}, which is no output")
+            if not ((std > 0) | np.isnan(outputs[key])).all():
+                raise ValueError(f"{name}: the standard deviation of {key} must be above 0")
+        columns = {"t": t, "outputs": outputs, "inputs": inputs, "sigma": sigma or None}
+        for kind, value in columns.items():
+            object.__setattr__(self, kind, value)
 
     def __len__(self) -> int:
         return len(self.t)
-
-    def _deviation(self, key: str, value: float | FloatArray) -> float | FloatArray:
-        place, array = f"{self.name}: the standard deviation of {key}", np.array(value, dtype=float)
-        if key not in self.outputs:
-            raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
-        if array.shape not in ((), self.t.shape):
-            raise ValueError(f"{place} is one number or {len(self)}, one per time")
-        missing = np.isnan(self.outputs[key]) & (array.ndim > 0)
-        if not np.all((np.isfinite(array) & (array > 0)) | missing):
-            raise ValueError(f"{place} must be above 0")
-        return array if array.ndim else float(array)
 
 
 def refined(record: Record, every: int) -> tuple[Record, IntArray]:
@@ -187,11 +169,15 @@ def _copies(model: OdeModel, count: int) -> dict[str, tuple[str, ...]]:
     return copies
 
 
-def _column(value: ArrayLike, what: str) -> FloatArray:
+def _column(value: ArrayLike, what: str, shape: tuple[int, ...], gaps: bool = False) -> FloatArray:
+    """A copy as finite numbers, one a time, NaN where there may be gaps; one number is that of all times."""
     try:
         column = np.array(value, dtype=float)
+        column = np.full(shape, column) if not column.ndim else column
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} must be numbers") from error
-    if column.ndim != 1:
-        raise ValueError(f"{what} must be one column, not of shape {column.shape}")
+    if column.shape != shape or column.ndim != 1:
+        raise ValueError(f"{what} must be one column of a number for each time, not {column.shape}")
+    for i in np.flatnonzero(np.isinf(column) | (np.isnan(column) & (not gaps)))[:1]:
+        raise ValueError(f"{what}: the value in row {i + 1} is {column[i]:g}")
     return column
