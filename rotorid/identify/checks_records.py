@@ -2,9 +2,8 @@
 
 The model does not describe the record; its residuals are no noise, or hum; times cannot be as stated. A
 series is one output of one record. A column c beside the sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of
-squares,
-with c⊥ its part outside them. So hum is looked for in a periodogram that gives back what the parameters have
-taken of a sinusoid, beside a resonance most of it.
+squares, with c⊥ its part outside them. So hum is looked for in a periodogram that gives back what the
+parameters have taken of a sinusoid, beside a resonance most of it.
 
 Where records do not determine every parameter: the outputs depend on them by the coefficients of the
 equations alone, in dx/dt = −(a + b) x + g h u by a + b and g h. A coefficient, or a product or quotient of
@@ -206,22 +205,6 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     ), shift > FAR
 
 
-# -- errors of the outputs and of the times
-
-
-def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[str, float]:
-    """Standard deviation of each output from its residuals; none where only rounding is left."""
-    if _rounding_only(problem, r):
-        return {}
-    rows: dict[str, list[FloatArray]] = {}
-    for name, _, part in problem.series:
-        rows.setdefault(name, []).append(r[part] / problem.scale[part])
-    share = 1 - min(n_parameters / len(r), 0.9)
-    errors = {name: float(np.sqrt(np.mean(np.concatenate(x) ** 2) / share)) for name, x in rows.items()}
-    least = 1e-6 * max(errors.values())  # an output that is met exactly would count for everything
-    return {name: max(size, least) for name, size in errors.items()}
-
-
 def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: bool) -> Iterator[str]:
     """Where errors are unequal, or not as stated."""
     sizes = {
@@ -229,11 +212,11 @@ def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: b
         for _, words, rows in problem.series
         if rows.stop - rows.start >= FEWEST
     }
-    alike = problem.stated or problem.errors or _rounding_only(problem, r) or not sizes
+    alike = problem.stated or _rounding_only(problem, r) or not sizes
     if linear and not alike and max(sizes.values()) >= 2 * min(sizes.values()):
         yield (
             f"the outputs have different errors ({', '.join(f'{n} {s:.2g}' for n, s in sizes.items())}), "
-            "but the intervals hold for equal ones. With --sigma auto precise outputs count for more"
+            "but the intervals hold for equal ones. Stated with --sigma, precise outputs count for more"
         )
     if why := estimate.misfit():
         yield f"{why}: intervals are too narrow, or the model does not quite describe the record"

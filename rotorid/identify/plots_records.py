@@ -41,7 +41,7 @@ def figure_fit(result: Fit) -> Figure:
         _finish(ax, f"input {name}")
     axes[-1].set_xlabel(result.records[0].axis.word)
     figure.align_ylabels(axes)
-    stated = result.errors or any(record.sigma for record in result.records)
+    stated = any(record.sigma for record in result.records)
     title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
     more = len(result.records) - MANY
     title += f"; and {counted(more, 'more record')}" if more > 0 else ""
@@ -77,7 +77,7 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     }
     for k, r in residuals.items():
         record, rms = result.records[k], np.sqrt(np.nanmean(np.concatenate([*residuals.values()]) ** 2))
-        band = 2 * np.broadcast_to((record.sigma or result.errors or {name: rms})[name], len(record))
+        band = 2 * np.broadcast_to((record.sigma or {name: rms})[name], len(record))
         t = record.axis.scale * record.t
         axes.fill_between(t, -band, band, color="#d9dde3", lw=0, zorder=0.5)
         axes.plot(t, r, **_styles(result, k)[0])

@@ -16,7 +16,7 @@ from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
-from rotorid.regression.prior import Prior, prior_rows
+from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import RCOND
 
 LARGEST = 1e140
@@ -46,11 +46,6 @@ class Iterations(NonlinearEstimate):
     regression: tuple[FloatArray, FloatArray] | None = None
     stopped_by: str | None = None
 
-    def after(self, before: FloatArray) -> Iterations:
-        """The same, as the continuation of earlier steps, (k, n)."""
-        costs = np.append(np.full(len(before), np.nan), self.costs)
-        return replace(self, history=np.vstack((before, self.history)), costs=costs)
-
 
 class Problem:
     """Residuals y(t, θ) − measured, divided by the standard deviations where these are known.
@@ -65,10 +60,6 @@ class Problem:
         What is fitted to what.
     integrator, rtol
         Of `simulate`.
-    errors
-        Estimated standard deviation of each output, to weigh by; not stated ones.
-    prior
-        Rows that count with those of the records; none by default.
 
     Raises
     ------
@@ -83,11 +74,9 @@ class Problem:
         records: Sequence[Record],
         integrator: str = "auto",
         rtol: float = RTOL,
-        errors: Mapping[str, float] | None = None,
-        prior: Prior | None = None,
     ) -> None:
         self.given, self.records, outputs = model, tuple(records), model.outputs
-        self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
+        self.integrator, self.rtol = integrator, rtol
         if not records:
             raise ValueError("a fit needs at least one record")
         for record in records:
@@ -95,7 +84,8 @@ class Problem:
         self.models = models_of(model, len(records))
         """One per record, all with the same parameters."""
         self.model = self.models[0]
-        self.prior = prior or prior_rows(self.model.parameters, {})
+        self.prior = prior_rows(self.model.parameters, {})
+        """Rows that count with those of the records."""
         self.inputs = [inputs_of(model, record) for record in records]
         self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
         stated = [_table(record.sigma or {}, outputs, len(record)) for record in records]
@@ -104,8 +94,7 @@ class Problem:
         self.stated = bool(known.any())
         if self.stated and not known.all():
             raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        sizes = [self.errors.get(name, 1.0) for name in outputs]
-        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in stated]
+        self.weights = [1.0 / np.where(np.isnan(sigma), 1.0, sigma) for sigma in stated]
         self.series: list[tuple[str, str, slice]] = []
         """Of each output of a record its name, words for it, and its rows."""
         low = 0
@@ -129,15 +118,6 @@ class Problem:
         """Of the last evaluation, one per record."""
         self.quick = integrator
         """That of the evaluations: for "auto" that which is quick for this model and these times."""
-
-    @property
-    def scaled(self) -> bool:
-        """Whether a residual of 1 is one standard deviation, stated or estimated: a prior counts on it."""
-        return self.stated or (len(self.prior) > 0 and not self.prior.ridge)
-
-    def again(self, integrator: str, rtol: float, errors: Mapping[str, float]) -> Problem:
-        """The same problem, integrated or weighed otherwise."""
-        return Problem(self.given, self.records, integrator, rtol, errors, self.prior)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
@@ -202,7 +182,7 @@ class Problem:
     def linear_fit(self, K: FloatArray, Y: FloatArray, theta: FloatArray) -> Estimate:
         """The step of the parameters (n,) from linearised rows K δ = Y, (m, n) and (m,), and the prior's."""
         A, y = self.prior.below(K), np.append(Y, -self.prior.residual(theta))
-        sigma = 1.0 if self.scaled else None
+        sigma = 1.0 if self.stated else None
         step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 

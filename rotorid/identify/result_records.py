@@ -54,8 +54,6 @@ class Fit(Answered, Iterations):
         Of neighbouring residuals; None for few samples or exact data.
     residual_rms
         In the unit of the outputs.
-    errors
-        Standard deviation of each output as estimated from its residuals, where these were the weights.
     prior
         What a prior or a ridge did to the estimate; None without any.
     normal_matrix
@@ -72,7 +70,6 @@ class Fit(Answered, Iterations):
     simulations: tuple[Trajectory, ...]
     autocorrelation: float | None
     residual_rms: float
-    errors: dict[str, float] | None
     prior: PriorEffect | None
     normal_matrix: NormalMatrix | None
 
@@ -109,7 +106,7 @@ class Fit(Answered, Iterations):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
         names = self.parameters
-        kept = "residual_rms method integrator loss converged message reliable stopped_by iterations errors"
+        kept = "residual_rms method integrator loss converged message reliable stopped_by iterations"
         document = {key: getattr(self, key) for key in f"{kept} at_bounds autocorrelation warnings".split()}
         document["history"] = [
             {"cost": cost, "parameters": dict(zip(names, row, strict=True))}
@@ -145,9 +142,6 @@ class Fit(Answered, Iterations):
             judgement = f"NO intervals, see why. {judgement}"
         found = f"{parts.found}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
         found += f"\n  residual rms {self.residual_rms:.4g}"
-        if self.errors:
-            sizes = ", ".join(f"{name} {error:.3g}" for name, error in self.errors.items())
-            found += f"\n  estimated standard deviations, used as weights: {sizes}"
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
         return replace(
