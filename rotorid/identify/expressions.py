@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
+from numbers import Real
 from typing import Any, NamedTuple
 
 FUNCTIONS = (
@@ -74,6 +75,30 @@ def quote(text: str, position: int = 0, width: int = 60) -> str:
 def is_name(text: str) -> bool:
     """Whether a model may use this as a name."""
     return re.fullmatch(_NAME, text) is not None and text not in FUNCTIONS
+
+
+def check_names(kinds: Mapping[str, Iterable[str]], variable: str, meaning: str) -> None:
+    """Refuse what is no name, or used twice, but for an output; the variable has a meaning of its own."""
+    seen: dict[str, str] = {}
+    for kind, name in ((kind, name) for kind, names in kinds.items() for name in names):
+        if name == variable:
+            raise ValueError(f"{kind} {name}: {name} is {meaning}; choose another name")
+        if not isinstance(name, str) or not is_name(name):
+            raise ValueError(
+                f"{kind} {name!r} is no name; a name begins with a letter, has letters, digits and _, and is "
+                "not the name of a function"
+            )
+        if name in seen and kind != "output":
+            other = f"a {seen[name]}" if seen[name] != kind else "given"
+            raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
+        seen[name] = kind
+
+
+def finite(place: str, value: Any) -> float:  # noqa: ANN401
+    """The value, if it is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ValueError(f"{place}: its value must be a finite number, not {value!r}")
+    return float(value)
 
 
 def parse(text: str, *, where: str = "") -> Any:  # noqa: ANN401  sympy has no types

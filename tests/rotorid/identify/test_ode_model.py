@@ -144,7 +144,7 @@ def test_curve_fitting_needs_no_states():
     [
         ({"states": {"x": "-a*x +"}}, r"state x: '-a\*x \+', character 7"),
         ({"states": {"x": "-a*z"}}, "state x: '-a\\*z': z is not defined here"),
-        ({"states": {"x": "-alpha1*x"}, "estimate": {"alpha": 1.0}}, "did you mean alpha?"),
+        ({"states": {"x": "-alpha1*x"}, "estimate": {"alpha": 1.0}}, "did you mean 'alpha'"),
         ({"states": {"x": "__import__('os').system('x')"}}, "state x: .*character 1: _ cannot stand here"),
         ({"states": {"x": "eval(x)"}}, "eval is no function"),
         ({"states": {"x": "-a*x.real"}}, "cannot stand here"),
@@ -154,7 +154,7 @@ def test_curve_fitting_needs_no_states():
         ({"initial": {}}, "initial: the value of the state x is missing"),
         ({"initial": {"x": 1, "z": 2}}, "initial: z is no state; states are x"),
         ({"initial": {"x": "t"}}, "initial x: 't': t is not defined here; it may use a"),
-        ({"initial": {"x": float("nan")}}, "initial x: nan is no finite number"),
+        ({"initial": {"x": float("nan")}}, "initial x: its value must be a finite number"),
         ({"estimate": {"x": 1.0}}, "parameter x: x is already a state"),
         ({"estimate": {"a": float("inf")}}, "a: its value must be a finite number"),
         ({"known": {"a": 1.0}}, "known value a: a is already a parameter"),
