@@ -24,7 +24,7 @@ from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
-from rotorid.identify.combinations import NAME, only_determined, why_several
+from rotorid.identify.combinations import NAME, why_several
 from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
@@ -35,7 +35,7 @@ from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import together
-from rotorid.regression.undetermined_combinations import FoundCombination
+from rotorid.regression.undetermined_combinations import FoundCombination, only_determined
 
 REWEIGHTINGS, MOVED = 2, 0.01
 """Rounds at most with weights from predicted amplitudes, after the first with measured ones; standard

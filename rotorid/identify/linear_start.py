@@ -22,14 +22,13 @@ from rotorid.base.text import listing
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.combinations import (
     Polynomial,
-    only_determined,
     sum_words,
     why_several,
 )
 from rotorid.identify.operator_model import HarmonicModel, products_of_powers
 from rotorid.regression import least_squares, solution
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.undetermined_combinations import echelon
+from rotorid.regression.undetermined_combinations import echelon, only_determined
 
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
