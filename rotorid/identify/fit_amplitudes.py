@@ -331,8 +331,6 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
         for name in model.parameters
         if not name.isidentifier()
     ]
-    if answer.linear and answer.solutions and not answer.linear.recovery.sure:
-        words.append("the parameters were found by a search; there may be more solutions than shown")
     words += answer.warnings
     if answer.converged:
         high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])

@@ -267,7 +267,9 @@ def ode_model(
     outputs = dict(outputs or {name: name for name in states})
     if not outputs:
         raise ValueError("a model needs states, or outputs of the time")
-    kinds = {"state": states, "parameter": estimate, "known value": known, "input": inputs}
+    recorded = {f"{x}_0": _measuring(x, outputs) for x in states if initial.get(x) == "record"}
+    initial |= {state: f"{state}_0" for state in states if initial.get(state) == "record"}
+    kinds = {"state": states, "parameter": (*estimate, *recorded), "known value": known, "input": inputs}
     expressions.check_names(kinds | {"output": outputs}, "t", "the time")
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
@@ -275,13 +277,6 @@ def ode_model(
     check_known("per_record", per_record, "parameter", estimate)
     begin, known = ({n: expressions.finite(n, x) for n, x in each.items()} for each in (estimate, known))
     names = ["t", *states, *estimate, *inputs]
-    measured = [x for x in states if initial[x] == "record" and "record" not in (*names, *known)]
-    recorded: dict[str, str] = {}
-    for state in measured:
-        parameter = f"{state}_0"
-        while parameter in (*names, *known):
-            parameter += "_"
-        initial[state], recorded[parameter] = parameter, _measuring(state, outputs)
     texts: dict[str, str] = {}
 
     def read(kind: str, given: Mapping[str, float | str], allowed: Collection[str]) -> tuple[Expression, ...]:
@@ -338,10 +333,8 @@ def check_known(where: str, names: Iterable[str], kind: str, known: Collection[s
 
 def _measuring(state: str, outputs: Mapping[str, str]) -> str:
     """The output that measures a state, which begins as the record says."""
-    import sympy
-
     for output, text in outputs.items():
-        if expressions.parse(str(text), where=f"output {output}") == sympy.Symbol(state):
+        if str(text).strip("() ") == state:
             return output
     raise ValueError(
         f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or other '

@@ -145,8 +145,8 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
             starts[copy] = float(record.outputs.get(output, np.full(1, np.nan))[0])
             if np.isnan(starts[copy]):
                 raise ValueError(
-                    f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
-                    f"[initial] takes it from the record; give a number there, or a parameter"
+                    f"{record.name}: {output} has no sample at the first time, where [initial] takes it from "
+                    "the record"
                 )
     return starts
 

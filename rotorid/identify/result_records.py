@@ -10,13 +10,11 @@ import numpy as np
 from rotorid.base import tables
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import Trajectory
-from rotorid.regression.estimate import parameter_columns
 from rotorid.regression.normal_matrix import NormalMatrix
 from rotorid.regression.prior import PriorEffect
 
@@ -118,9 +116,8 @@ class Fit(Answered, Iterations):
         return {**self.estimate.to_dict(), **plain(document), **more}
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per parameter: value, std, the 95 % interval, and whether it stands at a bound."""
-        at_bound = [name in self.at_bounds for name in self.parameters]
-        return frame((*parameter_columns(self.parameters, self.estimate), Column("at_bound", at_bound)))
+        """One row per parameter: value, std and the 95 % interval."""
+        return self.estimate.to_frame()
 
     @property
     def answer(self) -> Answer:
