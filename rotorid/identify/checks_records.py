@@ -102,7 +102,7 @@ def misfit(problem: Problem, estimate: Estimate, r: FloatArray, loss: str) -> st
         far = loss == "linear" and float(r @ r) > MISFIT * estimate.dof
         why = estimate.misfit() if far else ""
         return f"{why}: {HINT}" if why else ""
-    for _, name, rows in problem.series:
+    for name, rows in problem.series:
         data, part = problem.data[rows], r[rows]
         if loss != "linear":  # without outliers
             limit = 3 * 1.4826 * float(np.median(np.abs(part)))
@@ -131,7 +131,7 @@ def _correlated(problem: Problem, r: FloatArray, only: Sequence[slice] = ()) -> 
     up to the tenth neighbour in white residuals (Box and Pierce 1970); and how many times too narrow
     intervals are, with correlations that fade as the first.
     """
-    parts = [r[rows] for rows in only or [rows for *_, rows in problem.series]]
+    parts = [r[rows] for rows in only or [rows for _, rows in problem.series]]
     parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in parts]
     size = sum(map(len, parts))
     lags = range(1, 1 + min(LAGS, max(1, min(map(len, parts)) // 5)))
@@ -163,7 +163,7 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
         1.0,
         slice(0),
     )  # of noise it is χ² of two
-    for *_, rows in problem.series:
+    for _, rows in problem.series:
         times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
@@ -209,7 +209,7 @@ def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: b
     """Where errors are unequal, or not as stated."""
     sizes = {
         words: np.sqrt(np.mean((r[rows] / problem.scale[rows]) ** 2))
-        for _, words, rows in problem.series
+        for words, rows in problem.series
         if rows.stop - rows.start >= FEWEST
     }
     alike = problem.stated or _rounding_only(problem, r) or not sizes

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.adaptive_steps import worth_compiling
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.records import Record, inputs_of, models_of
@@ -88,26 +88,30 @@ class Problem:
         """Rows that count with those of the records."""
         self.inputs = [inputs_of(model, record) for record in records]
         self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
-        stated = [_table(record.sigma or {}, outputs, len(record)) for record in records]
-        self.masks = [~np.isnan(data) for data in self.measured]
-        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(stated, self.masks, strict=True)])
-        self.stated = bool(known.any())
-        if self.stated and not known.all():
-            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        self.weights = [1.0 / np.where(np.isnan(sigma), 1.0, sigma) for sigma in stated]
-        self.series: list[tuple[str, str, slice]] = []
-        """Of each output of a record its name, words for it, and its rows."""
-        low = 0
-        for record, mask in zip(records, self.masks, strict=True):
-            mask[:1, self.model.fixed_at_first] = False
-            for name, count in zip(outputs, mask.sum(axis=0).tolist(), strict=True):
-                words = f"{name} in {record.name}" if len(records) > 1 else name
-                self.series += [(name, words, slice(low, low + count))] * (count > 0)
-                low += count
-        if not low:
+        self.series: list[tuple[str, slice]] = []
+        """Words for each output of a record, and its rows."""
+        n, low, high, places = len(outputs), 0, 0, list[IntArray]()
+        for record, table in zip(records, self.measured, strict=True):
+            seen = ~np.isnan(table)
+            seen[:1, self.model.fixed_at_first] = False
+            for j, name in enumerate(outputs):
+                places.append(low + n * np.flatnonzero(seen[:, j]) + j)
+                words, size = f"{name} in {record.name}" if len(records) > 1 else name, len(places[-1])
+                self.series += [(words, slice(high, high + size))] * (size > 0)
+                high += size
+            low += table.size
+        if not high:
             raise ValueError("the records have no samples of an output beside those that known values fix")
-        self.data, self.scale = self.vector(self.measured), self.vector([*map(np.ones_like, self.measured)])
-        """Measured values and 1 as weighted rows."""
+        self.places = np.concatenate(places)
+        """Of the rows in the samples of all outputs at the first time of the first record, at the next, …"""
+        self.scale = np.ones(high)
+        sigma = self.vector([_table(record.sigma or {}, outputs, len(record)) for record in records])
+        self.stated = not np.isnan(sigma).all()
+        if self.stated and np.isnan(sigma).any():
+            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
+        self.scale = 1.0 / sigma if self.stated else self.scale
+        """1 over the standard deviations."""
+        self.data = self.vector(self.measured)
         most = np.abs(self.data).max()
         if not (most == 0 or 1 / LARGEST < most < LARGEST):
             raise ValueError(
@@ -121,16 +125,12 @@ class Problem:
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
-        parts = [
-            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask.T]
-            for table, mask, weight in zip(tables, self.masks, self.weights, strict=True)
-        ]
-        return np.concatenate(parts)
+        flat = np.concatenate([table.reshape(-1, *table.shape[2:]) for table in tables])
+        return (flat[self.places].T * self.scale).T
 
     def by_time(self, columns: Sequence[FloatArray]) -> FloatArray:
         """What belongs to the times of each record, (n,), as rows without weights."""
-        tables = [np.tile(column[:, None], len(self.model.outputs)) for column in columns]
-        return self.vector(tables) / self.scale
+        return np.repeat(np.concatenate(columns), len(self.model.outputs))[self.places]
 
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
