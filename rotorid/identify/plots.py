@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.plots import right_angles
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     COLORS,
@@ -20,7 +19,6 @@ from rotorid.base.plot_style import (
     look,
     new_figure,
     plain,
-    rad_s_above,
 )
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import SPEEDS, Shown
@@ -35,8 +33,6 @@ if TYPE_CHECKING:
 
 POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4
 """Of a curve; most curves of a sweep, outputs in a legend, modes."""
-HIDDEN = 3.0
-"""Standard deviations below which a vector has no phase to draw."""
 MODEL_UNIT = Shown("model unit")
 """Of amplitudes whose columns name no unit."""
 
@@ -151,23 +147,20 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
     """Amplitude and phase over speed less the slow roll (C,), and the fit of the first sweep."""
     figure, labels = new_figure(6.6), sweeps[0].labels
     above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-    dots: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1))}
-    for k, (sweep, c, name, omega, read) in enumerate(_curves(sweeps)):
-        vectors, lines = read - roll[c], [(read - roll[c], {"lw": 1.6, "label": name, **look(k)})]
-        seen = np.abs(vectors) > HIDDEN * np.nanmedian(sweep.noise[:, c])
-        phase = np.unwrap(np.angle(vectors[seen]))
+    dots: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1)), "zorder": 3}
+    for k, (sweep, c) in enumerate([(s, c) for s in sweeps for c in range(len(s.sensors))][:CURVES]):
+        omega, run = np.sort(sweep.speeds), f", run {sweep.run}" if len(sweeps) > 1 else ""
+        vectors = sweep.vectors[np.argsort(sweep.speeds, kind="stable"), c]
+        lines = [(vectors, {"lw": 1.6, "label": f"{sweep.sensors[c]}{run}", **look(k)})]
         if fit is not None and sweep is sweeps[0]:
-            lines.append((fit.curve(omega)[:, c] - roll[c], {"label": f"fit, run {sweep.run}", **dots}))
-        for z, style in lines:  # phases of the fit beside those of the readings
-            beside = labels.phase_sign * np.degrees(phase + np.angle(z * vectors.conj())[seen])
-            beside -= (
-                360 * np.floor(np.median(labels.phase_sign * np.degrees(phase)) / 360) if seen.any() else 0
-            )
-            above.plot(RPM * omega, labels.vibration_scale * np.abs(z), **style)
-            below.plot(RPM * omega[seen], beside, **style)
+            lines.append((fit.curve(omega)[:, c], {"label": f"fit{run}", **dots}))
+        for z, style in lines:
+            size, phase = labels.vibration(z - roll[c])
+            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
+            above.plot(RPM * omega, size, **style)
+            below.plot(RPM * omega, phase, **style)
     above.set(ylabel=f"amplitude, {_unit(sweeps[0])}", ylim=(0.0, None))
-    below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees")
-    below.yaxis.set_major_locator(right_angles(below))
+    below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees", yticks=range(0, 361, 90))
     if labels.phase == "lag":
         below.invert_yaxis()  # through a critical speed the curve falls, as everywhere
     critical = [] if fit is None else RPM * fit.values[0]
@@ -175,25 +168,10 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
         for speed in critical:
             ax.axvline(speed, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
         plain(ax)
-        ax.margins(x=0.01)
-    rad_s_above(above)
-    words = ", ".join(f"{speed:.0f}" for speed in critical)
-    title = f"less the slow roll; at most {CURVES} curves" + (f"; critical: {words} rpm" if words else "")
-    legend_below(figure, (above,), 3, title=title)
+    words = f"less the slow roll; at most {CURVES} curves; dashed: critical speeds"
+    legend_below(figure, (above,), 3, title=words)
     return figure
 
 
 def _unit(readings: Readings) -> str:
     return readings.labels.vibration_in or "no unit"
-
-
-def _curves(sweeps: Sequence[Readings]) -> list[tuple[Readings, int, str, FloatArray, ComplexArray]]:
-    """Sweeps and sensors to draw, with names, rising speeds, and vectors."""
-    curves = []
-    for sweep in sweeps:
-        for c, name in enumerate(sweep.sensors):
-            order = np.argsort(sweep.speeds, kind="stable")
-            seen = order[~np.isnan(sweep.vectors[order, c])]
-            words = f"{name}, run {sweep.run}" if len(sweeps) > 1 else name
-            curves.append((sweep, c, words, sweep.speeds[seen], sweep.vectors[seen, c]))
-    return curves[:CURVES]
