@@ -13,7 +13,6 @@ from rotorid.base.plot_style import (
     COLORS,
     DARK,
     MARKERS,
-    QUIET,
     TEXT,
     legend_below,
     look,
@@ -25,7 +24,6 @@ from rotorid.base.unit_words import SPEEDS, Shown
 from rotorid.identify.amplitudes import real_matrices
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.identify.modes_result import FittedModes, Readings
@@ -38,57 +36,36 @@ MODEL_UNIT = Shown("model unit")
 
 
 def figure_identification(result: Identification) -> Figure:
-    """Amplitudes and phases, or shapes, measured and predicted."""
-    units = {name: result.experiments.units.get(name, MODEL_UNIT) for name in result.model.outputs}
-    free = bool(result.experiments.free.all())
-    heights = [3.4] if free else [*[2.4] * len({*units.values()}), 1.6]
-    figure = new_figure(0.9 + sum(heights))
-    axes = [*figure.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]]
-    words = _shapes(result, axes[0], units) if free else _forced(result, axes, units)
-    for ax in axes:
-        plain(ax)
-    figure.align_ylabels(axes)
-    legend_below(figure, axes, 2 if free else 4, title=f"points: measured{words}")
-    return figure
-
-
-def _forced(result: Identification, axes: Sequence[Axes], units: Mapping[str, Shown]) -> str:
-    """Sizes, on axes by their unit, and phases, with two standard deviations, and those of the model."""
-    data, rows, phases = result.experiments, ~result.experiments.free, axes[-1]
-    by_unit, (grid, curves) = dict(zip(dict.fromkeys(units.values()), axes, strict=False)), _curve(result)
+    """Amplitudes, on axes by their unit, and phases, with two standard deviations, and those of the model."""
+    data = result.experiments
+    units = {name: data.units.get(name, MODEL_UNIT) for name in result.model.outputs}
+    panels, (grid, curves) = [*dict.fromkeys(units.values())], _curve(result)
+    figure = new_figure(2.5 + 2.4 * len(panels))
+    axes = figure.subplots(len(panels) + 1, sharex=True, height_ratios=[*[2.4] * len(panels), 1.6])
+    w, x, phases = data.axis.scale * data.frequencies, data.axis.scale * grid, axes[-1]
     for j, (name, unit) in enumerate(units.items()):
-        z, ax, line = data.table([name])[rows, 0], by_unit[unit], {"lw": 1.4, **look(j)}
+        z, ax = data.table([name])[:, 0], axes[panels.index(unit)]
         turn = real_matrices(np.exp(-1j * np.angle(z)))
-        std = 2 * np.sqrt(np.einsum("nai,nij,naj->an", turn, data.covariance(name)[rows], turn))
+        std = 2 * np.sqrt(np.einsum("nai,nij,naj->an", turn, data.covariance(name), turn))
         bars = (unit.scale * std[0], np.degrees(std[1] / np.abs(z))) if data.stated else (None, None)
         mark = {"elinewidth": 1.2, "zorder": 3, **_mark(j), "label": name if j < NAMES else ""}
-        w, x = data.axis.scale * data.frequencies[rows], data.axis.scale * grid
         ax.errorbar(w, unit.scale * np.abs(z), bars[0], **mark)
         phases.errorbar(w, _degrees(z), bars[1], **mark)
-        if name in curves:
-            ax.plot(x, unit.scale * np.abs(curves[name]), **line)
-            phases.plot(x, _degrees(curves[name]), **line)
+        cross = {**look(j), "marker": "x", "linestyle": ""}
+        lines = [(w, result.predicted.get(name), cross), (x, curves.get(name), {"lw": 1.4, **look(j)})]
+        for at, model, style in lines:
+            if model is not None:
+                ax.plot(at, unit.scale * np.abs(model), **style)
+                phases.plot(at, _degrees(model), **style)
         ax.set_ylabel(f"amplitude, {unit.word}")
-    for ax in by_unit.values():
+    for ax in axes:
+        plain(ax)
         ax.set_ylim(bottom=0.0)
     phases.set(xlabel=data.axis.word, ylabel="phase lead, °", ylim=(-205, 205), yticks=range(-180, 181, 90))
-    lost = "; free vibrations not drawn" if data.free.any() else ""
-    return f"{' ± 2σ' if data.stated else ''}; lines: model{lost}"
-
-
-def _shapes(result: Identification, axes: Axes, units: Mapping[str, Shown]) -> str:
-    """Measured and fitted mode shapes, one line per natural frequency."""
-    data, outputs = result.experiments, result.model.outputs
-    fitted = [[*amplitudes.real] for amplitudes in np.transpose([*result.predicted.values()])]
-    for i, (w, shape) in enumerate(zip(data.frequencies, data.table(outputs).real, strict=True)):
-        label = f"{data.axis.scale * w:.5g} {data.axis.word.rpartition(', ')[2]}"
-        axes.plot(shape, zorder=3, label=label if i < NAMES else "", **_mark(i))
-        if fitted:
-            axes.plot(fitted[i], lw=1.4, **look(i))
-    axes.axhline(0.0, color=QUIET, lw=0.8)
-    axes.set_xticks(range(len(outputs)), outputs)
-    axes.set_ylabel(f"shape, {' or '.join({unit.word: '' for unit in units.values()})}")
-    return "; lines: model"
+    figure.align_ylabels(axes)
+    words = f"points: measured{' ± 2σ' if data.stated else ''}; crosses and lines: model"
+    legend_below(figure, axes, 4, title=words)
+    return figure
 
 
 def _degrees(z: ComplexArray) -> FloatArray:
@@ -101,18 +78,19 @@ def _mark(j: int) -> dict[str, Any]:
 
 
 def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArray]]:
-    """Predicted amplitudes over the measured range, where one excitation belongs to it, else at its tests."""
+    """Predicted amplitudes over the measured range, where one excitation belongs to it."""
     model, data = result.model, result.experiments
-    rows = np.flatnonzero(~data.free)[np.argsort(data.frequencies[~data.free], kind="stable")]
-    w, inputs = data.frequencies[rows], data.table(model.inputs)[rows]
-    at_tests = w, {name: values[rows] for name, values in result.predicted.items()}
-    if not result.predicted or model.varying or not np.allclose(inputs, inputs[0], rtol=1e-9, atol=0):
-        return at_tests
-    # what is measured may lie at a peak: the line passes exactly there
-    grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), POINTS), w)))
-    with suppress(np.linalg.LinAlgError):
-        return grid, model.predict(result.theta, grid, dict(zip(model.inputs, inputs[0], strict=True)))
-    return at_tests
+    w, inputs = data.frequencies, data.table(model.inputs)
+    if (
+        result.predicted
+        and not (model.varying or data.free.any())
+        and np.allclose(inputs, inputs[0], 1e-9, 0)
+    ):
+        # what is measured may lie at a peak: the line passes exactly there
+        grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), POINTS), w)))
+        with suppress(np.linalg.LinAlgError):
+            return grid, model.predict(result.theta, grid, dict(zip(model.inputs, inputs[0], strict=True)))
+    return w, {}
 
 
 def figure_modes(modes: FittedModes) -> Figure:
