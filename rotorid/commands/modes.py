@@ -149,7 +149,7 @@ def _sentence(fit: FittedModes) -> str:
     """How many modes, and where."""
     if fit.undetermined:
         return "Not every mode is determined: no table of modes."
-    words = [fit.readings.words(omega) for omega in fit.values[0]]
+    words = [fit.readings.labels.speed_words(omega) for omega in fit.values[0]]
     unit = words[0].partition(" ")[2]
     return (
         f"{counted(len(words), 'mode')}: {listing([word.partition(' ')[0] for word in words], 'and')} {unit}."

@@ -26,6 +26,7 @@ from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, why_several
 from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
+from rotorid.identify.ode import check_known
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
@@ -103,8 +104,7 @@ def _check(
     """Refuse names that are not the model's, or that stand for two things."""
     find(LOSSES, loss, "loss")
     for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
-        if wrong := [name for name in names if name not in model.parameters]:
-            raise ValueError(f"{what}: {wrong[0]} is no parameter; those are {', '.join(model.parameters)}")
+        check_known(what, names, "parameter", model.parameters)
     for name, (low, high) in bounds.items():
         if low is not None and high is not None and not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")

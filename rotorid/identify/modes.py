@@ -129,7 +129,7 @@ def peak_bands(
     H
         Responses (n, P).
     noise
-        Size (n, P) of what in these is no peak.
+        Size (P,) of what in these is no peak.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
         order = np.argsort(sweep.speeds, kind="stable")
         Z = sweep.vectors[order]
         slow = [z[~np.isnan(z)][:SLOWEST].mean() for z in Z.T]
-        around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
+        around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise)
     while True:
         fit = fit_modes(sweep, answers, bands, around)
         noise = fit.by_noise()

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from rotorid.identify.modes_result import FittedModes, Readings
     from rotorid.identify.result import Identification
 
-POINTS, CURVES, NAMES, MODES = 1000, len(COLORS), 12, 4
-"""Of a curve; most curves of a sweep, outputs in a legend, modes."""
+POINTS, CURVES, NAMES = 1000, len(COLORS), 12
+"""Of a curve; most curves of a sweep, outputs in a legend."""
 MODEL_UNIT = Shown("model unit")
 """Of amplitudes whose columns name no unit."""
 
@@ -95,8 +95,8 @@ def _curve(result: Identification) -> tuple[FloatArray, Mapping[str, ComplexArra
 
 def figure_modes(modes: FittedModes) -> Figure:
     """A row a mode: readings and fit in the complex plane, where a mode is a circle, and over frequency."""
-    data, k = modes.readings, min(len(modes.ends), MODES)
-    (word, scale), unit, size = SPEEDS[data.labels.speed_unit], _unit(data), data.labels.vibration_scale
+    data, labels, k = modes.readings, modes.readings.labels, len(modes.ends)
+    (word, scale), unit, size = SPEEDS[labels.speed_unit], _unit(data), labels.vibration_scale
     figure = new_figure(2.2 * k + 0.7)
     axes = figure.subplots(k, 2, squeeze=False, width_ratios=(2, 3))
     for mode, ((circle, peak), (low, high)) in enumerate(zip(axes, modes.ends, strict=False)):
@@ -108,7 +108,7 @@ def figure_modes(modes: FittedModes) -> Figure:
             circle.plot(read.real, read.imag, label=name, **mark)
             peak.plot(scale * grid, np.abs(fit), **look(p))
             peak.plot(w, np.abs(read), **mark)
-        at = "" if modes.undetermined else f": {data.words(modes.values[0, mode])}"
+        at = "" if modes.undetermined else f": {labels.speed_words(modes.values[0, mode])}"
         circle.set_title(f"mode {mode + 1}{at}", loc="left", fontsize=TEXT)
         circle.set(xlabel=f"real part, {unit}", ylabel=f"imaginary part, {unit}")
         circle.set_aspect("equal", adjustable="datalim")
@@ -116,8 +116,8 @@ def figure_modes(modes: FittedModes) -> Figure:
         for ax in (circle, peak):
             ax.locator_params("x", nbins=4)
             plain(ax)
-    drawn = f"{k} of {len(modes.ends)} modes, at most {CURVES} points"
-    legend_below(figure, axes[:1, 0], 5, title=f"hollow: readings; lines: fit ({drawn})")
+    words = f"hollow: readings; lines: fit (at most {CURVES} points)"
+    legend_below(figure, axes[:1, 0], 5, title=words)
     return figure
 
 

@@ -142,12 +142,9 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
     copies, starts = _copies(model, len(records)), {}
     for name, output in model.recorded.items():
         for copy, record in zip(copies[name], records, strict=True):
-            starts[copy] = float(record.outputs.get(output, np.full(1, np.nan))[0])
+            starts[copy] = float(record.outputs[output][0]) if output in record.outputs else np.nan
             if np.isnan(starts[copy]):
-                raise ValueError(
-                    f"{record.name}: {output} has no sample at the first time, where [initial] takes it from "
-                    "the record"
-                )
+                raise ValueError(f"{record.name}: {output} has no sample at the first time for [initial]")
     return starts
 
 
