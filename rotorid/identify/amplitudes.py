@@ -57,7 +57,9 @@ class AmplitudeErrors:
     def __post_init__(self) -> None:
         values = (self.relative, self.phase, self.floor)
         if not all(np.isfinite(v) and v >= 0 for v in values) or not any(values):
-            raise ValueError(f"errors of amplitudes must be finite, none below 0 and one above; got {values}")
+            raise ValueError(
+                f"errors of amplitudes are finite, not negative, and one greater than zero; got {values}"
+            )
 
     def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
         """Covariance of real and imaginary part, shape (…, 2, 2), for amplitudes (…).

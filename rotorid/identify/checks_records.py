@@ -49,12 +49,12 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     """The estimate of a fit, without intervals where these would mislead, and what else `Fit` says of it."""
     estimate, theta, linear = path.estimate, path.estimate.solution, loss == "linear"
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
-    judged: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
     try:
         r, J = estimate.residuals, problem.jacobian(theta)
     except SimulationError as error:
         words.append(f"the model cannot be simulated with the result: {error}")
-        return judged | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
+        nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
+        return nothing | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
     prior = effect(problem.prior, J, r, theta, stated=problem.stated, at_bounds=path.at_bounds)
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
@@ -82,7 +82,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         )
     words += [] if poor else [*_errors_words(problem, estimate, r, linear)]
     sound = path.converged and not poor and not wrong and not problem.prior.ridge
-    return judged | {
+    return {
         "estimate": _widened(estimate, factor if sound else None),
         "reliable": sound and factor == 1,
         "warnings": [*words, _fast(problem, theta)],

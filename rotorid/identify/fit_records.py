@@ -14,6 +14,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit
+from rotorid.identify.expressions import finite
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.quasilinearization import quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
@@ -235,10 +236,7 @@ def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:
     values |= recorded_starts(model, problem.records)
     given = for_copies(model, len(problem.records), given)
     check_known("start", given, "parameter", values)
-    theta = np.array([*(values | given).values()], dtype=float)
-    if not np.isfinite(theta).all():
-        raise ValueError("starting values must be finite numbers")
-    return theta
+    return np.array([finite(name, value) for name, value in (values | given).items()])
 
 
 def _check(model: OdeModel, records: Sequence[Record], method: str, integrator: str, loss: str) -> None:

@@ -359,7 +359,7 @@ def with_nuisance(
     terms = {"offset": "1"} if offset else {}
     terms |= {"drift": "t"} if drift else {}
     for frequency in hum_Hz:
-        name = f"hum{frequency:g}".replace(".", "_").replace("-", "_").replace("+", "")
+        name = f"hum{frequency:g}".replace(".", "_")
         terms |= {f"{name}_{wave}": f"{wave}({2 * math.pi * frequency!r}*t)" for wave in ("cos", "sin")}
     texts = {
         output: " + ".join([f"({text})", *(f"{name}_{output}*{term}" for name, term in terms.items())])

@@ -218,7 +218,7 @@ def test_experiments_check_themselves():
         Experiments(("1",), np.ones(1), {"X": np.ones(2, dtype=complex)}, marks)
     with pytest.raises(ValueError, match="X: 1 finite values are needed"):
         Experiments(("1",), np.ones(1), one, marks, None, {"X": np.ones((2, 2))})
-    with pytest.raises(ValueError, match="none below 0"):
+    with pytest.raises(ValueError, match="not negative"):
         AmplitudeErrors(-0.1)
-    with pytest.raises(ValueError, match="none below 0 and one above"):
+    with pytest.raises(ValueError, match="greater than zero"):
         AmplitudeErrors()
