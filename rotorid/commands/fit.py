@@ -50,8 +50,8 @@ class FitOptions:
         Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
         intervals.
     sigma : LIST
-        Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
-        from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
+        Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; default: NAME_std of the record, or else all
+        alike.
     """
 
     method: str = "levenberg-marquardt"
@@ -90,7 +90,7 @@ def fit(
     Inputs are taken as exact, and as straight lines between their samples; only outputs have errors.
 
     Example: rotorid fit sample_data/fit/three_masses/model.toml sample_data/fit/three_masses/record.csv
-    --sigma auto --plot fit.png
+    --plot fit.png
 
     Every step of [Q], its regression M θ = Y, and the tables of its iterations:
 
@@ -133,9 +133,8 @@ def fit(
     files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     begin = None if options.start is None else _start(options.start, equations, len(records))
-    weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
-    deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
-    data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
+    deviations = None if options.sigma is None else sigmas(options.sigma, equations.outputs)
+    data = _read(records, equations, deviations, allow_missing=options.allow_missing)
     result = estimate(
         equations,
         data,
@@ -145,7 +144,6 @@ def fit(
         start=begin,
         starts=options.starts,
         tolerance=options.tolerance,
-        weigh=weigh,
         ridge=options.ridge or 0.0,
     )
     iterations: dict[str, Callable[[Path], bytes]] = {
@@ -182,7 +180,6 @@ def _read(
     sigma: dict[str, float] | None,
     *,
     allow_missing: bool,
-    weigh: bool,
 ) -> list[Record]:
     """All records, with standard deviations for all of them or for none."""
     from rotorid.files.records import STD
@@ -196,8 +193,6 @@ def _read(
         for one in given
     ]
     stated = [record for record in records if record.sigma is not None]
-    if stated and weigh:
-        raise ValueError(f"{stated[0].name}: leave out either the columns NAME{STD} or --sigma auto")
     if 0 < len(stated) < len(records):
         bare = next(record for record in records if record.sigma is None)
         raise ValueError(

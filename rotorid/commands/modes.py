@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing
+from rotorid.base.unit_words import SPEEDS
 from rotorid.commands.amplitude_errors import amplitude_errors
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.report.options import file_of
@@ -145,11 +146,9 @@ def _sentence(fit: FittedModes) -> str:
     """How many modes, and where."""
     if fit.undetermined:
         return "Not every mode is determined: no table of modes."
-    words = [fit.readings.words(omega) for omega in fit.values[0]]
-    unit = words[0].partition(" ")[2]
-    return (
-        f"{counted(len(words), 'mode')}: {listing([word.partition(' ')[0] for word in words], 'and')} {unit}."
-    )
+    labels = fit.readings.labels
+    words = [f"{SPEEDS[labels.speed_unit][1] * omega:.5g}" for omega in fit.values[0]]
+    return f"{counted(len(words), 'mode')}: {listing(words, 'and')} {labels.speed_in}."
 
 
 def _tables(fit: FittedModes) -> tuple[Table, Table]:

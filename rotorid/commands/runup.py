@@ -66,10 +66,10 @@ class RunUpOptions:
 
 
 class SlowRoll(NamedTuple):
-    """Vectors (C,), covariances of their parts, where they are from, and warnings; None: unknown."""
+    """Vectors (C,), standard deviations of either part, where they are from, and warnings; None: unknown."""
 
     vectors: ComplexArray | None
-    covariances: FloatArray | None
+    std: FloatArray | None
     words: str
     warnings: tuple[str, ...] = ()
 
@@ -124,7 +124,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     mean, time = 0.0 if rate == 0.0 else None, sweeps[0].time
     if mean is None and time is not None and len(time) > 1:
         mean = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
-    slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.covariances)
+    slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.std)
     steady, estimate = (modes.steady, modes.fit.estimate) if modes else (None, None)
     warnings = (*turned, *modes.warnings) if modes else (f"no modes: {why}",)
     warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
@@ -270,10 +270,8 @@ def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
     return Table("critical speeds", columns)
 
 
-def _roll_table(sweep: Readings, vectors: ComplexArray, covariances: FloatArray | None) -> Table:
+def _roll_table(sweep: Readings, vectors: ComplexArray, std: FloatArray | None) -> Table:
     """A row a sensor."""
-    import numpy as np
-
     labels = sweep.labels
     unit = f"_{labels.vibration_unit}" if labels.vibration_unit else ""
     size, angle = labels.vibration(vectors)
@@ -282,9 +280,8 @@ def _roll_table(sweep: Readings, vectors: ComplexArray, covariances: FloatArray 
         Column(f"amplitude{unit}", size, figures),
         Column("phase_deg", angle, "{:.1f}".format),
     ]
-    if covariances is not None:  # of either part, as large
-        std = labels.vibration_scale * np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 2)
-        columns.insert(2, Column(f"std{unit}", std, error_figures))
+    if std is not None:
+        columns.insert(2, Column(f"std{unit}", labels.vibration_scale * std, error_figures))
     return Table("slow roll", tuple(columns))
 
 

@@ -56,10 +56,10 @@ class AmplitudeErrors:
 
     def __post_init__(self) -> None:
         values = (self.relative, self.phase, self.floor)
-        if not all(np.isfinite(v) and v >= 0 for v in values):
-            raise ValueError(f"errors of amplitudes must be finite and not negative; got {values}")
-        if not any(values):
-            raise ValueError("state at least one error of the amplitudes greater than zero, or none at all")
+        if not all(np.isfinite(v) and v >= 0 for v in values) or not any(values):
+            raise ValueError(
+                f"errors of amplitudes are finite, not negative, and one greater than zero; got {values}"
+            )
 
     def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
         """Covariance of real and imaginary part, shape (…, 2, 2), for amplitudes (…).
@@ -168,12 +168,14 @@ class Experiments:
     def __post_init__(self) -> None:
         if not (n := len(self.names)):
             raise ValueError("there are no experiments")
-        parts: dict[str, AnyArray] = {"frequencies": self.frequencies}
-        parts |= {f"amplitudes {name}": values for name, values in self.signals.items()}
-        parts |= {f"covariances of {name}": values for name, values in self.covariances.items()}
-        for what, values in parts.items():
-            if np.shape(values) != ((n, 2, 2) if what.startswith("cov") else (n,)) or np.isinf(values).any():
-                raise ValueError(f"the {what} must be finite (amplitudes NaN: not measured), {n} of them")
+        parts: list[tuple[tuple[int, ...], Mapping[str, AnyArray]]] = [
+            ((n,), {"frequencies": self.frequencies, **self.signals}),
+            ((n, 2, 2), self.covariances),
+        ]
+        for shape, columns in parts:
+            for what, values in columns.items():
+                if np.shape(values) != shape or np.isinf(values).any():
+                    raise ValueError(f"{what}: {n} finite values are needed (NaN: not measured)")
         if not (np.asarray(self.frequencies) >= 0).all():
             raise ValueError(f"frequencies must be finite and not negative; got {self.frequencies.tolist()}")
 

@@ -1,9 +1,9 @@
 """What must be known of a fit to time records before its numbers are used, the worst first.
 
-The model does not describe the record; its residuals are no noise, or hum; steps from sample to sample are
-too coarse; times cannot be as stated. A series is one output of one record. A column c beside the
-sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of squares, with c⊥ its part outside them. So hum is looked for
-in a periodogram that gives back what the parameters have taken of a sinusoid, beside a resonance most of it.
+The model does not describe the record; its residuals are no noise, or hum; times cannot be as stated. A
+series is one output of one record. A column c beside the sensitivities J takes (c⊥ᵀr)²/c⊥ᵀc⊥ of the sum of
+squares, with c⊥ its part outside them. So hum is looked for in a periodogram that gives back what the
+parameters have taken of a sinusoid, beside a resonance most of it.
 
 Where records do not determine every parameter: the outputs depend on them by the coefficients of the
 equations alone, in dx/dt = −(a + b) x + g h u by a + b and g h. A coefficient, or a product or quotient of
@@ -22,8 +22,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import RTOL, Iterations, Problem, at
-from rotorid.identify.simulation import STEPWISE
+from rotorid.identify.record_residuals import Iterations, Problem, at
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.normal_matrix import normal_matrix
@@ -50,14 +49,12 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     """The estimate of a fit, without intervals where these would mislead, and what else `Fit` says of it."""
     estimate, theta, linear = path.estimate, path.estimate.solution, loss == "linear"
     words = ["" if path.converged else f"{path.message}; no intervals are given"]
-    judged: dict[str, Any] = dict.fromkeys(
-        ("integration_change", "autocorrelation", "prior", "normal_matrix")
-    )
     try:
         r, J = estimate.residuals, problem.jacobian(theta)
     except SimulationError as error:
         words.append(f"the model cannot be simulated with the result: {error}")
-        return judged | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
+        nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
+        return nothing | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
     prior = effect(problem.prior, J, r, theta, stated=problem.stated, at_bounds=path.at_bounds)
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
@@ -69,8 +66,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
-    change, integration = _integration(problem, estimate, J)
-    words += [integration, poor, cause, path.bound_warning]
+    words += [poor, cause, path.bound_warning]
     if path.converged:
         estimate = combined(problem, estimate)
         words += ["" if estimate.full_rank or poor else estimate.describe_rank()]
@@ -86,11 +82,10 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         )
     words += [] if poor else [*_errors_words(problem, estimate, r, linear)]
     sound = path.converged and not poor and not wrong and not problem.prior.ridge
-    return judged | {
+    return {
         "estimate": _widened(estimate, factor if sound else None),
         "reliable": sound and factor == 1,
         "warnings": [*words, _fast(problem, theta)],
-        "integration_change": change,
         "autocorrelation": rho,
         "prior": prior,
         "normal_matrix": normal_matrix(estimate.names, path.regression[0] if path.regression else J),
@@ -107,7 +102,7 @@ def misfit(problem: Problem, estimate: Estimate, r: FloatArray, loss: str) -> st
         far = loss == "linear" and float(r @ r) > MISFIT * estimate.dof
         why = estimate.misfit() if far else ""
         return f"{why}: {HINT}" if why else ""
-    for _, name, rows in problem.series:
+    for name, rows in problem.series:
         data, part = problem.data[rows], r[rows]
         if loss != "linear":  # without outliers
             limit = 3 * 1.4826 * float(np.median(np.abs(part)))
@@ -136,7 +131,7 @@ def _correlated(problem: Problem, r: FloatArray, only: Sequence[slice] = ()) -> 
     up to the tenth neighbour in white residuals (Box and Pierce 1970); and how many times too narrow
     intervals are, with correlations that fade as the first.
     """
-    parts = [r[rows] for rows in only or [rows for *_, rows in problem.series]]
+    parts = [r[rows] for rows in only or [rows for _, rows in problem.series]]
     parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in parts]
     size = sum(map(len, parts))
     lags = range(1, 1 + min(LAGS, max(1, min(map(len, parts)) // 5)))
@@ -168,7 +163,7 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
         1.0,
         slice(0),
     )  # of noise it is χ² of two
-    for *_, rows in problem.series:
+    for _, rows in problem.series:
         times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
@@ -210,54 +205,21 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     ), shift > FAR
 
 
-# -- errors of the outputs, of coarse steps and of the times
-
-
-def output_errors(problem: Problem, r: FloatArray, n_parameters: int) -> dict[str, float]:
-    """Standard deviation of each output from its residuals; none where only rounding is left."""
-    if _rounding_only(problem, r):
-        return {}
-    rows: dict[str, list[FloatArray]] = {}
-    for name, _, part in problem.series:
-        rows.setdefault(name, []).append(r[part] / problem.scale[part])
-    share = 1 - min(n_parameters / len(r), 0.9)
-    errors = {name: float(np.sqrt(np.mean(np.concatenate(x) ** 2) / share)) for name, x in rows.items()}
-    least = 1e-6 * max(errors.values())  # an output that is met exactly would count for everything
-    return {name: max(size, least) for name, size in errors.items()}
-
-
 def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: bool) -> Iterator[str]:
     """Where errors are unequal, or not as stated."""
     sizes = {
         words: np.sqrt(np.mean((r[rows] / problem.scale[rows]) ** 2))
-        for _, words, rows in problem.series
+        for words, rows in problem.series
         if rows.stop - rows.start >= FEWEST
     }
-    alike = problem.stated or problem.errors or _rounding_only(problem, r) or not sizes
+    alike = problem.stated or _rounding_only(problem, r) or not sizes
     if linear and not alike and max(sizes.values()) >= 2 * min(sizes.values()):
         yield (
             f"the outputs have different errors ({', '.join(f'{n} {s:.2g}' for n, s in sizes.items())}), "
-            "but the intervals hold for equal ones. With --sigma auto precise outputs count for more"
+            "but the intervals hold for equal ones. Stated with --sigma, precise outputs count for more"
         )
     if why := estimate.misfit():
         yield f"{why}: intervals are too narrow, or the model does not quite describe the record"
-
-
-def _integration(problem: Problem, estimate: Estimate, J: FloatArray) -> tuple[FloatArray | None, str]:
-    """Change of the parameters with error control instead of steps from sample to sample (n,), and words."""
-    theta = estimate.solution
-    if problem.runs[0].integrator not in STEPWISE:
-        return None, ""
-    missed = problem.residual(theta) - problem.again("auto", RTOL, problem.errors).residual(theta)
-    change = solution(problem.prior.below(J), np.append(missed, np.zeros(len(problem.prior))), rcond=RCOND)
-    limit = 1e-8 * np.abs(theta)
-    if estimate.std is not None:
-        limit = np.maximum(limit, 0.1 * np.nan_to_num(estimate.std))
-    j = int(np.argmax(np.abs(change) / np.maximum(limit, 1e-300)))
-    far = f"{estimate.names[j]} by about {change[j]:.2g}"
-    far += "" if estimate.std is None else f" (standard deviation {estimate.std[j]:.2g})"
-    worse = abs(change[j]) > limit[j]
-    return change, f"a more accurate integration would change {far}" if worse else ""
 
 
 def _fast(problem: Problem, theta: FloatArray) -> str:

@@ -200,16 +200,6 @@ def _written(words: Expression) -> str:
     return str(printer.doprint(words.xreplace(decimals)))
 
 
-def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
-    """Say which parameters and combinations are determined and which parameters are not."""
-    seen = [name for name in parameters if name not in lost]
-    seen += [w for w in words if w not in seen and any(n in NAME.findall(w) for n in lost)]
-    verb = "is" if len(seen) == 1 else "are"
-    text = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
-    itself = "itself is" if len(lost) == 1 else "themselves are"
-    return f"{text}; {listing(lost, 'and')} by {itself} not"
-
-
 def why_several(solutions: Sequence[FloatArray], names: Sequence[str], differ: Sequence[int]) -> list[str]:
     """Say in words how several solutions (n,) differ in the parameters of these indices."""
     if len(solutions) < 2 or not len(differ):

@@ -29,6 +29,7 @@ from rotorid.identify.combinations import (
     insert,
     times,
 )
+from rotorid.identify.expressions import check_names, finite, names, parse_equation
 from rotorid.identify.operator_model import HarmonicModel
 
 MAX_TERMS = 20_000
@@ -74,13 +75,13 @@ def harmonic_model(
     >>> model.outputs, model.inputs
     (('X',), ('F',))
     """
-    from rotorid.identify.expressions import names, parse_equation
-
     texts = (equations,) if isinstance(equations, str) else tuple(equations)
     if not texts:
         raise ValueError("the model has no equations")
-    numbers = {name: _finite(name, value) for name, value in (known or {}).items()}
-    _check_names(tuple(estimate), numbers)
+    if not estimate:
+        raise ValueError("no parameter is to be estimated: name at least one")
+    numbers = {name: finite(name, value) for name, value in (known or {}).items()}
+    check_names({"parameter": estimate, "known value": numbers}, P, "d/dt")
     sides = [parse_equation(text, where=f"equation {i + 1}") for i, text in enumerate(texts)]
     left, right = ({n for side in sides for n in names(side[i])} for i in (0, 1))
     others = sorted((left | right) - {P, *numbers, *estimate})
@@ -266,26 +267,3 @@ def _row_by_row(
     alone -= set(stated)
     beside = {n for term in terms if len(alone.intersection(term)) == 1 for n in set(term) - alone}
     return frozenset(beside | set(stated))
-
-
-def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
-    from rotorid.identify.expressions import is_name
-
-    if not estimate:
-        raise ValueError("no parameter is to be estimated: name at least one")
-    for name in (*estimate, *known):
-        if not is_name(name):
-            raise ValueError(f"'{name}' cannot be a name: letters, digits and _ only, and no function's name")
-        if name == P:
-            raise ValueError("p is d/dt: it can be neither known nor estimated")
-    for name in estimate:
-        if estimate.count(name) > 1:
-            raise ValueError(f"the parameter {name} is named twice")
-        if name in known:
-            raise ValueError(f"{name} is both known and to be estimated")
-
-
-def _finite(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-        raise ValueError(f"the known {name} must be a finite number; got {value!r}")
-    return float(value)

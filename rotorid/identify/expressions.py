@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
+from numbers import Real
 from typing import Any, NamedTuple
 
 FUNCTIONS = (
@@ -74,6 +75,30 @@ def quote(text: str, position: int = 0, width: int = 60) -> str:
 def is_name(text: str) -> bool:
     """Whether a model may use this as a name."""
     return re.fullmatch(_NAME, text) is not None and text not in FUNCTIONS
+
+
+def check_names(kinds: Mapping[str, Iterable[str]], variable: str, meaning: str) -> None:
+    """Refuse what is no name, or used twice, but for an output; the variable has a meaning of its own."""
+    seen: dict[str, str] = {}
+    for kind, name in ((kind, name) for kind, names in kinds.items() for name in names):
+        if name == variable:
+            raise ValueError(f"{kind} {name}: {name} is {meaning}; choose another name")
+        if not isinstance(name, str) or not is_name(name):
+            raise ValueError(
+                f"{kind} {name!r} is no name; a name begins with a letter, has letters, digits and _, and is "
+                "not the name of a function"
+            )
+        if name in seen and kind != "output":
+            other = f"a {seen[name]}" if seen[name] != kind else "given"
+            raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
+        seen[name] = kind
+
+
+def finite(place: str, value: Any) -> float:  # noqa: ANN401
+    """The value, if it is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ValueError(f"{place}: its value must be a finite number, not {value!r}")
+    return float(value)
 
 
 def parse(text: str, *, where: str = "") -> Any:  # noqa: ANN401  sympy has no types
@@ -167,7 +192,7 @@ class _Parser:
     """Recursive descent; sums and products are collected before sympy sees them, which keeps them quick."""
 
     def __init__(self, text: str, where: str) -> None:
-        self.text, self.where, self.depth, self.place = text, where, 0, 0
+        self.text, self.where, self.depth = text, where, 0
         if not isinstance(text, str):
             raise ExpressionError(repr(text), 0, "an expression is a text in quotes", where)
         if len(text) > MAX_LENGTH:
@@ -181,66 +206,64 @@ class _Parser:
                 shown = sign if sign.isprintable() else repr(sign)[1:-1]
                 hint = _HINTS.get(sign, f"expressions have {allowed}")
                 raise self.error(at, f"{shown} cannot stand here: {hint}")
-        self.tokens = [token for token in every if token.kind != "blank"]
-        self.tokens += [_Token("end", "", len(text))] * 2  # one to take, and one behind it
+        self.rest = iter([token for token in every if token.kind != "blank"])
+        self.next = self.end = _Token("end", "", len(text))
+        self.take()
 
     def error(self, at: int, hint: str) -> ExpressionError:
         return ExpressionError(self.text, at, hint, self.where)
 
-    @property
-    def next(self) -> _Token:
-        return self.tokens[self.place]
-
     def take(self) -> _Token:
-        self.place += 1
-        return self.tokens[self.place - 1]
+        token, self.next = self.next, next(self.rest, self.end)
+        return token
 
     def sides(self) -> list[Any]:
         """The expressions between the signs =."""
-        sides = [self.sum().expr]
+        sides = [self.chain().expr]
         while self.next.text == "=":
             self.take()
-            sides.append(self.sum().expr)
-        if self.next.kind != "end":
-            raise self.unexpected()
+            sides.append(self.chain().expr)
+        self.expect("end")
         return sides
 
-    def unexpected(self) -> ExpressionError:
+    def expect(self, kind: str) -> None:
+        """Refuse what stands here instead of this."""
         token = self.next
-        if token.text == ")":
-            return self.error(token.at, "this parenthesis closes nothing")
-        return self.error(token.at, f"an operator such as * is missing before {token.text}")
+        if token.text == ")" != kind:
+            raise self.error(token.at, "this parenthesis closes nothing")
+        if kind not in (token.kind, token.text):
+            raise self.error(token.at, f"an operator such as * is missing before {token.text}")
 
-    def sum(self) -> _Node:
+    def chain(self, *, product: bool = False) -> _Node:
+        """A sum of products, or a product."""
         import sympy
 
-        return self.chain(self.product, ("+", "-"), sympy.Add)
-
-    def product(self) -> _Node:
-        import sympy
-
-        return self.chain(self.unary, ("*", "/"), sympy.Mul)
-
-    def chain(self, operand: Callable[[], _Node], signs: tuple[str, str], join: Callable[..., Any]) -> _Node:
-        nodes, at = [operand()], self.next.at
-        while self.next.text in signs:
-            sign, node = self.take(), operand()
+        at, nodes, sign = self.next.at, list[_Node](), self.end
+        join, signs = (sympy.Mul, ("*", "/")) if product else (sympy.Add, ("+", "-"))
+        while sign.text in signs or not nodes:
+            node = self.unary() if product else self.chain(product=True)
             if sign.text == "/" and node.number == 0:  # such as x/(y - y)
                 raise self.error(sign.at, "division by zero")
-            if sign.text in "-/":
+            if sign.text in ("-", "/"):
                 node = node._replace(expr=-node.expr if sign.text == "-" else 1 / node.expr)
             nodes.append(node)
-        if len(nodes) == 1:
-            return nodes[0]
+            sign = self.take() if self.next.text in signs else self.end
         exprs, bits = zip(*nodes, strict=True)
-        return self.node(at, lambda: join(*exprs), sum(bits))
+        return self.node(at, lambda: join(*exprs), sum(bits)) if len(nodes) > 1 else nodes[0]
 
     def unary(self) -> _Node:
-        if self.next.text not in ("+", "-"):
-            return self.power()
-        sign = self.take()
-        node = self.deeper(sign, self.unary)
-        return node if sign.text == "+" else node._replace(expr=-node.expr)
+        """A power, perhaps with a sign; all that is nested passes here."""
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.error(self.next.at, f"the expression is nested deeper than {MAX_DEPTH}")
+        if self.next.text in ("+", "-"):
+            minus = self.take().text == "-"
+            node = self.unary()
+            node = node._replace(expr=-node.expr) if minus else node
+        else:
+            node = self.power()
+        self.depth -= 1
+        return node
 
     def power(self) -> _Node:
         import sympy
@@ -248,110 +271,79 @@ class _Parser:
         base = self.atom()
         if self.next.text != "**":
             return base
-        sign = self.take()
-        exponent = self.deeper(sign, self.unary)
+        at, exponent = self.take().at, self.unary()
         x, n = base.number, exponent.number
         if n is not None and abs(n) > MAX_EXPONENT:
-            raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
+            raise self.error(at, f"an exponent is at most {MAX_EXPONENT} in size")
         if x == 0 and n is not None and n < 0:
-            raise self.error(sign.at, "division by zero")
+            raise self.error(at, "division by zero")
         if x is not None and n is not None and n.denominator > 1:
-            return self.real(lambda: math.pow(x, n), sign.at, "this power")
+            return self.node(at, lambda: math.pow(x, n))
         bits = base.bits * (1 if n is None else max(1, math.ceil(abs(n)))) + exponent.bits
-        return self.node(sign.at, lambda: sympy.Pow(base.expr, exponent.expr), bits)
+        return self.node(at, lambda: sympy.Pow(base.expr, exponent.expr), bits)
 
     def atom(self) -> _Node:
         import sympy
 
-        token, after = self.take(), self.next
-        if token.text == "(":
-            return self.enclosed(token)
-        if token.kind == "end":
-            raise self.error(token.at, "the expression ends here, but a name, a number or ( must follow")
-        if token.kind == "sign":
-            raise self.error(token.at, f"a name, a number or ( is expected before {token.text}")
-        if token.kind == "number":
-            if after.kind in ("name", "number") and after.at == token.at + len(token.text):
-                raise self.error(after.at, f"a product is written with *: {token.text}*{after.text}")
-            return self.number(token)
-        called = after.text == "("
-        if token.text in FUNCTIONS:
-            if not called:
-                raise self.error(
-                    token.at,
-                    f"{token.text} is a function: {token.text}(…); choose another name for a quantity",
-                )
-            return self.function(token.text, self.enclosed(self.take()), token.at)
-        if called:
-            near = [f for f in FUNCTIONS if f.startswith(token.text.casefold()[:3])]
+        (kind, text, at), after = self.take(), self.next
+        if text == "(":
+            node = self.chain()
+            if self.next.kind == "end":
+                raise self.error(at, "this parenthesis is never closed")
+            self.expect(")")
+            self.take()
+            return node
+        if kind in ("end", "sign"):
+            here = f"before {text}" if text else "where the expression ends here"
+            raise self.error(at, f"a name, a number or ( is expected {here}")
+        if kind == "number":
+            if after.kind in ("name", "number") and after.at == at + len(text):
+                raise self.error(after.at, f"a product is written with *: {text}*{after.text}")
+            size, above = float(text), re.search("[1-9]", re.split("[eE]", text)[0])
+            exact = len(text) <= 400 and size <= LARGEST and (size >= 1 / LARGEST or not above)
+            return self.node(at, lambda: Fraction(text) if exact else Fraction(LARGEST) ** 2)
+        if text in FUNCTIONS:
+            if after.text != "(":
+                raise self.error(at, f"{text} is a function: {text}(…); choose another name for a quantity")
+            return self.function(text, self.atom(), at)
+        if after.text == "(":
+            near = [f for f in FUNCTIONS if f.startswith(text.casefold()[:3])]
             meant = f"did you mean {near[0]}? " if near else ""
-            raise self.error(
-                token.at,
-                f"{token.text} is no function ({meant}functions are {', '.join(FUNCTIONS)}); a product is "
-                "written *",
-            )
-        return _Node(sympy.Symbol(token.text))
-
-    def enclosed(self, opened: _Token) -> _Node:
-        node = self.deeper(opened, self.sum)
-        if self.next.kind == "end":
-            raise self.error(opened.at, "this parenthesis is never closed")
-        if self.next.text != ")":
-            raise self.unexpected()
-        self.take()
-        return node
-
-    def number(self, token: _Token) -> _Node:
-        size, above = float(token.text), re.search("[1-9]", re.split("[eE]", token.text)[0])
-        if len(token.text) > 400 or size > LARGEST or (above and size < 1 / LARGEST):
-            raise self.unsized(token.at)
-        return self.constant(Fraction(token.text), token.at)
-
-    def unsized(self, at: int) -> ExpressionError:
-        least = f"{1 / LARGEST:g} or 0"
-        return self.error(at, f"a number is at most {LARGEST:g} in size, and at least {least}")
+            functions = f"{meant}functions are {', '.join(FUNCTIONS)}"
+            raise self.error(at, f"{text} is no function ({functions}); a product is written *")
+        return _Node(sympy.Symbol(text))
 
     def function(self, name: str, argument: _Node, at: int) -> _Node:
         import sympy
 
         x = argument.number
         if x is not None and name in ("abs", "sign"):
-            return self.constant(abs(x) if name == "abs" else Fraction((x > 0) - (x < 0)), at)
+            return self.node(at, lambda: abs(x) if name == "abs" else Fraction((x > 0) - (x < 0)))
         if x is not None:
-            return self.real(lambda: getattr(math, name)(x), at, f"{name}({float(x):g})")
+            return self.node(at, lambda: getattr(math, name)(x))
         called = getattr(sympy, "Abs" if name == "abs" else name)
         # unevaluated: sympy's simplifications may search for long
         options = {} if name == "sqrt" else {"evaluate": False}
         return self.node(at, lambda: called(argument.expr, **options), argument.bits)
 
-    def real(self, compute: Callable[[], float], at: int, what: str) -> _Node:
-        try:
-            value = compute()
-        except (ValueError, OverflowError):
-            value = math.nan
-        if not math.isfinite(value):
-            raise self.error(at, f"{what} is no finite real number")
-        return self.constant(Fraction(repr(value)), at)  # the shortest decimal: 0.01**0.5 is 1/10
-
-    def constant(self, number: Fraction, at: int) -> _Node:
+    def node(self, at: int, build: Callable[[], Any], bits: int = 1) -> _Node:
+        """What is built once its size is known to be allowed; a number must be real, and in bounds."""
         import sympy
 
-        if number and not 1 / Fraction(LARGEST) <= abs(number) <= Fraction(LARGEST):
-            raise self.unsized(at)
-        bits = number.numerator.bit_length() + number.denominator.bit_length()
-        return _Node(sympy.Rational(number.numerator, number.denominator), bits)
-
-    def node(self, at: int, build: Callable[[], Any], bits: int) -> _Node:
-        """What is built once its size is known to be allowed."""
         if bits > MAX_BITS:
             raise self.error(at, "this expression is too large; write it in parts or with smaller powers")
-        node = _Node(build(), bits)
-        return node if node.number is None else self.constant(node.number, at)
-
-    def deeper(self, token: _Token, inner: Callable[[], _Node]) -> _Node:
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise self.error(token.at, f"the expression is nested deeper than {MAX_DEPTH}")
-        node = inner()
-        self.depth -= 1
-        return node
+        try:
+            value = build()
+            value = Fraction(repr(value)) if isinstance(value, float) else value  # 0.01**0.5 is 1/10
+        except (ValueError, OverflowError):
+            raise self.error(at, "this is no finite real number") from None
+        node = _Node(
+            sympy.Rational(*value.as_integer_ratio()) if isinstance(value, Fraction) else value, bits
+        )
+        number = node.number
+        if number is None:
+            return node
+        if number and not 1 / Fraction(LARGEST) <= abs(number) <= Fraction(LARGEST):
+            least = f"{1 / LARGEST:g} or 0"
+            raise self.error(at, f"a number is at most {LARGEST:g} in size, and at least {least}")
+        return node._replace(bits=number.numerator.bit_length() + number.denominator.bit_length())

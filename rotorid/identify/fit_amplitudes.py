@@ -24,8 +24,9 @@ from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
-from rotorid.identify.combinations import NAME, only_determined, why_several
+from rotorid.identify.combinations import NAME, why_several
 from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
+from rotorid.identify.ode import check_known
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
@@ -35,7 +36,7 @@ from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import together
-from rotorid.regression.undetermined_combinations import FoundCombination
+from rotorid.regression.undetermined_combinations import FoundCombination, only_determined
 
 REWEIGHTINGS, MOVED = 2, 0.01
 """Rounds at most with weights from predicted amplitudes, after the first with measured ones; standard
@@ -103,8 +104,7 @@ def _check(
     """Refuse names that are not the model's, or that stand for two things."""
     find(LOSSES, loss, "loss")
     for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
-        if wrong := [name for name in names if name not in model.parameters]:
-            raise ValueError(f"{what}: {wrong[0]} is no parameter; those are {', '.join(model.parameters)}")
+        check_known(what, names, "parameter", model.parameters)
     for name, (low, high) in bounds.items():
         if low is not None and high is not None and not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
@@ -331,8 +331,6 @@ def _finished(answer: Identification, bounds: Bounds) -> Identification:
         for name in model.parameters
         if not name.isidentifier()
     ]
-    if answer.linear and answer.solutions and not answer.linear.recovery.sure:
-        words.append("the parameters were found by a search; there may be more solutions than shown")
     words += answer.warnings
     if answer.converged:
         high = answer.values if answer.ci95 is None else np.fmax(answer.values, answer.ci95[:, 1])

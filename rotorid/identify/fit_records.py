@@ -13,7 +13,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
-from rotorid.identify.checks_records import judge, misfit, output_errors
+from rotorid.identify.checks_records import judge, misfit
+from rotorid.identify.expressions import finite
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.quasilinearization import quasilinearization
 from rotorid.identify.record_residuals import RTOL, Iterations, Problem
@@ -48,7 +49,6 @@ def fit(  # noqa: PLR0913
     tolerance: float | None = None,
     rtol: float = RTOL,
     seed: int = 0,
-    weigh: bool = False,
     ridge: float = 0.0,
 ) -> Fit:
     """Estimate the parameters of a model from time records.
@@ -58,7 +58,8 @@ def fit(  # noqa: PLR0913
     model
         Of `ode_model` or `second_order`.
     records
-        One, or several that share the parameters.
+        One, or several that share the parameters. Without stated errors all samples count alike, whatever
+        their unit.
     method
         One of `METHODS`.
     integrator
@@ -79,9 +80,6 @@ def fit(  # noqa: PLR0913
         Of the integration.
     seed
         Of the other starts.
-    weigh
-        Estimate the standard deviation of each output from its residuals and weigh by it, until it stays.
-        Without stated errors all samples count alike otherwise, whatever their unit.
     ridge
         λ of a ridge towards the starting values, as `rotorid.regression.prior` has it.
 
@@ -106,13 +104,12 @@ def fit(  # noqa: PLR0913
         raise ValueError(f"starts and max_iterations must be at least 1, and starts at most {MOST_STARTS:,}")
     if not 0 < (1.0 if tolerance is None else tolerance) < np.inf:
         raise ValueError(f"the tolerance is a number above 0, not {tolerance:g}")
-    _check(model, several, method, integrator, loss, weigh)
+    _check(model, several, method, integrator, loss)
     problem = Problem(model, several, integrator, rtol)
     (low, high), names = problem.model.bounds.T, problem.model.parameters
     begin = inside(_start(problem, start or {}), low, high)
-    prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
-    if ridge or not weigh:
-        problem.prior = prior
+    known = for_copies(model, len(several), model.prior)
+    problem.prior = prior_rows(names, known, ridge, begin, problem.jacobian)
 
     def search(problem: Problem, theta: FloatArray) -> Iterations:
         near = (1e-8, 1e-5) if tolerance is None else (1e-6, 0.1)
@@ -127,7 +124,7 @@ def fit(  # noqa: PLR0913
             problem.jacobian,
             theta,
             names=names,
-            sigma_stated=problem.scaled,
+            sigma_stated=problem.stated,
             bounds={name: (a, b) for name, a, b in zip(names, low, high, strict=True)},
             loss=loss,
             max_iterations=max_iterations,
@@ -141,18 +138,8 @@ def fit(  # noqa: PLR0913
     path = min(paths, key=_cost)
     if starts is None and method == "levenberg-marquardt" and (path.converged or path.iterations > 20):
         path, more = _from_elsewhere(search, problem, path, begins[1:], loss)
-    words = [more, *_rivals(paths, path)]
-    if weigh:
-        problem, path = _weighed(search, problem, path)
-    if weigh and len(prior):
-        if not (path.converged and problem.errors):
-            raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
-        problem.prior = prior
-        paths = _searched(search, problem, [path.estimate.solution, *begins[1:count]])
-        path = min(paths, key=_cost).after(path.history)
-        words = [more, *_rivals(paths, path)]
     judged, theta = judge(problem, path, loss), path.estimate.solution
-    words = [*judged.pop("warnings"), *words]
+    words = [*judged.pop("warnings"), more, *_rivals(paths, path)]
     if ((theta < low) | (theta > high)).any():
         words.append(f"{method} knows no bounds, and the result lies outside those of the model")
     runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
@@ -166,7 +153,6 @@ def fit(  # noqa: PLR0913
         warnings=tuple(filter(None, words))[:MOST_WARNINGS],
         simulations=runs,
         residual_rms=float(np.sqrt(np.mean((path.estimate.residuals / problem.scale) ** 2))),
-        errors=problem.errors or None,
     )
 
 
@@ -228,18 +214,6 @@ def _from_elsewhere(
     )
 
 
-def _weighed(search: Searching, problem: Problem, path: Iterations) -> tuple[Problem, Iterations]:
-    """Weights from the residuals of the last fit, until they stay, or 20 times."""
-    for _ in range(20 if path.converged else 0):
-        errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
-        last = problem.errors
-        if all(abs(size - last.get(name, np.inf)) <= 0.002 * size for name, size in errors.items()):
-            break
-        problem = problem.again(problem.integrator, problem.rtol, errors)
-        path = search(problem, path.estimate.solution).after(path.history)
-    return problem, path
-
-
 def _cost(path: Iterations) -> float:
     return float(path.costs[-1])
 
@@ -262,15 +236,10 @@ def _start(problem: Problem, given: Mapping[str, float]) -> FloatArray:
     values |= recorded_starts(model, problem.records)
     given = for_copies(model, len(problem.records), given)
     check_known("start", given, "parameter", values)
-    theta = np.array([*(values | given).values()], dtype=float)
-    if not np.isfinite(theta).all():
-        raise ValueError("starting values must be finite numbers")
-    return theta
+    return np.array([finite(name, value) for name, value in (values | given).items()])
 
 
-def _check(
-    model: OdeModel, records: Sequence[Record], method: str, integrator: str, loss: str, weigh: bool
-) -> None:
+def _check(model: OdeModel, records: Sequence[Record], method: str, integrator: str, loss: str) -> None:
     """Refuse what does not go together."""
     if not model.parameters:
         raise ValueError(
@@ -281,11 +250,8 @@ def _check(
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
         raise ValueError("quasilinearization integrates with heun, sequential-heun, or error control (auto)")
-    stated = any(record.sigma is not None for record in records)
-    if weigh and stated:
-        raise ValueError("standard deviations are stated: there is nothing to estimate them for")
-    if model.prior and not (weigh or stated):
+    if model.prior and all(record.sigma is None for record in records):
         raise ValueError(
             "[prior] is weighed against the errors of the records: state them (--sigma 0.01, or columns "
-            "NAME_std), or have them estimated (--sigma auto)"
+            "NAME_std)"
         )

@@ -24,7 +24,6 @@ from rotorid.identify.combinations import (
     ONE,
     Monomial,
     Polynomial,
-    only_determined,
     sum_words,
     times,
     why_several,
@@ -32,7 +31,7 @@ from rotorid.identify.combinations import (
 from rotorid.identify.operator_model import HarmonicModel, products_of_powers
 from rotorid.regression import least_squares, solution
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.undetermined_combinations import echelon
+from rotorid.regression.undetermined_combinations import echelon, only_determined
 
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
@@ -46,8 +45,6 @@ STARTS, STEPS = 64, 50
 """Of Newton's method, which finds 308 of 310 solutions of drawn systems from 48; steps at most, also of the
 refinement, which ends where nothing is gained."""
 TINY = 1e-300
-MOST = 30
-"""Product of the degrees of combinations up to which their solutions are surely all found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +88,6 @@ class Recovery(NamedTuple):
         Parameters with one value in all solutions; NaN for the others.
     gain
         (n, q): change of the parameters per change of the combinations; NaN rows where nobody knows.
-    sure
-        False: the equations are of so high a degree that there may be more solutions.
     reasons
         In words, why there are several solutions or none.
     """
@@ -101,7 +96,6 @@ class Recovery(NamedTuple):
     undetermined: BoolArray
     values: FloatArray
     gain: FloatArray
-    sure: bool = True
     reasons: tuple[str, ...] = ()
 
 
@@ -306,17 +300,14 @@ def recover(system: System) -> Recovery:
             solutions.append(theta)
     if not solutions:
         reason = "no real values of the parameters give the estimated combinations"
-        return Recovery((), undetermined, values, gain, False, (reason,))
+        return Recovery((), undetermined, values, gain, (reason,))
     solutions.sort(key=lambda theta: [-float(f"{x:.6g}") for x in theta])  # not by what rounding leaves
     lost = several(solutions) | undetermined
     gain[free] = solution(weight @ system.combinations(solutions[0])[1][:, free], weight, rcond=1e-13)
     gain[undetermined] = np.nan
     reasons = why_several(solutions, system.names, np.flatnonzero(lost & ~undetermined).tolist())
     values = np.where(lost, np.nan, solutions[0])
-    degrees = ((system.matrix != 0) * np.abs(system.exponents).sum(axis=1)).max(axis=1)
-    return Recovery(
-        tuple(solutions), undetermined, values, gain, bool(degrees.prod() <= MOST), tuple(reasons)
-    )
+    return Recovery(tuple(solutions), undetermined, values, gain, tuple(reasons))
 
 
 def _candidates(system: System, free: list[int]) -> list[FloatArray]:

@@ -129,7 +129,7 @@ def peak_bands(
     H
         Responses (n, P).
     noise
-        Size (n, P) of what in these is no peak.
+        Size (P,) of what in these is no peak.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
         order = np.argsort(sweep.speeds, kind="stable")
         Z = sweep.vectors[order]
         slow = [z[~np.isnan(z)][:SLOWEST].mean() for z in Z.T]
-        around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise[order])
+        around = peak_bands(sweep.speeds[order], Z - slow, NOISE * sweep.noise)
     while True:
         fit = fit_modes(sweep, answers, bands, around)
         noise = fit.by_noise()
@@ -212,35 +212,29 @@ def _fit(sweep: Readings, answers: Answers, bands: Bands | None) -> FittedModes:
 
 
 def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
-    """What no speed changes: run-out, and modes far below. Vectors (C,) and covariances of their parts."""
+    """What no speed changes: run-out, and modes far below. Vectors and deviations of either part (C,)."""
     k = len(fit.ends)
     vectors, covariances = fit.predicted(lambda q: np.eye(k + 2, dtype=complex)[-1:] * q[0] ** 2)
-    return vectors[0], covariances[0]
+    return vectors[0], np.sqrt(np.trace(covariances[0], axis1=1, axis2=2) / 2)
 
 
 def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArray]:
-    """Mean of the vectors at or below a speed, rad/s: (C,), and covariances of their parts, NaN of one alone.
+    """Mean of the vectors at or below a speed, rad/s, and its deviation in either part as they scatter, (C,).
 
     Raises
     ------
     ValueError
         For a sensor without a vector there.
     """
-    slow = sweep.take(np.flatnonzero(sweep.speeds <= speed))
-    read, words = ~np.isnan(slow.vectors), sweep.labels.speed_words
-    count = read.sum(axis=0)
+    slow, words = sweep.vectors[sweep.speeds <= speed], sweep.labels.speed_words
+    count = (~np.isnan(slow)).sum(axis=0)
     if not count.all():
         raise ValueError(
             f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
             f"{words(speed)}; the lowest speed is {words(float(sweep.speeds.min()))}"
         )
-    mean, variances = np.nanmean(slow.vectors, axis=0), slow.covariances
-    if variances is None:  # as the vectors scatter
-        off = slow.vectors - mean
-        parts = np.stack((off.real, off.imag), axis=-1)
-        free = np.where(count > 1, 1 - 1 / count, np.nan)[:, None, None]
-        variances = parts[..., None] * parts[..., None, :] / free
-    return mean, np.where(read[..., None, None], variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
+    free = np.where(count > 1, 2.0 * (count - 1), np.nan)
+    return np.nanmean(slow, axis=0), np.nanstd(slow, axis=0) / np.sqrt(free)
 
 
 def vectors_when_passing(

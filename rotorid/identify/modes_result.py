@@ -20,7 +20,6 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.base.unit_words import SPEEDS
 from rotorid.identify.amplitudes import AmplitudeErrors, inverse_roots, real_matrices
 from rotorid.identify.answers import Answers
 from rotorid.regression.nonlinear import NonlinearEstimate
@@ -81,16 +80,9 @@ class Readings:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard deviation of each vector, (N, C): stated, or by differences of neighbours in speed."""
-        if self.covariances is not None:
-            return np.asarray(np.sqrt(np.trace(self.covariances, axis1=-2, axis2=-1)))
+        """Standard deviation of the vectors of each sensor, (C,), by differences of neighbours in speed."""
         second = np.diff(self.vectors[np.argsort(self.speeds, kind="stable")], 2, axis=0)
-        return np.tile(np.nanmedian(np.abs(second), axis=0) / np.sqrt(6 * np.log(2)), (len(self.speeds), 1))
-
-    def words(self, omega: float) -> str:
-        """A frequency in its unit."""
-        unit, scale = SPEEDS[self.labels.speed_unit]
-        return f"{scale * omega:.5g} {unit}"
+        return np.asarray(np.nanmedian(np.abs(second), axis=0) / np.sqrt(6 * np.log(2)))
 
     def roots(self, amplitudes: ComplexArray) -> FloatArray:
         """Inverse roots of the covariances at these amplitudes (N, C), (N, C, 2, 2)."""
@@ -230,7 +222,7 @@ class FittedModes:
         for mode, ((low, high), values) in enumerate(zip(self.ends, self.values.T, strict=True)):
             omega, zeta, error, other = values
             near = speeds[(3 * low - 2 * high <= speeds) & (speeds <= 3 * high - 2 * low)]
-            name = f"mode {mode + 1} ({self.readings.words(omega)})"
+            name = f"mode {mode + 1} ({self.readings.labels.speed_words(omega)})"
             if by_noise[mode] > RARE:
                 words.append(f"{name} is no more than noise: say in --bands where modes are")
             elif np.unique(np.abs(speeds - omega))[1] > ALONE * abs(zeta) * omega:

@@ -10,7 +10,6 @@ numerically, no matrix of symbols is inverted. With f = E⁻¹ r
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
 from rotorid.identify import expressions
 from rotorid.identify.expression_functions import Compiled, Expression, jacobian, real, signs
 
@@ -267,23 +267,16 @@ def ode_model(
     outputs = dict(outputs or {name: name for name in states})
     if not outputs:
         raise ValueError("a model needs states, or outputs of the time")
-    kinds = {"state": states, "parameter": estimate, "known value": known, "input": inputs}
-    _check_names(kinds | {"output": outputs})
+    recorded = {f"{x}_0": _measuring(x, outputs) for x in states if initial.get(x) == "record"}
+    initial |= {state: f"{state}_0" for state in states if initial.get(state) == "record"}
+    kinds = {"state": states, "parameter": (*estimate, *recorded), "known value": known, "input": inputs}
+    expressions.check_names(kinds | {"output": outputs}, "t", "the time")
     if missing := [name for name in states if name not in initial]:
         raise ValueError(f"initial: the value of the state {missing[0]} is missing")
     check_known("initial", initial, "state", states)
     check_known("per_record", per_record, "parameter", estimate)
-    for place, value in (*estimate.items(), *known.items()):
-        if isinstance(value, bool | str) or not np.isfinite(value):
-            raise ValueError(f"{place}: its value must be a finite number, not {value!r}")
+    begin, known = ({n: expressions.finite(n, x) for n, x in each.items()} for each in (estimate, known))
     names = ["t", *states, *estimate, *inputs]
-    measured = [x for x in states if initial[x] == "record" and "record" not in (*names, *known)]
-    recorded: dict[str, str] = {}
-    for state in measured:
-        parameter = f"{state}_0"
-        while parameter in (*names, *known):
-            parameter += "_"
-        initial[state], recorded[parameter] = parameter, _measuring(state, outputs)
     texts: dict[str, str] = {}
 
     def read(kind: str, given: Mapping[str, float | str], allowed: Collection[str]) -> tuple[Expression, ...]:
@@ -297,8 +290,8 @@ def ode_model(
         parameters=(*estimate, *recorded),
         outputs=tuple(outputs),
         inputs=tuple(inputs),
-        start=np.array([*estimate.values(), *(math.nan for _ in recorded)], dtype=float),
-        known={name: float(value) for name, value in known.items()},
+        start=np.array([*begin.values(), *(math.nan for _ in recorded)], dtype=float),
+        known=known,
         bounds=_limits(bounds or {}, estimate, len(recorded)),
         rates=read("state", states, names),
         initial=read("initial", {name: initial[name] for name in states}, (*estimate, *recorded)),
@@ -316,15 +309,12 @@ def read_expression(
     import sympy
 
     if not isinstance(text, str):
-        if isinstance(text, bool) or not np.isfinite(text):
-            raise ValueError(f"{where}: {text} is no finite number and no expression")
-        text = repr(float(text))
+        text = repr(expressions.finite(where, text))
     expr = expressions.parse(text, where=where)
     usable = sorted({*allowed, *known})
     for name in sorted(expressions.names(expr) - {*usable}):
-        near = difflib.get_close_matches(name, usable, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"it may use {', '.join(usable) or 'numbers'}"
-        raise ValueError(f"{where}: {expressions.quote(text)}: {name} is not defined here; {hint}")
+        hint = did_you_mean(name, usable) or f"; it may use {', '.join(usable) or 'numbers'}"
+        raise ValueError(f"{where}: {expressions.quote(text)}: {name} is not defined here{hint}")
     put = {sympy.Symbol(name): sympy.Rational(repr(float(value))) for name, value in known.items()}
     value = real(expr.subs(put))
     if value.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
@@ -343,10 +333,8 @@ def check_known(where: str, names: Iterable[str], kind: str, known: Collection[s
 
 def _measuring(state: str, outputs: Mapping[str, str]) -> str:
     """The output that measures a state, which begins as the record says."""
-    import sympy
-
     for output, text in outputs.items():
-        if expressions.parse(str(text), where=f"output {output}") == sympy.Symbol(state):
+        if str(text).strip("() ") == state:
             return output
     raise ValueError(
         f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or other '
@@ -371,30 +359,13 @@ def with_nuisance(
     terms = {"offset": "1"} if offset else {}
     terms |= {"drift": "t"} if drift else {}
     for frequency in hum_Hz:
-        name = f"hum{frequency:g}".replace(".", "_").replace("-", "_").replace("+", "")
+        name = f"hum{frequency:g}".replace(".", "_")
         terms |= {f"{name}_{wave}": f"{wave}({2 * math.pi * frequency!r}*t)" for wave in ("cos", "sin")}
     texts = {
         output: " + ".join([f"({text})", *(f"{name}_{output}*{term}" for name, term in terms.items())])
         for output, text in outputs.items()
     }
     return texts, [f"{name}_{output}" for output in outputs for name in terms]
-
-
-def _check_names(groups: Mapping[str, Collection[str]]) -> None:
-    """Refuse names that are none, or used twice; `groups` by kind."""
-    seen: dict[str, str] = {}
-    for kind, name in ((kind, name) for kind, names in groups.items() for name in names):
-        if name == "t":
-            raise ValueError(f"{kind} t: t is the time; choose another name")
-        if not isinstance(name, str) or not expressions.is_name(name):
-            raise ValueError(
-                f"{kind} {name!r} is no name; a name begins with a letter, has letters, digits and _, and is "
-                "not the name of a function"
-            )
-        if name in seen and kind != "output":
-            other = f"a {seen[name]}" if seen[name] != kind else "given"
-            raise ValueError(f"{kind} {name}: {name} is already {other}; choose another name")
-        seen[name] = kind
 
 
 def _limits(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, legend_below, look, new_figure, plain
 from rotorid.base.text import counted
-from rotorid.identify.records import record_names, refined
+from rotorid.identify.records import refined
 from rotorid.identify.simulation import STEPWISE, simulate
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
@@ -36,11 +37,11 @@ def figure_fit(result: Fit) -> Figure:
         draw_residuals(result, name, lower)
     for name, ax in zip(inputs, axes[2 * len(outputs) :], strict=True):
         for k, record in enumerate(result.records):
-            ax.plot(record.axis.scale * record.t, record.inputs[name], **_line(result, k))
+            ax.plot(record.axis.scale * record.t, record.inputs[name], **_styles(result, k)[1])
         _finish(ax, f"input {name}")
     axes[-1].set_xlabel(result.records[0].axis.word)
     figure.align_ylabels(axes)
-    stated = result.errors or any(record.sigma for record in result.records)
+    stated = any(record.sigma for record in result.records)
     title = f"points: measured, lines: model; residual = model − measured, ± {'2σ' if stated else '2 rms'}"
     more = len(result.records) - MANY
     title += f"; and {counted(more, 'more record')}" if more > 0 else ""
@@ -51,34 +52,35 @@ def figure_fit(result: Fit) -> Figure:
 
 def draw_signal(result: Fit, name: str, axes: Axes) -> None:
     """Measured samples (points) of an output and the fitted model (lines, fine between samples) over time."""
-    names = record_names([record.name for record in result.records])
+    names = [PurePath(record.name).name for record in result.records]
     for k, record in enumerate(result.records):
+        label = names[k] if names.count(names[k]) == 1 else f"record {k + 1}"
         if name in record.outputs:
-            label = names[k] if k < MANY else None
-            axes.plot(record.axis.scale * record.t, record.outputs[name], label=label, **_mark(result, k))
+            mark = _styles(result, k)[0] | ({"label": label} if k < MANY else {})
+            axes.plot(record.axis.scale * record.t, record.outputs[name], **mark)
     for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False)):
         if run.integrator not in STEPWISE and 1 < len(record) < CURVE_POINTS:
             finer, _ = refined(record, -(-CURVE_POINTS // (len(record) - 1)))
             run = simulate(result.models[k], result.estimate.solution, finer, sensitivities=False)
         y = run.y[:, result.model.outputs.index(name)]
-        axes.plot(record.axis.scale * run.t, y, **_line(result, k))
+        axes.plot(record.axis.scale * run.t, y, **_styles(result, k)[1])
     _finish(axes, name)
 
 
 def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
-    j, runs = result.model.outputs.index(name), [*zip(result.records, result.simulations, strict=False)]
-    residuals = [run.y[:, j] - record.outputs.get(name, np.nan) for record, run in runs]
-    measured = any(np.isfinite(r).any() for r in residuals)
-    if not measured:
-        words = "nothing measured" if runs else "the states diverge: no residuals"
-        axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
-    for k, (record, _) in enumerate(runs if measured else ()):
-        rms = np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))
-        band = 2 * np.broadcast_to((record.sigma or result.errors or {name: rms})[name], len(record))
+    j, runs = result.model.outputs.index(name), result.simulations
+    residuals = {
+        k: runs[k].y[:, j] - record.outputs[name]
+        for k, record in enumerate(result.records if runs else ())
+        if name in record.outputs
+    }
+    for k, r in residuals.items():
+        record, rms = result.records[k], np.sqrt(np.nanmean(np.concatenate([*residuals.values()]) ** 2))
+        band = 2 * np.broadcast_to((record.sigma or {name: rms})[name], len(record))
         t = record.axis.scale * record.t
         axes.fill_between(t, -band, band, color="#d9dde3", lw=0, zorder=0.5)
-        axes.plot(t, residuals[k], **_mark(result, k))
+        axes.plot(t, r, **_styles(result, k)[0])
     axes.axhline(0.0, color=QUIET, lw=0.8)
     _finish(axes, "residual")
 
@@ -93,17 +95,18 @@ def draw_parameters(result: Fit, axes: Axes) -> None:
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 
 
-def _mark(result: Fit, k: int) -> dict[str, Any]:
-    """Points of a record; of a single one in grey, so that the line of the model is seen on them."""
-    color = look(k)["color"] if len(result.records) > 1 else DARK
-    size = 5.0 if len(result.records[k]) <= 60 else 2.5
-    return {"linestyle": "", "marker": MARKERS[k % len(MARKERS)], "color": color, "ms": size, "alpha": 0.6}
-
-
-def _line(result: Fit, k: int) -> dict[str, Any]:
-    """Line of a record; a single value is a dash, as a line through it would not show."""
-    dash = {"marker": "_", "ms": 22.0} if len(result.records[k]) == 1 else {}
-    return {"lw": 1.3, **(look(k) if len(result.records) > 1 else {"color": BLUE}), **dash}
+def _styles(result: Fit, k: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Points and line of a record; points of a single one are grey, and the line of one sample is a dash."""
+    several, count = len(result.records) > 1, len(result.records[k])
+    line: dict[str, Any] = look(k) if several else {"color": BLUE}
+    marks = {
+        "linestyle": "",
+        "marker": MARKERS[k % len(MARKERS)],
+        "ms": 5.0 if count <= 60 else 2.5,
+        "alpha": 0.6,
+    }
+    marks["color"] = line["color"] if several else DARK
+    return marks, line | ({"marker": "_", "ms": 22.0} if count == 1 else {"lw": 1.3})
 
 
 def _finish(axes: Axes, name: str) -> None:

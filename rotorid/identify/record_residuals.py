@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.adaptive_steps import worth_compiling
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.records import Record, inputs_of, models_of
@@ -16,7 +16,7 @@ from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
-from rotorid.regression.prior import Prior, prior_rows
+from rotorid.regression.prior import prior_rows
 from rotorid.regression.search import RCOND
 
 LARGEST = 1e140
@@ -46,11 +46,6 @@ class Iterations(NonlinearEstimate):
     regression: tuple[FloatArray, FloatArray] | None = None
     stopped_by: str | None = None
 
-    def after(self, before: FloatArray) -> Iterations:
-        """The same, as the continuation of earlier steps, (k, n)."""
-        costs = np.append(np.full(len(before), np.nan), self.costs)
-        return replace(self, history=np.vstack((before, self.history)), costs=costs)
-
 
 class Problem:
     """Residuals y(t, θ) − measured, divided by the standard deviations where these are known.
@@ -65,10 +60,6 @@ class Problem:
         What is fitted to what.
     integrator, rtol
         Of `simulate`.
-    errors
-        Estimated standard deviation of each output, to weigh by; not stated ones.
-    prior
-        Rows that count with those of the records; none by default.
 
     Raises
     ------
@@ -83,11 +74,9 @@ class Problem:
         records: Sequence[Record],
         integrator: str = "auto",
         rtol: float = RTOL,
-        errors: Mapping[str, float] | None = None,
-        prior: Prior | None = None,
     ) -> None:
         self.given, self.records, outputs = model, tuple(records), model.outputs
-        self.integrator, self.rtol, self.errors = integrator, rtol, dict(errors or {})
+        self.integrator, self.rtol = integrator, rtol
         if not records:
             raise ValueError("a fit needs at least one record")
         for record in records:
@@ -95,30 +84,34 @@ class Problem:
         self.models = models_of(model, len(records))
         """One per record, all with the same parameters."""
         self.model = self.models[0]
-        self.prior = prior or prior_rows(self.model.parameters, {})
+        self.prior = prior_rows(self.model.parameters, {})
+        """Rows that count with those of the records."""
         self.inputs = [inputs_of(model, record) for record in records]
         self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
-        stated = [_table(record.sigma or {}, outputs, len(record)) for record in records]
-        self.masks = [~np.isnan(data) for data in self.measured]
-        known = np.concatenate([~np.isnan(s[m]) for s, m in zip(stated, self.masks, strict=True)])
-        self.stated = bool(known.any())
-        if self.stated and not known.all():
-            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        sizes = [self.errors.get(name, 1.0) for name in outputs]
-        self.weights = [1.0 / np.where(np.isnan(sigma), sizes, sigma) for sigma in stated]
-        self.series: list[tuple[str, str, slice]] = []
-        """Of each output of a record its name, words for it, and its rows."""
-        low = 0
-        for record, mask in zip(records, self.masks, strict=True):
-            mask[:1, self.model.fixed_at_first] = False
-            for name, count in zip(outputs, mask.sum(axis=0).tolist(), strict=True):
-                words = f"{name} in {record.name}" if len(records) > 1 else name
-                self.series += [(name, words, slice(low, low + count))] * (count > 0)
-                low += count
-        if not low:
+        self.series: list[tuple[str, slice]] = []
+        """Words for each output of a record, and its rows."""
+        n, low, high, places = len(outputs), 0, 0, list[IntArray]()
+        for record, table in zip(records, self.measured, strict=True):
+            seen = ~np.isnan(table)
+            seen[:1, self.model.fixed_at_first] = False
+            for j, name in enumerate(outputs):
+                places.append(low + n * np.flatnonzero(seen[:, j]) + j)
+                words, size = f"{name} in {record.name}" if len(records) > 1 else name, len(places[-1])
+                self.series += [(words, slice(high, high + size))] * (size > 0)
+                high += size
+            low += table.size
+        if not high:
             raise ValueError("the records have no samples of an output beside those that known values fix")
-        self.data, self.scale = self.vector(self.measured), self.vector([*map(np.ones_like, self.measured)])
-        """Measured values and 1 as weighted rows."""
+        self.places = np.concatenate(places)
+        """Of the rows in the samples of all outputs at the first time of the first record, at the next, …"""
+        self.scale = np.ones(high)
+        sigma = self.vector([_table(record.sigma or {}, outputs, len(record)) for record in records])
+        self.stated = not np.isnan(sigma).all()
+        if self.stated and np.isnan(sigma).any():
+            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
+        self.scale = 1.0 / sigma if self.stated else self.scale
+        """1 over the standard deviations."""
+        self.data = self.vector(self.measured)
         most = np.abs(self.data).max()
         if not (most == 0 or 1 / LARGEST < most < LARGEST):
             raise ValueError(
@@ -130,27 +123,14 @@ class Problem:
         self.quick = integrator
         """That of the evaluations: for "auto" that which is quick for this model and these times."""
 
-    @property
-    def scaled(self) -> bool:
-        """Whether a residual of 1 is one standard deviation, stated or estimated: a prior counts on it."""
-        return self.stated or (len(self.prior) > 0 and not self.prior.ridge)
-
-    def again(self, integrator: str, rtol: float, errors: Mapping[str, float]) -> Problem:
-        """The same problem, integrated or weighed otherwise."""
-        return Problem(self.given, self.records, integrator, rtol, errors, self.prior)
-
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
-        parts = [
-            np.swapaxes(table * weight.reshape(weight.shape + (1,) * (table.ndim - 2)), 0, 1)[mask.T]
-            for table, mask, weight in zip(tables, self.masks, self.weights, strict=True)
-        ]
-        return np.concatenate(parts)
+        flat = np.concatenate([table.reshape(-1, *table.shape[2:]) for table in tables])
+        return (flat[self.places].T * self.scale).T
 
     def by_time(self, columns: Sequence[FloatArray]) -> FloatArray:
         """What belongs to the times of each record, (n,), as rows without weights."""
-        tables = [np.tile(column[:, None], len(self.model.outputs)) for column in columns]
-        return self.vector(tables) / self.scale
+        return np.repeat(np.concatenate(columns), len(self.model.outputs))[self.places]
 
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
@@ -202,7 +182,7 @@ class Problem:
     def linear_fit(self, K: FloatArray, Y: FloatArray, theta: FloatArray) -> Estimate:
         """The step of the parameters (n,) from linearised rows K δ = Y, (m, n) and (m,), and the prior's."""
         A, y = self.prior.below(K), np.append(Y, -self.prior.residual(theta))
-        sigma = 1.0 if self.scaled else None
+        sigma = 1.0 if self.stated else None
         step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 

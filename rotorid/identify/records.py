@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import PurePath
 from typing import Any, TypeVar
 
 import numpy as np
@@ -31,7 +30,7 @@ class Record:
     inputs
         Measured inputs by name, shape (n,) each, without gaps; straight lines between samples.
     sigma
-        Standard deviations of outputs by name, a number or shape (n,); None: unknown.
+        Standard deviations of outputs by name, shape (n,), or a number for all samples; None: unknown.
     name
         For messages.
     axis
@@ -52,46 +51,28 @@ class Record:
     axis: Shown = SECONDS
 
     def __post_init__(self) -> None:
-        name, t = self.name, _column(self.t, f"{self.name}: the times")
+        name, t = self.name, _column(self.t, f"{self.name}: the times", np.shape(self.t))
         if not len(t):
             raise ValueError(f"{name} has no samples")
-        for i in np.flatnonzero(~np.isfinite(t))[:1]:
-            raise ValueError(f"{name}: the time in row {i + 1} is missing or infinite")
         for i in np.flatnonzero(np.diff(t) <= 0)[:1]:
             raise ValueError(
-                f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}; "
-                "sort the rows, merge samples of one time, or use one record for each run"
+                f"{name}: the times must increase, but t = {t[i + 1]:g} in row {i + 2} follows {t[i]:g}"
             )
-        object.__setattr__(self, "t", t)
-        for kind in ("outputs", "inputs"):
-            columns = {key: _column(x, f"{name}: {key}") for key, x in getattr(self, kind).items()}
-            object.__setattr__(self, kind, columns)
-            for key, column in columns.items():
-                if len(column) != len(t):
-                    raise ValueError(f"{name}: {key} has {len(column)} values, but there are {len(t)} times")
-                for i in np.flatnonzero(np.isinf(column))[:1]:
-                    raise ValueError(f"{name}: {key} is infinite in row {i + 1}; leave missing samples empty")
-                if kind == "inputs" and np.isnan(column).any():
-                    raise ValueError(
-                        f"{name}: the input {key} is missing at t = {t[np.isnan(column)][0]:g}; an input "
-                        "needs a value at every time"
-                    )
-        if self.sigma is not None:
-            object.__setattr__(self, "sigma", {key: self._deviation(key, x) for key, x in self.sigma.items()})
+        outputs, inputs, sigma = (
+            {key: _column(x, f"{name}: {key}", t.shape, gaps) for key, x in (columns or {}).items()}
+            for columns, gaps in ((self.outputs, True), (self.inputs, False), (self.sigma, True))
+        )
+        for key, std in sigma.items():
+            if key not in outputs:
+                raise ValueError(f"{name}: a standard deviation is given for {key}, which is no output")
+            if not ((std > 0) | np.isnan(outputs[key])).all():
+                raise ValueError(f"{name}: the standard deviation of {key} must be above 0")
+        columns = {"t": t, "outputs": outputs, "inputs": inputs, "sigma": sigma or None}
+        for kind, value in columns.items():
+            object.__setattr__(self, kind, value)
 
     def __len__(self) -> int:
         return len(self.t)
-
-    def _deviation(self, key: str, value: float | FloatArray) -> float | FloatArray:
-        place, array = f"{self.name}: the standard deviation of {key}", np.array(value, dtype=float)
-        if key not in self.outputs:
-            raise ValueError(f"{self.name}: a standard deviation is given for {key}, which is no output")
-        if array.shape not in ((), self.t.shape):
-            raise ValueError(f"{place} is one number or {len(self)}, one per time")
-        missing = np.isnan(self.outputs[key]) & (array.ndim > 0)
-        if not np.all((np.isfinite(array) & (array > 0)) | missing):
-            raise ValueError(f"{place} must be above 0")
-        return array if array.ndim else float(array)
 
 
 def refined(record: Record, every: int) -> tuple[Record, IntArray]:
@@ -115,21 +96,6 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
         have = ", ".join(record.inputs) or "none"
         raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
     return np.array([record.inputs[name] for name in model.inputs]).reshape(-1, len(record)).T
-
-
-def record_names(names: Sequence[str]) -> list[str]:
-    """Short names of records that tell them apart: without their folders, numbers where they are the same.
-
-    Examples
-    --------
-    >>> record_names(["a/run_1.csv", "a/run_2.csv"]), record_names(["a/x.csv", "b/x.csv"])
-    (['run_1.csv', 'run_2.csv'], ['a/x.csv', 'b/x.csv'])
-    >>> record_names(["the record", "the record"])
-    ['record 1', 'record 2']
-    """
-    numbers = [f"record {k + 1}" for k in range(len(names))]
-    ways = [PurePath(name).name or name for name in names], [*names], numbers
-    return next(way for way in ways if len({*way}) == len(names))
 
 
 def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
@@ -176,12 +142,9 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
     copies, starts = _copies(model, len(records)), {}
     for name, output in model.recorded.items():
         for copy, record in zip(copies[name], records, strict=True):
-            starts[copy] = float(record.outputs.get(output, np.full(1, np.nan))[0])
+            starts[copy] = float(record.outputs[output][0]) if output in record.outputs else np.nan
             if np.isnan(starts[copy]):
-                raise ValueError(
-                    f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
-                    f"[initial] takes it from the record; give a number there, or a parameter"
-                )
+                raise ValueError(f"{record.name}: {output} has no sample at the first time for [initial]")
     return starts
 
 
@@ -203,11 +166,15 @@ def _copies(model: OdeModel, count: int) -> dict[str, tuple[str, ...]]:
     return copies
 
 
-def _column(value: ArrayLike, what: str) -> FloatArray:
+def _column(value: ArrayLike, what: str, shape: tuple[int, ...], gaps: bool = False) -> FloatArray:
+    """A copy as finite numbers, one a time, NaN where there may be gaps; one number is that of all times."""
     try:
         column = np.array(value, dtype=float)
+        column = np.full(shape, column) if not column.ndim else column
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what} must be numbers") from error
-    if column.ndim != 1:
-        raise ValueError(f"{what} must be one column, not of shape {column.shape}")
+    if column.shape != shape or column.ndim != 1:
+        raise ValueError(f"{what} must be one column of a number for each time, not {column.shape}")
+    for i in np.flatnonzero(np.isinf(column) | (np.isnan(column) & (not gaps)))[:1]:
+        raise ValueError(f"{what}: the value in row {i + 1} is {column[i]:g}")
     return column

@@ -9,13 +9,12 @@ import numpy as np
 
 from rotorid.base import tables
 from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import frame
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
-from rotorid.identify.records import Record, record_names
+from rotorid.identify.records import Record
 from rotorid.identify.simulation import Trajectory
 from rotorid.regression.estimate import parameter_columns
 from rotorid.regression.normal_matrix import NormalMatrix
@@ -51,14 +50,10 @@ class Fit(Answered, Iterations):
         What must be known before the numbers are used.
     simulations
         States, outputs and sensitivities of each record with the result; empty where they diverge.
-    integration_change
-        Change of each parameter at a tighter tolerance; None where the solution is exact.
     autocorrelation
         Of neighbouring residuals; None for few samples or exact data.
     residual_rms
         In the unit of the outputs.
-    errors
-        Standard deviation of each output as estimated from its residuals, where these were the weights.
     prior
         What a prior or a ridge did to the estimate; None without any.
     normal_matrix
@@ -73,10 +68,8 @@ class Fit(Answered, Iterations):
     reliable: bool
     warnings: tuple[str, ...]
     simulations: tuple[Trajectory, ...]
-    integration_change: FloatArray | None
     autocorrelation: float | None
     residual_rms: float
-    errors: dict[str, float] | None
     prior: PriorEffect | None
     normal_matrix: NormalMatrix | None
 
@@ -112,30 +105,21 @@ class Fit(Answered, Iterations):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        names, change, series = self.parameters, self.integration_change, []
-        records = record_names([record.name for record in self.records])
-        for name, record, run in zip(records, self.records, self.simulations, strict=False):
-            for output, measured in record.outputs.items():
-                seen, y = np.isfinite(measured), run.y[:, self.model.outputs.index(output)]
-                rms = [float(np.sqrt(np.mean(x[seen] ** 2))) for x in (measured, y - measured) if seen.any()]
-                line = dict(zip(("rms", "residual_rms"), rms, strict=False))
-                series += [{"record": name, "output": output, "samples": int(seen.sum()), **line}] * bool(rms)
-        kept = "residual_rms method integrator loss converged message reliable stopped_by iterations errors"
+        names = self.parameters
+        kept = "residual_rms method integrator loss converged message reliable stopped_by iterations"
         document = {key: getattr(self, key) for key in f"{kept} at_bounds autocorrelation warnings".split()}
         document["history"] = [
             {"cost": cost, "parameters": dict(zip(names, row, strict=True))}
             for row, cost in zip(self.history, self.costs, strict=True)
         ]
-        document |= {"series": series, "solutions": []}
-        document["integration_change"] = None if change is None else dict(zip(names, change, strict=True))
+        document["solutions"] = []
         matrix = self.normal_matrix and self.normal_matrix.to_dict()
         more = {"normal_matrix": matrix, **(self.prior.to_dict() if self.prior else {})}
         return {**self.estimate.to_dict(), **plain(document), **more}
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per parameter: value, std, the 95 % interval, and whether it stands at a bound."""
-        at_bound = [name in self.at_bounds for name in self.parameters]
-        return frame((*parameter_columns(self.parameters, self.estimate), Column("at_bound", at_bound)))
+        """One row per parameter: value, std and the 95 % interval."""
+        return frame(parameter_columns(self.parameters, self.estimate))
 
     @property
     def answer(self) -> Answer:
@@ -157,9 +141,6 @@ class Fit(Answered, Iterations):
             judgement = f"NO intervals, see why. {judgement}"
         found = f"{parts.found}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
         found += f"\n  residual rms {self.residual_rms:.4g}"
-        if self.errors:
-            sizes = ", ".join(f"{name} {error:.3g}" for name, error in self.errors.items())
-            found += f"\n  estimated standard deviations, used as weights: {sizes}"
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
         return replace(

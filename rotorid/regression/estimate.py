@@ -14,7 +14,12 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import cell, plain
 from rotorid.base.result import Column
 from rotorid.base.text import error_figures, percent, sentence, table
-from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
+from rotorid.regression.undetermined_combinations import (
+    Combination,
+    combination_words,
+    echelon,
+    only_determined,
+)
 
 
 class Uncertain:
@@ -188,13 +193,8 @@ class Estimate(Answered, Uncertain):
             n, condition = len(self.names), self.condition_number
             who = "the parameter is" if n == 1 else f"all {n} parameters are"
             return f"{who} determined (condition number {condition:.3g})"
-        determined = [n for n in self.names if n not in self.undetermined]
-        determined += [c.words for c in self.combinations]
-        verb = "is" if len(determined) == 1 else "are"
-        seen = f"only {' and '.join(determined)} {verb} determined" if determined else "nothing is determined"
-        missing = ", ".join(self.undetermined)
-        one = "itself is" if len(self.undetermined) == 1 else "themselves are"
-        return f"{seen}; {missing} by {one} not (rank {self.rank} of {len(self.names)})"
+        words = only_determined(self.names, self.undetermined, [c.words for c in self.combinations])
+        return f"{words} (rank {self.rank} of {len(self.names)})"
 
     def _combination(self, row: FloatArray) -> Combination:
         cov = self.solution_covariance

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
 
 WORD_TOLERANCE = 1e-7
 """A parameter whose share in the null space is below this is taken as determined."""
@@ -59,6 +60,16 @@ def combination_words(coefficients: FloatArray, names: Sequence[str]) -> str:
         size = f"{abs(c):.4g}"
         text += sign + (name if size == "1" else f"{size}·{name}")
     return text
+
+
+def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
+    """Say which parameters and combinations, in words, are determined and which parameters are not."""
+    seen = [name for name in parameters if name not in lost]
+    seen += [w for w in words if w not in seen and any(name in w for name in lost)]
+    verb = "is" if len(seen) == 1 else "are"
+    text = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
+    itself = "itself is" if len(lost) == 1 else "themselves are"
+    return f"{text}; {listing(lost, 'and')} by {itself} not"
 
 
 def echelon(rows: FloatArray) -> list[FloatArray]:

@@ -258,15 +258,13 @@ fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
 fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3
-fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
-fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
+fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --report fit.html
 fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
 fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
 fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --tolerance 1e-3
 fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
 fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02
-fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma auto
 fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
 fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
 identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
@@ -353,7 +351,6 @@ PRIOR = {
 }
 EDITS = {
     "fit-prior": PRIOR,
-    "fit-prior-auto": PRIOR,
     "fit-prior-unweighed": PRIOR,
     "identify-prior": {
         "prior.toml": (

@@ -50,7 +50,6 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("demo-identification", "*", _EXACT, absolute=1e-9),
     Tolerance("fit-*", "parameters.*.std", _EXACT, absolute=1e-13),
     Tolerance("fit-*", "*residual_rms", _EXACT, absolute=1e-12),
-    Tolerance("fit-*", "integration_change.*", "the difference of two integrations", absolute=1e-12),
     Tolerance("fit-*", "autocorrelation*", "of residuals near the optimum, not at it", absolute=1e-8),
     Tolerance("*", "*correlation[[]*", "of parameters that do not hang together", absolute=1e-12),
     Tolerance("campbell-*", "*log_decrement*", "a rotor without damping has none", absolute=1e-12),

@@ -33,7 +33,7 @@ COMMANDS = {
     "--stability 0:9000rpm --errors compliance=1,shapes=1",
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
-    "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv --sigma auto",
+    "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv",
     "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --amplitude-error 2 "
     "--phase-error 1",
     "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",

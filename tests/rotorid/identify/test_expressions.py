@@ -109,7 +109,7 @@ def test_equations_have_two_sides():
         ("asin(2)", 0, "no finite"),
         ("(-8)**(1/3)", 4, "no finite real"),
         ("exp(1000)", 0, "no finite"),
-        ("1e300*1e300", 5, "at most"),
+        ("1e300*1e300", 0, "at most"),
         ("_x", 0, "begins with a letter"),
         ("−x", 0, "written -"),
     ],

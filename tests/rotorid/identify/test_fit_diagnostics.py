@@ -74,16 +74,6 @@ def test_only_a_combination_is_determined(method):
     assert any("a + b" in text for text in found.warnings)
 
 
-def test_error_of_the_integration():
-    record = decay_record(error=1e-5)
-    coarse = fit(decay(), record, integrator="heun")
-    fine = fit(decay(), record)
-    assert any("more accurate integration would change a by" in text for text in coarse.warnings)
-    shift = fine.values - coarse.values
-    assert coarse.integration_change[0] == pytest.approx(shift[0], rel=0.05)
-    assert fine.integration_change is None
-
-
 def test_correlated_residuals():
     rng, noise = np.random.default_rng(2), [0.0]
     for e in 0.01 * rng.standard_normal(200):

@@ -74,8 +74,8 @@ def test_functions_of_known_numbers_are_numbers():
     ("equations", "known", "estimate", "message"),
     [
         ([MASS], {"m": 1}, ["c", "b", "k"], "the parameter k is to be estimated but stands in no equation"),
-        ([MASS], {"m": 1}, ["c", "c"], "the parameter c is named twice"),
-        ([MASS], {"m": 1, "c": 1}, ["c", "b"], "c is both known and to be estimated"),
+        ([MASS], {"m": 1}, ["c", "c"], "parameter c: c is already given"),
+        ([MASS], {"m": 1, "c": 1}, ["c", "b"], "known value c: c is already a parameter"),
         ([MASS], {"m": 1}, ["c", "p"], "p is d/dt"),
         ([MASS], {"m": 1}, [], "no parameter"),
         ([], {}, ["c"], "no equations"),
@@ -89,8 +89,8 @@ def test_functions_of_known_numbers_are_numbers():
         (["c*p = 1"], {}, ["c"], "equation 1, .*contains no signal"),
         (["c*X"], {}, ["c"], "equation needs one ="),
         (["c*X = __import__('os')"], {}, ["c"], "equation 1"),
-        ([MASS], {"m": float("nan")}, ["c"], "the known m must be a finite number"),
-        ([MASS], {"m": 1}, ["c", "sin"], "'sin' cannot be a name"),
+        ([MASS], {"m": float("nan")}, ["c"], "m: its value must be a finite number"),
+        ([MASS], {"m": 1}, ["c", "sin"], "parameter 'sin' is no name"),
     ],
 )
 def test_bad_models_are_refused_in_words(equations, known, estimate, message):

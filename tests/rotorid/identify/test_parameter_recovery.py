@@ -202,16 +202,6 @@ def test_three_time_constants_can_be_exchanged():
     assert found.unidentifiable[0].startswith("T1, T2 and T3 can be exchanged")
 
 
-def test_solutions_of_equations_of_a_high_degree_may_be_more():
-    equation = "((x**3 + y**3 + z**3)*p**3 + (x**4 + y**4 + z**4)*p**2 + (x**3 - y*z**2 + x)*p + 3)*X = F"
-    model = harmonic_model([equation], estimate=["x", "y", "z"])
-    w, truth = np.array([0.4, 0.9, 1.6]), np.array([1.5, 0.5, 0.9])
-    load = {"F": np.ones(3, dtype=complex)}
-    answer = identify(model, experiments(model, w, {**load, **model.predict(truth, w, load)}))
-    assert answer.solutions
-    assert "found by a search; there may be more" in answer.warnings[0]
-
-
 @given(st.integers(0, 100_000), st.integers(1, 4), st.integers(0, 2))
 @settings(deadline=None, max_examples=40)
 def test_random_systems_recover_or_name_an_invariant(seed, unknowns, merged):

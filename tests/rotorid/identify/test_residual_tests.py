@@ -40,17 +40,13 @@ def test_sinusoid_left_over_below_a_large_trend():
     assert abs(better.values[0] - 7.85398) < 4 * better.std[0]
 
 
-def test_outputs_of_unequal_precision_are_said_and_weighed():
+def test_outputs_of_unequal_precision_are_said_and_count_as_stated():
     model, record = decays(0)
     plain = fit(model, record)
     assert "the outputs have different errors" in " ".join(plain.warnings)
-    weighed = fit(model, record, weigh=True)
-    truth = {"x": np.exp(-0.8 * record.t), "q": np.exp(-0.4 * record.t)}
-    drawn = {name: np.sqrt(np.nanmean((record.outputs[name] - y) ** 2)) for name, y in truth.items()}
-    assert weighed.errors == pytest.approx(drawn, rel=0.05)
-    assert weighed.warnings == ()
-    assert weighed.std[0] < 0.2 * plain.std[0]
-    assert "used as weights" in weighed.summary()
+    stated = fit(model, replace(record, sigma={"x": 0.002, "q": 0.1}))
+    assert stated.warnings == ()
+    assert stated.std[0] < 0.2 * plain.std[0]
 
 
 def test_output_in_a_small_unit_that_the_model_does_not_describe():
@@ -187,13 +183,6 @@ def test_dead_sensor():
     model = ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0})
     found = fit(model, Record(0.1 * np.arange(30), {"x": np.zeros(30)}))
     assert "zero throughout" in " ".join(found.warnings)
-
-
-def test_stated_errors_are_not_estimated_too():
-    model = ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0})
-    record = decay_record()
-    with pytest.raises(ValueError, match="nothing to estimate them for"):
-        fit(model, Record(record.t, record.outputs, sigma={"x": 1.0}), weigh=True)
 
 
 def following(rho, seed, n=200):
