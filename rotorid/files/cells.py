@@ -148,13 +148,18 @@ def is_spreadsheet_error(cell: str) -> bool:
 
 def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
     """Rows with the header in one row, where that is found; those above it become comments."""
-    header = find([[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]])
+    texts = {k: [show(cell) for cell in cells] for k, (_, cells) in enumerate(rows[: 2 * MOST_ABOVE])}
+    filled = [k for k, text in texts.items() if any(text) and not text[0].startswith("#")]
+    header = find([texts[k] for k in filled])
     if header is None:
         return list(rows)
-    first, last, names = header
-    above = [(n, (f"# {' '.join(filter(None, map(show, cells))).lstrip('# ')}",)) for n, cells in rows[:last]]
-    changed = rows[last] if first == last else (rows[last][0], tuple(names))
-    return [*above, changed, *rows[last + 1 :]]
+    last = filled[header[1]]
+    above = [(rows[k][0], (f"# {' '.join(filter(None, texts[k])).lstrip('# ')}",)) for k in range(last)]
+    return [
+        *above,
+        (rows[last][0], tuple(header[2])) if header[0] != header[1] else rows[last],
+        *rows[last + 1 :],
+    ]
 
 
 def make_grid(

@@ -416,7 +416,7 @@ def _has_columns(
         what = "a known column" if len(unknown) == 1 else "known columns"
         column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
         expected = f"{what}: {known}; remarks go into 'note'"
-    if expected and not ("" in grid.header and missing and problems.of(grid.source)):
+    if expected and not (fits and missing and problems.of(grid.source)):
         problems.add(grid.source, grid.header_row, column, value, expected)
     return fits
 

@@ -218,9 +218,11 @@ def read_headings(
     return headings
 
 
-def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None) -> bool:
-    """Whether cells are surely the header of a runs table: most of its columns, or run and speed."""
-    stems = {heading.stem for heading in read_headings(cells, named)}
+def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, weights: bool) -> bool:
+    """Whether cells are surely the header of a table: most of its columns; of runs, run and speed."""
+    stems = {heading.stem for heading in read_headings(cells, named, weights=weights)}
+    if weights:
+        return "plane" in stems and bool(stems & {"mass", "unbalance"})
     stems |= set(READING) if "vector" in stems else set()
     return len(stems & _NEEDED) > len(_NEEDED) / 2 or {"run", "speed"} <= stems
 
@@ -230,21 +232,38 @@ def find_header(
 ) -> tuple[int, int, Sequence[str]] | None:
     """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
-    Two rows make one header where a name in the upper one stands over several columns: `Bearing 1` over
-    `mils` and `deg`.
+    Rows make one header where a name in the upper one stands over several columns, `Bearing 1` over `mils`
+    and `deg`, and where the lower one has units.
     """
     for at, cells in enumerate(rows[:MOST_ABOVE]):
-        if weights:
-            stems = {heading.stem for heading in read_headings(cells, weights=True)}
-            if "plane" in stems and stems & {"mass", "unbalance"}:
-                return at, at, cells
+        last, names, below = at, cells, rows[at + 1 :]
+        both = None if weights or not below else _joined(cells, below[0])
+        if both is not None and looks_like_header(both, named, weights=False):
+            last, names = at + 1, both
+        elif not looks_like_header(cells, named, weights=weights):
             continue
-        both = _joined(cells, rows[at + 1]) if at + 1 < len(rows) else None
-        if both is not None and looks_like_header(both, named):
-            return at, at + 1, both
-        if looks_like_header(cells, named):
-            return at, at, cells
+        units_below = None if last + 1 >= len(rows) else _with_units(names, rows[last + 1], weights=weights)
+        return (at, last, names) if units_below is None else (at, last + 1, units_below)
     return None
+
+
+def _with_units(names: Sequence[str], below: Sequence[str], *, weights: bool) -> list[str] | None:
+    """Names with the units of the row below them; None where that row holds something else."""
+    joined, sure = [*names], False
+    for heading, cell in zip(read_headings(names, weights=weights), below, strict=False):
+        text, stem = cell.strip("()[] "), heading.stem
+        if text in ("", "-") or stem == "note":
+            continue
+        quantity = "amplitude" if stem in ("", "vector") else "phase" if stem == "angle" else stem
+        known = quantity in (*MEASURED, "mass") and readable(quantity, text)
+        if not known and (stem not in (*MEASURED, "mass") or re.match("[0-9.,+-]", text)):
+            return None
+        sure = sure or known
+        if not heading.unit:
+            joined[heading.index] = f"{heading.name} ({text})"
+        elif not (known and read_unit(quantity, heading.unit) == read_unit(quantity, text)):
+            joined[heading.index] = f"{quantity} ({heading.unit}, {text})"  # explained as no unit
+    return joined if sure else None
 
 
 def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:

@@ -190,19 +190,7 @@ def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"
             raise Unclear(f"readings at the running speed (1X) alone: {other}", heading)
-    needed = {"run", "speed", "sensor", *READING}
-    if named.keys().isdisjoint(grid.header) and is_long(grid, headings, needed):
-        return grid
     return long_rows(grid, headings, READING, "sensor", conventions)
-
-
-def is_long(grid: Grid, headings: Sequence[Heading], needed: set[str]) -> bool:
-    """Whether a table has its form already, and plain numbers."""
-    stems = {h.stem for h in headings if h.tidy and (h.unit or h.stem != "phase")}
-    places = [h.index for h in headings if h.stem in NUMBERS]
-    plain = needed <= stems and all(h.tidy or h.stem == "" or _is_kept(h.name) for h in headings)
-    cells = {show(cells[k]) for _, cells in grid.rows for k in places} if plain else ()
-    return plain and all(map(_PLAIN.fullmatch, cells))
 
 
 def long_rows(
@@ -225,15 +213,12 @@ def long_rows(
         Where something has no reading, or several.
     """
     phase = conventions.labels.phase if key == "sensor" else ""
-    below = _units_row(grid, headings)
-    rows = grid.rows[1:] if below else grid.rows
-    columns = []
+    rows, columns = grid.rows, list[_Column]()
     for h in headings:
         cells = [cells[h.index] for _, cells in rows]
         for column in _halves(_Column(h, h.stem, h.unit, cells), headings, rows, pair):
-            under = below.get(h.index) if column.stem != "phase" or h.stem == "phase" else None
             if column.stem in (*NUMBERS, *pair):
-                column = _with_unit(column, under, rows, phase)
+                column = _with_unit(column, rows, phase)
                 if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
                     column = column._replace(unit="mm_s_rms")
             columns.append(column)
@@ -263,23 +248,6 @@ def long_rows(
         rows=tuple(long),
         named=tuple(taken) * len(rows),
     )
-
-
-def _units_row(grid: Grid, headings: Sequence[Heading]) -> dict[int, tuple[int, str]]:
-    """Units in the row below the header, by place; empty where that row holds something else."""
-    units: dict[int, tuple[int, str]] = {}
-    sure, (row, cells) = False, grid.rows[0] if len(grid.rows) > 1 else (0, ())
-    for heading, cell in zip(headings, cells, strict=False):
-        text, stem = show(cell).strip("()[] "), heading.stem
-        if text in ("", "-") or stem == "note":
-            continue
-        quantity = "amplitude" if stem in ("", "vector") else stem
-        known = quantity in (*NUMBERS, "angle") and readable(quantity, text)
-        if _PLAIN.fullmatch(text) or not (known or stem in NUMBERS):
-            return {}
-        units[heading.index] = (row, text)
-        sure = sure or known
-    return units if sure else {}
 
 
 def _halves(
@@ -331,14 +299,12 @@ def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: 
     return unit
 
 
-def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Row], phase: str) -> _Column:
-    """Numbers and their one unit, which the heading states, the row below it, or every cell."""
+def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
+    """Numbers and their one unit, which the heading states, or every cell."""
     heading, stem, unit, cells = column
     stated: dict[str, tuple[int | None, Cell]] = {}
     if unit:
         stated[spelt(unit) if heading.tidy else _unit(column, unit, phase)] = (None, heading.name)
-    if below is not None and (under := _unit(column, below[1], phase, *below)):
-        stated.setdefault(under, below)
     whole, numbers = bool(stated), dict[Cell, Cell]()
     for cell in dict.fromkeys(cells) if stem in NUMBERS else ():
         match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)

@@ -24,7 +24,7 @@ from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, re
 from rotorid.files.conventions import FULL_TURN, Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, Unclear, explained, is_long, long_rows
+from rotorid.files.layout import NUMBER, WEIGHT, Unclear, explained, long_rows
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of
 
@@ -135,10 +135,9 @@ def _long(grid: Grid, conventions: Conventions) -> Grid:
         headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
         if "unit" in stems:
             grid = _with_units(grid, {h.stem: h.index for h in headings})
-        if not is_long(grid, headings, {"plane", "mass"}) or "unit" in stems:
-            headings = headings if wide else [replace(h, sensor="") for h in headings]
-            grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
-            grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
+        headings = headings if wide else [replace(h, sensor="") for h in headings]
+        grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
+        grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
     header = [name.partition("_")[0] for name in grid.header]
     filled = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
     places = [k for k, stem in enumerate(header) if stem in filled]
