@@ -304,7 +304,10 @@ def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
     heading, stem, unit, cells = column
     stated: dict[str, tuple[int | None, Cell]] = {}
     if unit:
-        stated[spelt(unit) if heading.tidy else _unit(column, unit, phase)] = (None, heading.name)
+        stated[spelt(unit) if heading.tidy and stem != "mass" else _unit(column, unit, phase)] = (
+            None,
+            heading.name,
+        )
     whole, numbers = bool(stated), dict[Cell, Cell]()
     for cell in dict.fromkeys(cells) if stem in NUMBERS else ():
         match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
@@ -320,12 +323,14 @@ def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
         raise Unclear(f"a number {unit}, as {place} says", heading, row, cell)
     unit = next(iter(stated), "")
     cells = [numbers.get(cell, cell) for cell in cells] if numbers else cells
-    if stem == "phase" and not unit:
-        plain = [text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", "."))]
-        if any(abs(float(text)) > math.tau for text in plain):
+    if stem in ("phase", "angle") and not unit:
+        texts = (text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", ".")))
+        plain = [abs(float(text)) for text in texts]
+        if max(plain, default=0.0) > math.tau or (stem == "angle" and not any(plain)):
             unit = "deg"
-        elif not heading.tidy:
-            raise Unclear("its unit, as in 'Phase (deg)' or 98°: phases so small may be radians", heading)
+        elif stem == "angle" or not heading.tidy:
+            example = f"'{stem.capitalize()} (deg)' or 98°"
+            raise Unclear(f"its unit, as in {example}: {stem}s so small may be radians", heading)
     if stem == "amplitude" and unit == "mm_s" and is_severity(heading.name):
         unit = "mm_s_rms"
     return _Column(heading, stem, unit, cells)

@@ -201,8 +201,8 @@ BAD_COLUMNS = [
     (RUNS, "speed_rpm", "speed", "speed", "which is missing"),
     (RUNS, "amplitude_um_pp", "amplitude_um_pk", "amplitude_um_pk", "um_pp (peak to peak)"),
     (RUNS, "amplitude_um_pp", "ampltude_um_pp", "ampltude_um_pp", "did you mean 'amplitude_um_pp'?"),
-    (WEIGHTS, "mass_g", "mass_gram", "mass_gram", "one of the units kg, g, mg, oz or lb"),
-    (WEIGHTS, "mass_g", "unbalance_gmm", "unbalance_gmm", "did you mean 'g_mm'?"),
+    (WEIGHTS, "mass_g", "mass_gran", "mass_gran", "a unit of weight: kg, g, mg"),
+    (WEIGHTS, "mass_g", "unbalance_gmn", "unbalance_gmn", "did you mean 'g_mm'?"),
 ]
 
 
@@ -241,7 +241,9 @@ def test_mixed_units(bad):
     words = "one unit for amplitude, not also amplitude_um_pp"
     the_only(bad(mixed), "runs.csv", 1, "amplitude_mil_pp", "amplitude_mil_pp", words)
     both = [[*WEIGHTS[0], "unbalance_g_mm"], *([*line, 1] for line in WEIGHTS[1:])]
-    the_only(bad(weights=both), "weights.csv", 1, "unbalance_g_mm", None, "not both")
+    the_only(
+        bad(weights=both), "weights.csv", 1, "unbalance_g_mm", "unbalance_g_mm", "one column of the mass"
+    )
 
 
 def test_equal_rows(bad):
