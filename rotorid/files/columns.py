@@ -247,9 +247,6 @@ def read_table(
     sheet: str,
     columns: Sequence[Column],
     problems: Problems,
-    *,
-    first: bool = False,
-    may_be_empty: bool = False,
 ) -> Table | None:
     """Read a table from a text file or a workbook.
 
@@ -258,20 +255,18 @@ def read_table(
     source
         A file, of which `.xlsx` is a workbook and everything else text, or the cells of a sheet.
     sheet
-        Name of the sheet in a workbook; the only sheet may have any name (with `first`, the first one).
+        Name of the sheet in a workbook; where none has it, the first one is read.
     columns
         What the table may contain; every other column is a problem.
     problems
         Collects the complaints.
-    may_be_empty
-        Whether a header without rows says something.
 
     Returns
     -------
     Table or None
         None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
     """
-    grid = read_grid(source, sheet, problems, first=first, may_be_empty=may_be_empty)
+    grid = read_grid(source, sheet, problems, first=True)
     return None if grid is None else make_table(grid, columns, problems)
 
 

@@ -202,7 +202,7 @@ BAD_COLUMNS = [
     (RUNS, "amplitude_um_pp", "amplitude_um_pk", "amplitude_um_pk", "um_pp (peak to peak)"),
     (RUNS, "amplitude_um_pp", "ampltude_um_pp", "ampltude_um_pp", "did you mean 'amplitude_um_pp'?"),
     (WEIGHTS, "mass_g", "mass_gran", "mass_gran", "a unit of weight: kg, g, mg"),
-    (WEIGHTS, "mass_g", "unbalance_gmn", "unbalance_gmn", "did you mean 'g_mm'?"),
+    (WEIGHTS, "mass_g", "unbalance_gmn", "unbalance_gmn", "did you mean 'g_m'?"),
 ]
 
 
