@@ -86,21 +86,16 @@ def make_slow_roll(
     """
     before, words, speeds = len(problems), list[str](), None
     own, sensors = units.vibration(trials.labels.vibration_unit), trials.sensors
-    other_unit = (
-        f"an amplitude in {own.name or 'no unit'}, as the readings have, or in a unit that converts to it"
-    )
-
-    def known(name: str) -> str:
-        return f"{did_you_mean(name, sensors)}; its sensors are {listing(sensors, 'and')}"
-
     if isinstance(source, Mapping):
         given, vectors = tuple(source), np.zeros((1, len(source)), dtype=complex)
         for k, (name, vector) in enumerate(source.items()):
             unit = vector.amplitude.unit if vector.amplitude.unit.name else own
             if name not in sensors:
-                vector.complain(problems, "", f"a sensor of the runs table, not {name!r}{known(name)}")
+                vector.complain(
+                    problems, "", f"a sensor of the runs table, not {name!r}{_known(name, sensors)}"
+                )
             elif unit.kind != own.kind:
-                vector.complain(problems, "amplitude", other_unit)
+                vector.complain(problems, "amplitude", _other_unit(own.name))
             reading = np.array([unit.to_si(vector.amplitude.value)]), np.radians([vector.phase])
             vectors[:, k] = conventions.labels.vibration_from(*reading)
     else:
@@ -110,15 +105,7 @@ def make_slow_roll(
         if runs is None:
             return None
         place, given, vectors = source_name(source), runs.sensors, runs.mean[0]
-        unit = units.vibration(runs.labels.vibration_unit)
-        if unit.kind != own.kind:
-            problems.add(place, None, "amplitude", unit.name or "no unit", other_unit)
-        if len(runs.runs) > 1:
-            expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
-            problems.add(place, None, "run", runs.runs[1], expected)
-        for name in (name for name in given if name not in sensors):
-            problems.add(place, None, "sensor", name, f"a sensor of the job{known(name)}")
-        rows = _at_speeds(runs, place, trials, conventions.speed_tolerance_percent, problems)
+        rows = _fitting(runs, place, trials, conventions.speed_tolerance_percent, problems)
         if len(runs.speeds) > 1:
             vectors, speeds = vectors[rows], trials.speeds
         elif runs.speeds[0] > SLOW * trials.speeds.min():
@@ -141,8 +128,26 @@ def make_slow_roll(
     return SlowRoll(sensors, whole if speeds is not None else whole[0], speeds, tuple(words))
 
 
-def _at_speeds(runs: Trials, place: str, trials: Trials, band: float, problems: Problems) -> list[int]:
-    """Which speed of a slow run belongs to each speed of the job: of one speed, that."""
+def _known(name: str, sensors: tuple[str, ...]) -> str:
+    return f"{did_you_mean(name, sensors)}; its sensors are {listing(sensors, 'and')}"
+
+
+def _other_unit(name: str) -> str:
+    return f"an amplitude in {name or 'no unit'}, as the readings have, or in a unit that converts to it"
+
+
+def _fitting(runs: Trials, place: str, trials: Trials, band: float, problems: Problems) -> list[int]:
+    """Which speed of a slow run belongs to each speed of the job; problems where it is no slow run of it."""
+    name, ours = runs.labels.vibration_unit, trials.labels.vibration_unit
+    if units.vibration(name).kind != units.vibration(ours).kind:
+        problems.add(place, None, "amplitude", name or "no unit", _other_unit(ours))
+    if len(runs.runs) > 1:
+        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
+        problems.add(place, None, "run", runs.runs[1], expected)
+    for sensor in runs.sensors:
+        if sensor not in trials.sensors:
+            expected = f"a sensor of the job{_known(sensor, trials.sensors)}"
+            problems.add(place, None, "sensor", sensor, expected)
     near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
     if len(runs.speeds) > 1 and None in near:
         unit = units.SPEED[trials.labels.speed_unit]
