@@ -201,12 +201,8 @@ def make_grid(
     while header and not header[-1]:
         header.pop()
     if header_row is None or (len(filled) < 2 and not may_be_empty):
-        expected = (
-            "rows below the header; there are none"
-            if filled
-            else "a table with a header row; the file is empty"
-        )
         if complete:
+            expected = "rows below the header; there are none" if filled else EMPTY
             problems.add(source, header_row, None, None, expected)
         return None
     body, width = filled[1:], len(header)

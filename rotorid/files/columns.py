@@ -329,9 +329,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
         if column is None:
             wrong = f"a known column (did you mean {near[k]!r}?)" if near[k] else ""
         elif column.stem in places:
-            other = grid.header[places[column.stem][0]]
-            one = f"one unit for {column.stem}, not also {other}"
-            wrong = "the column once" if other == names[k] else one
+            wrong = f"the column once, not also {grid.header[places[column.stem][0]]}"
         else:
             try:
                 unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else None
@@ -398,15 +396,15 @@ def _has_columns(
     if not stems:
         fits, column = False, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
-        problems.apart({grid.source})  # that rows are longer than a title is no news
+        problems.drop(grid.source)  # that rows are longer than a title is no news
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
         fits, end = False, seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"
     elif missing:
-        needed = listing(missing[0].names if len(missing) == 1 else [c.names[0] for c in missing], "and")
-        needed = needed.replace(" and ", " or ") if len(missing) == 1 else needed
+        several = f"columns {listing([c.names[0] for c in missing], 'and')}"
+        needed = several if len(missing) > 1 else f"a column {listing(missing[0].names)}"
         column, value = missing[0].names[0], listing(unknown, "and") or None
-        expected = f"{'a column' if len(missing) == 1 else 'columns'} {needed}; the columns are {present}"
+        expected = f"{needed}; the columns are {present}"
     elif unknown:
         what = "a known column" if len(unknown) == 1 else "known columns"
         column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
@@ -465,12 +463,10 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
 def _named(text: str) -> str:
     if not text:
         raise NotANumber("a name")
-    if text[0] in "=@":
-        raise NotANumber("a name; one that begins with = or @ would be a formula in a spreadsheet")
+    if text[0] in "=@" or not text.isprintable():
+        raise NotANumber("a name without control characters, which does not begin as a formula, with = or @")
     if is_spreadsheet_error(text) or not text.strip("#"):
         raise NotANumber("a name, not an error of the spreadsheet")
-    if not text.isprintable():
-        raise NotANumber("a name without line breaks and control characters")
     return text
 
 

@@ -54,8 +54,7 @@ _WEIGHTS = _words(
     action="action",
     unit="unit",
     pieces="pieces",
-    unbalance="unbalance|imbalance",
-    mass="weight|mass|wt|amount",
+    mass="unbalance|imbalance|weight|mass|wt|amount",
     run=_RUN,
 )
 _TIDY = {
@@ -71,34 +70,11 @@ _BESIDE = re.compile(
 )
 """What `rotorid vectors` and instruments write beside the readings."""
 _BESIDE_WEIGHTS = re.compile("date|time|remark|operator", re.IGNORECASE)
-_FILLERS = {
-    "name",
-    "no",
-    "nr",
-    "number",
-    "id",
-    "shaft",
-    "rotor",
-    "machine",
-    "running",
-    "rotational",
-    "nominal",
-}
-_FILLERS |= {
-    "",
-    "measurement",
-    "measuring",
-    "run",
-    "measured",
-    "position",
-    "vibration",
-    "vib",
-    "balance",
-    "balancing",
-    "trial",
-    "correction",
-    "of",
-}
+_FILLERS = re.compile(
+    "(?:|name|no|nr|number|id|shaft|rotor|machine|running|rotational|nominal|measurement|measuring|run|measured"
+    "|position|vibration|vib|balance|balancing|trial|correction|of)",
+    re.IGNORECASE,
+)
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _ORDER = re.compile(r"(?<![^\W_])(?<!\.)([0-9]+(?:\.[0-9]+)?)[xX×](?![^\W_])")
 _PROBE_Y = re.compile(r"(?<![^\W_])[0-9]+[yY](?![^\W_])")
@@ -116,14 +92,21 @@ _BOTH_AT_END = re.compile(
     re.IGNORECASE,
 )
 _SPELLINGS = {
-    "r_min": "rpm",
-    "1_min": "rpm",
-    "cpm": "rpm",
-    "hz": "Hz",
-    **dict.fromkeys(("°", "º", "degree", "degrees"), "deg"),
-    **{"mils": "mil", "micron": "um", "microns": "um", "ips": "in_s", "m_s²": "m_s2", "mm_s²": "mm_s2"},
-    **dict.fromkeys(("gram", "grams", "gr", "gm", "gms"), "g"),
-    **{"ounce": "oz", "ounces": "oz", "lbs": "lb", "pound": "lb", "pounds": "lb"},
+    other: unit
+    for unit, others in {
+        "rpm": "r_min 1_min cpm",
+        "Hz": "hz",
+        "deg": "° º degree degrees",
+        "mil": "mils",
+        "um": "micron microns",
+        "in_s": "ips",
+        "m_s2": "m_s²",
+        "mm_s2": "mm_s²",
+        "g": "gram grams gr gm gms",
+        "oz": "ounce ounces",
+        "lb": "lbs pound pounds",
+    }.items()
+    for other in others.split()
 }
 
 
@@ -222,7 +205,7 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, 
     """Whether cells are surely the header of a table: most of its columns; of runs, run and speed."""
     stems = {heading.stem for heading in read_headings(cells, named, weights=weights)}
     if weights:
-        return "plane" in stems and bool(stems & {"mass", "unbalance"})
+        return {"plane", "mass"} <= stems
     stems |= set(READING) if "vector" in stems else set()
     return len(stems & _NEEDED) > len(_NEEDED) / 2 or {"run", "speed"} <= stems
 
@@ -268,19 +251,15 @@ def _with_units(names: Sequence[str], below: Sequence[str], *, weights: bool) ->
 
 def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
     """The names of two rows of headings; None where no upper name stands over several lower ones."""
-    names, group, several = [], "", False
-    for k, heading in enumerate(read_headings(lower)):
-        above = upper[k] if k < len(upper) else ""
-        if re.fullmatch(r"[0-9.,+-]+", heading.name) and heading.name.strip("-"):
+    names, group, several = list[str](), "", False
+    for above, heading in zip([*upper, *[""] * len(lower)], read_headings(lower), strict=False):
+        if re.fullmatch(r"-*[0-9.,+][0-9.,+-]*", heading.name):
             return None
-        if heading.stem in READING and not heading.sensor:
-            several = several or (above in ("", group) and bool(group))
-            group = above or group
-            names.append(f"{group} {heading.name}".strip())
-        else:
-            group = ""
-            names.append(" ".join(filter(None, (above, heading.name.strip("-")))))
-    filled = [name for name in names if name]
+        reading = heading.stem in READING and not heading.sensor
+        several = several or (reading and bool(group) and above in ("", group))
+        group = (above or group) if reading else ""
+        names.append(f"{group if reading else above} {heading.name.strip('-')}".strip())
+    filled = [*filter(None, names)]
     return names if several and len(set(filled)) == len(filled) else None
 
 
@@ -291,7 +270,8 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
     if beside or name.casefold().startswith(REMARKS):
         return replace(unknown, stem="note")
     if (tidy := _TIDY[weights].fullmatch(name)) is not None:
-        return replace(unknown, stem=tidy[1] or tidy[0], unit=tidy[2] or "", tidy=True)
+        stem = (tidy[1] or tidy[0]).replace("unbalance", "mass")
+        return replace(unknown, stem=stem, unit=tidy[2] or "", tidy=True)
     order = None if probes or weights else _ORDER.search(name)
     if order is not None and order[1] != "1":
         return replace(unknown, stem=f"{order[1]}X")
@@ -338,7 +318,7 @@ def _with_rest(heading: Heading, outside: str, match: re.Match[str], inside: str
     if quantity in READING and not inside and (at_end := _AT_END.search(after)):  # velocity DE mm/s
         after, inside = after[: at_end.start()], at_end[0]
     words = [word for word in f"{before} {after}".split() if word.casefold() not in ("vibration", "vib")]
-    if quantity not in READING and any(word.casefold().strip(".#") not in _FILLERS for word in words):
+    if quantity not in READING and any(not _FILLERS.fullmatch(word.strip(".#")) for word in words):
         return Heading(heading.index, heading.name, sensor=heading.name)
     return replace(heading, unit=inside, sensor=" ".join(words) if quantity in READING else "")
 
@@ -348,14 +328,11 @@ def _of_weights(unknown: Heading, outside: str, inside: str) -> Heading:
     for stem, role in _WEIGHTS.items():
         if match := role.search(outside):
             after = _bare(outside[match.end() :])
-            unit = inside or (after if after.casefold() not in _FILLERS else "")
+            unit = inside or ("" if _FILLERS.fullmatch(after) else after)
             if stem == "hole" and unit and readable("phase", unit):
                 stem = "angle"
-            if stem in ("mass", "unbalance") and unit and readable("mass", unit):
-                stem = units.weight(read_unit("mass", unit)[0]).kind
-            measured = stem in ("mass", "unbalance", "angle")
-            plane = _bare(outside[: match.start()]) if measured else ""
-            return replace(unknown, stem=stem, unit=unit if measured else "", sensor=plane)
+            unit = unit if stem in ("mass", "angle") else ""
+            return replace(unknown, stem=stem, unit=unit, sensor=_bare(outside[: match.start()]))
     whole = f"{outside} {inside}".strip()
     at_end = _AT_END.search(whole)
     if at_end and at_end["angle"]:

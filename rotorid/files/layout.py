@@ -149,10 +149,9 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
-    first = grids[0]
+    first, rows = grids[0], list[Row]()
     if len(grids) == 1:
         return first
-    rows: list[Row] = []
     for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
@@ -160,32 +159,29 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
-    name = listing([grid.source for grid in grids], "and")
-    return replace(first, source=name, rows=tuple(rows), named=())
+    source = listing([grid.source for grid in grids], "and")
+    return replace(first, source=source, rows=tuple(rows), named=())
 
 
 def _names_of(columns: Columns | None) -> dict[str, str]:
     """Names of a runs table by the names that the job says its file has."""
-    stated = {} if columns is None else columns.in_file()
-    return {name: columns.written(field) for name, field in stated.items() if columns is not None}
+    return (
+        {} if columns is None else {name: columns.written(field) for name, field in columns.in_file().items()}
+    )
 
 
 def _are_there(columns: Columns, grid: Grid, problems: Problems) -> bool:
     """Whether the file has the columns that the job names; else a problem of the job."""
-    there, before = [name for name in grid.header if name], len(problems)
+    there, before = [*filter(None, grid.header)], len(problems)
     for name, field in columns.in_file().items():
         if name not in there and columns.written(field) not in there:
-            known = f"its columns are {listing(there, 'and')}"
-            expected = f"a column of {grid.source}{did_you_mean(name, there)}; {known}"
-            columns.complain(problems, field, expected)
+            hint = f"{did_you_mean(name, there)}; its columns are {listing(there, 'and')}"
+            columns.complain(problems, field, f"a column of {grid.source}{hint}")
     return len(problems) == before
 
 
 def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
     headings = read_headings(grid.header, named)
-    stems = [heading.stem for heading in headings if heading.tidy]
-    if len(set(stems)) < len(stems):
-        return grid  # a column of a runs table stands there twice
     for heading in headings:
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"

@@ -111,7 +111,6 @@ def read_weights(
 def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:
     """The table with one row a weight and its columns by their own names; blank rows say nothing."""
     headings = read_headings(grid.header, weights=True)
-    headings = [replace(h, stem="mass") if h.stem == "unbalance" else h for h in headings]
     at = {h.stem: h.index for h in headings}
     wide = "plane" not in at and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
     if {"unit", "mass"} <= at.keys():

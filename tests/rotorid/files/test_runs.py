@@ -233,12 +233,12 @@ def test_unknown_and_repeated_columns(bad):
     problems = bad([[*line, "x"] for line in RUNS[:1]] + [[*line, 1] for line in RUNS[1:]])
     the_only(problems, "runs.csv", 1, "x", "x", "a known column: run, speed_rpm")
     problems = bad([[*line, line[3]] for line in RUNS])
-    the_only(problems, "runs.csv", 1, "amplitude_um_pp", "amplitude_um_pp", "the column once")
+    the_only(problems, "runs.csv", 1, "amplitude_um_pp", "amplitude_um_pp", "one column of the amplitude")
 
 
 def test_mixed_units(bad):
     mixed = [[*RUNS[0], "amplitude_mil_pp"], *([*line, 1] for line in RUNS[1:])]
-    words = "one unit for amplitude, not also amplitude_um_pp"
+    words = "one column of the amplitude, and 'amplitude_um_pp' could be it too"
     the_only(bad(mixed), "runs.csv", 1, "amplitude_mil_pp", "amplitude_mil_pp", words)
     both = [[*WEIGHTS[0], "unbalance_g_mm"], *([*line, 1] for line in WEIGHTS[1:])]
     the_only(
