@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
-_PEAK = re.compile("peak|pk", re.IGNORECASE)
+_PEAK, _SEVERITY = re.compile("peak|pk", re.IGNORECASE), re.compile("velocity|severity", re.IGNORECASE)
+"""Of a heading: mm/s alone are rms where it says severity, and where the job has limits in rms."""
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
@@ -214,9 +215,7 @@ def long_rows(
         cells = [cells[h.index] for _, cells in rows]
         for column in _halves(_Column(h, h.stem, h.unit, cells), headings, rows, pair):
             if column.stem in (*NUMBERS, *pair):
-                column = _with_unit(column, rows, phase)
-                if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
-                    column = column._replace(unit="mm_s_rms")
+                column = _with_unit(column, rows, phase, rms=conventions.rms)
             columns.append(column)
     sensors = _by_name(columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
@@ -295,7 +294,7 @@ def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: 
     return unit
 
 
-def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
+def _with_unit(column: _Column, rows: Sequence[Row], phase: str, *, rms: bool) -> _Column:
     """Numbers and their one unit, which the heading states, or every cell."""
     heading, stem, unit, cells = column
     stated: dict[str, tuple[int | None, Cell]] = {}
@@ -327,14 +326,9 @@ def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
         elif stem == "angle" or not heading.tidy:
             example = f"'{stem.capitalize()} (deg)' or 98°"
             raise Unclear(f"its unit, as in {example}: {stem}s so small may be radians", heading)
-    if stem == "amplitude" and unit == "mm_s" and is_severity(heading.name):
-        unit = "mm_s_rms"
+    if unit == "mm_s" and not heading.tidy and (rms or _SEVERITY.search(heading.name)):
+        unit = "mm_s" if _PEAK.search(heading.name) else "mm_s_rms"
     return _Column(heading, stem, unit, cells)
-
-
-def is_severity(name: str) -> bool:
-    """Whether a heading says that mm/s alone are rms, as of a vibration severity."""
-    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not _PEAK.search(name)
 
 
 def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dict[str, dict[str, _Column]]:

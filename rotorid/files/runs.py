@@ -32,7 +32,7 @@ from rotorid.files.conventions import (
     Phase,
     StatedErrors,
 )
-from rotorid.files.layout import is_severity, joined, read_runs_grids, stated_phase
+from rotorid.files.layout import joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
@@ -214,7 +214,7 @@ def read_runs(
         _placed(vectors[rows], at, shape),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=words + _which_mm_s(table, rms=conventions.rms),
+        warnings=words + _which_mm_s(table),
         steps=_placed(steps[:, rows], at, shape),
         covariance=covariance,
     )
@@ -323,14 +323,15 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
     return table
 
 
-def _which_mm_s(table: Table, *, rms: bool) -> tuple[str, ...]:
-    """How mm/s alone are read, below a heading that is not one of this program's own."""
+def _which_mm_s(table: Table) -> tuple[str, ...]:
+    """How mm/s alone are read, below a heading that does not say it."""
     heading, unit = table.fields["amplitude"].heading, table.unit("amplitude").name
-    if unit == "mm_s_rms" and (is_severity(heading) or (rms and "rms" not in heading.casefold())):
-        return (f"{heading!r} is read as mm/s rms: write peak in the heading where it is the peak",)
-    if unit == "mm_s" and "mm_s" not in heading and not re.search("peak|pk", heading, re.IGNORECASE):
-        return (f"{heading!r} is read as mm/s peak: write rms in the heading where it is rms",)
-    return ()
+    if unit not in ("mm_s", "mm_s_rms") or re.search("mm_s|rms|peak|pk", heading, re.IGNORECASE):
+        return ()
+    read, other = ("peak", "rms") if unit == "mm_s" else ("rms", "the peak")
+    return (
+        f"{heading!r} is read as mm/s {read}: write {other.split()[-1]} in the heading where it is {other}",
+    )
 
 
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
