@@ -98,8 +98,7 @@ class Column:
 class Field:
     """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
 
-    `names` has the column of the file that each cell is from, where they are several; `doubts` what was
-    expected of cells that a lenient column leaves to its reader.
+    `names` has the column of the file that each cell is from, where they are several.
     """
 
     name: str
@@ -108,7 +107,6 @@ class Field:
     numbers: FloatArray
     texts: tuple[str, ...]
     names: tuple[str, ...]
-    doubts: Mapping[int, str]
 
     @property
     def heading(self) -> str:
@@ -204,11 +202,9 @@ class Table:
 
     def must_be(self, stem: str, allowed: FloatArray | Iterable[bool], expected: str) -> None:
         """Complain about every number of a column that is not allowed; unreadable ones have been reported."""
-        if stem not in self:
-            return
-        bad = ~np.fromiter(allowed, dtype=bool, count=len(self)) & ~np.isnan(self.numbers(stem))
-        for index in np.flatnonzero(bad):
-            self.complain(index, stem, expected)
+        if stem in self:
+            bad = ~np.fromiter(allowed, dtype=bool, count=len(self))
+            self.complain_where(bad & ~np.isnan(self.numbers(stem)), stem, expected)
 
     def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
         """The one column that there is of several; else None and a problem, if none is only misspelt.
@@ -422,7 +418,6 @@ def _field(
     name = names[0] if len(set(names)) == 1 else grid.header[index]
     # most cells of a long table say what another one has said
     known: dict[Cell, str | float] = {"": ""} if column.blank else {}
-    doubts: dict[int, str] = {}
     doubtful: set[str] = set()
     if unit is not None and not comma and grid.separator in (";", "\t"):
         doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), grid.header[index])
@@ -431,14 +426,13 @@ def _field(
             if cell not in known:
                 known[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
         except NotANumber as error:
-            where = names[place] if names else name
-            doubts[place] = str(error)
             if not column.lenient:
+                where = names[place] if names else name
                 problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
     values = [known.get(cell, "") for cell in cells]
     numbers = np.array([math.nan if isinstance(value, str) else value for value in values], dtype=float)
     texts = tuple(value if isinstance(value, str) else "" for value in values)
-    return Field(name, unit, cells, numbers, texts, names, doubts)
+    return Field(name, unit, cells, numbers, texts, names)
 
 
 def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *, comma: bool) -> str | float:

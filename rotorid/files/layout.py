@@ -142,10 +142,10 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
             warnings.simplefilter("ignore")  # of a file that is read once more
             find = partial(find_header, named=named)
             grid = read_grid(file, "runs", Problems(), first=True, find=find, top=True)
-        units_ = [h.unit for h in read_headings(grid.header, named) if h.stem == "phase"] if grid else []
-        words |= {read_unit("phase", unit)[1] for unit in units_ if readable("phase", unit)}
-    words -= {""}
-    return as_phase(words.pop()) if len(words) == 1 and words <= {*PHASES} else None
+        for heading in read_headings(grid.header, named) if grid else ():
+            if heading.stem == "phase" and readable("phase", heading.unit):
+                words |= {*PHASES} & {read_unit("phase", heading.unit)[1]}
+    return as_phase(words.pop()) if len(words) == 1 else None
 
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:

@@ -159,7 +159,7 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
     if stem == "clock" and written:
         raise NotANumber("a time of the clock face, such as 10:20")
     if not written or (stem != "hole" and match is None):
-        raise NotANumber(table.fields[stem].doubts.get(i, "an angle"))
+        raise NotANumber("a number of degrees, a hole of the plane or a clock, such as 10:20")
     hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:
