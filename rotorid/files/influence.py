@@ -181,9 +181,8 @@ def load_influence(
         phase=phase or written.phase,
         angles=angles or written.angles,
     )
-    nothing, W = np.full((S, C), np.nan), values[at]
-    names = tuple(sensors), tuple(planes)
-    return Stored(Influence(np.array(speeds), *names, W, nothing, errors, labels), said)
+    names, nothing = (tuple(sensors), tuple(planes)), np.full((S, C), np.nan)
+    return Stored(Influence(np.array(speeds), *names, values[at], nothing, errors, labels), said)
 
 
 def _tidied(grid: Grid) -> Grid:
@@ -236,9 +235,9 @@ def _keys(table: Table) -> list[tuple[float, str, str]]:
 def _stated(table: Table) -> dict[str, str]:
     """What the heading of the phases, or comment lines of older versions, say about conventions."""
     patterns = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
-    texts = (*table.comments, table.fields["phase"].name)
-    found = [(key, re.search(pattern, text)) for text in texts for key, pattern in patterns.items()]
-    return {key: match[1] for key, match in found if match}
+    text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
+    matches = {key: re.search(pattern, text) for key, pattern in patterns.items()}
+    return {key: match[1] for key, match in matches.items() if match}
 
 
 def _from_json(path: Path, problems: Problems) -> Influence | None:
@@ -373,13 +372,13 @@ def fit_to_readings(
     Every speed and sensor of the readings must be there; further ones are left out.
     """
     ours, theirs, rpm = trials.labels, influence.labels, units.SPEED["rpm"]
-    pairs = [("influence", units.vibration, ours.vibration_unit, theirs.vibration_unit, "runs")]
+    pairs = [(units.vibration, ours.vibration_unit, theirs.vibration_unit, "runs")]
     if trials.planes:
-        pairs.append(("influence", units.weight, ours.weight_unit, theirs.weight_unit, "weights"))
-    for column, unit_of, our, their, table in pairs:
+        pairs.append((units.weight, ours.weight_unit, theirs.weight_unit, "weights"))
+    for unit_of, our, their, table in pairs:
         if unit_of(our).kind != unit_of(their).kind:
             expected = f"coefficients in {our or 'no unit'} or a unit that converts, as the {table} table has"
-            problems.add(source, None, column, their or "no unit", expected)
+            problems.add(source, None, "influence", their or "no unit", expected)
     rows = [nearest_speed(influence.speeds, v, tolerance_percent) for v in trials.speeds.tolist()]
     for speed in trials.speeds[[row is None for row in rows]]:
         known = show_speeds(influence.speeds, rpm)

@@ -230,7 +230,7 @@ def long_rows(
     for column, name in ((c, name) for own in groups for c, name in zip(own, names, strict=True)):
         if _name(column) != name:
             raise Unclear(f"the unit of all {key}s, {name}", column.heading)
-    header = [_name(c) if c.stem != "note" else _remark(c, k) for k, c in enumerate(common)]
+    header = [_name(column, k) for k, column in enumerate(common)]
     long: list[Row] = []
     taken = [tuple(c.heading.name for c in (*common, *own[:wide], *own)) for own in groups]
     for k, (number, _) in enumerate(rows):
@@ -374,28 +374,19 @@ def _pair_by_number(sensors: dict[str, dict[str, _Column]]) -> None:
             sensors[number] = {stem: column for name in pair for stem, column in sensors.pop(name).items()}
 
 
-def _name(column: _Column) -> str:
-    """The name that a column has in a runs or weights table."""
-    if column.stem in ("", "note"):
-        return column.heading.name
-    if column.stem == "speed" and not column.unit and not column.heading.tidy:
-        raise Unclear(f"its unit too, such as '{column.heading.name} (rpm)'", column.heading)
-    return f"{column.stem}_{column.unit}" if column.unit else column.stem
-
-
-def _remark(column: _Column, k: int) -> str:
-    """A name of a remark that no column of a table has."""
-    name = column.heading.name
-    return name if _is_kept(name) else f"note {k} {name}"
-
-
-def _is_kept(name: str) -> bool:
-    """Whether the reader of a runs table knows the name of a column without a reading."""
-    return name == "time_s" or name.casefold().startswith(REMARKS) or bool(DEVIATION.match(name))
+def _name(column: _Column, place: int = 0) -> str:
+    """The name that a column has in a runs or weights table; that of a remark is of no other column."""
+    name, stem = column.heading.name, column.stem
+    if stem == "note":
+        known = name == "time_s" or name.casefold().startswith(REMARKS) or DEVIATION.match(name)
+        return name if known else f"note {place} {name}"
+    if stem == "speed" and not column.unit and not column.heading.tidy:
+        raise Unclear(f"its unit too, such as '{name} (rpm)'", column.heading)
+    return f"{stem}_{column.unit}" if stem and column.unit else stem or name
 
 
 def _once(common: Sequence[_Column]) -> bool:
     """Whether no run has two readings of one speed, so that there can be one sensor only."""
-    keys = [column.cells for column in common if column.stem in ("run", "speed", "repeat")]
-    rows = [tuple(map(show, row)) for row in zip(*keys, strict=True)]
+    keys = (map(show, column.cells) for column in common if column.stem in ("run", "speed", "repeat"))
+    rows = [*zip(*keys, strict=True)]
     return len(set(rows)) == len(rows)
