@@ -106,7 +106,9 @@ def _why_no_comma(separator: str) -> str:
     if separator == ",":
         words = "in a comma-separated file a comma is not a decimal sign (separate by ;)"
         return f"a number with a decimal point: {words}"
-    return "a number with a decimal point: this comma may separate thousands (or separate columns by ;)"
+    if separator == "\t":
+        return "a number with a decimal point: this comma may separate thousands (or separate columns by ;)"
+    return "a number; the cell holds text, whose comma may separate thousands"
 
 
 def _reason(text: str) -> str:
