@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
-_PEAK = re.compile("peak|pk", re.IGNORECASE)
+_PEAK, _SEVERITY = re.compile("peak|pk", re.IGNORECASE), re.compile("velocity|severity", re.IGNORECASE)
+"""Of a heading: mm/s alone are rms where it says severity, and where the job has limits in rms."""
 _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
@@ -141,18 +142,17 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
             warnings.simplefilter("ignore")  # of a file that is read once more
             find = partial(find_header, named=named)
             grid = read_grid(file, "runs", Problems(), first=True, find=find, top=True)
-        units_ = [h.unit for h in read_headings(grid.header, named) if h.stem == "phase"] if grid else []
-        words |= {read_unit("phase", unit)[1] for unit in units_ if readable("phase", unit)}
-    words -= {""}
-    return as_phase(words.pop()) if len(words) == 1 and words <= {*PHASES} else None
+        for heading in read_headings(grid.header, named) if grid else ():
+            if heading.stem == "phase" and readable("phase", heading.unit):
+                words |= {*PHASES} & {read_unit("phase", heading.unit)[1]}
+    return as_phase(words.pop()) if len(words) == 1 else None
 
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
-    first = grids[0]
+    first, rows = grids[0], list[Row]()
     if len(grids) == 1:
         return first
-    rows: list[Row] = []
     for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
@@ -160,49 +160,34 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
-    name = listing([grid.source for grid in grids], "and")
-    return replace(first, source=name, rows=tuple(rows), named=())
+    source = listing([grid.source for grid in grids], "and")
+    return replace(first, source=source, rows=tuple(rows), named=())
 
 
 def _names_of(columns: Columns | None) -> dict[str, str]:
     """Names of a runs table by the names that the job says its file has."""
-    stated = {} if columns is None else columns.in_file()
-    return {name: columns.written(field) for name, field in stated.items() if columns is not None}
+    return (
+        {} if columns is None else {name: columns.written(field) for name, field in columns.in_file().items()}
+    )
 
 
 def _are_there(columns: Columns, grid: Grid, problems: Problems) -> bool:
     """Whether the file has the columns that the job names; else a problem of the job."""
-    there, before = [name for name in grid.header if name], len(problems)
+    there, before = [*filter(None, grid.header)], len(problems)
     for name, field in columns.in_file().items():
         if name not in there and columns.written(field) not in there:
-            known = f"its columns are {listing(there, 'and')}"
-            expected = f"a column of {grid.source}{did_you_mean(name, there)}; {known}"
-            columns.complain(problems, field, expected)
+            hint = f"{did_you_mean(name, there)}; its columns are {listing(there, 'and')}"
+            columns.complain(problems, field, f"a column of {grid.source}{hint}")
     return len(problems) == before
 
 
 def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
     headings = read_headings(grid.header, named)
-    stems = [heading.stem for heading in headings if heading.tidy]
-    if len(set(stems)) < len(stems):
-        return grid  # a column of a runs table stands there twice
     for heading in headings:
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"
             raise Unclear(f"readings at the running speed (1X) alone: {other}", heading)
-    needed = {"run", "speed", "sensor", *READING}
-    if named.keys().isdisjoint(grid.header) and is_long(grid, headings, needed):
-        return grid
     return long_rows(grid, headings, READING, "sensor", conventions)
-
-
-def is_long(grid: Grid, headings: Sequence[Heading], needed: set[str]) -> bool:
-    """Whether a table has its form already, and plain numbers."""
-    stems = {h.stem for h in headings if h.tidy and (h.unit or h.stem != "phase")}
-    places = [h.index for h in headings if h.stem in NUMBERS]
-    plain = needed <= stems and all(h.tidy or h.stem == "" or _is_kept(h.name) for h in headings)
-    cells = {show(cells[k]) for _, cells in grid.rows for k in places} if plain else ()
-    return plain and all(map(_PLAIN.fullmatch, cells))
 
 
 def long_rows(
@@ -225,17 +210,12 @@ def long_rows(
         Where something has no reading, or several.
     """
     phase = conventions.labels.phase if key == "sensor" else ""
-    below = _units_row(grid, headings)
-    rows = grid.rows[1:] if below else grid.rows
-    columns = []
+    rows, columns = grid.rows, list[_Column]()
     for h in headings:
         cells = [cells[h.index] for _, cells in rows]
         for column in _halves(_Column(h, h.stem, h.unit, cells), headings, rows, pair):
-            under = below.get(h.index) if column.stem != "phase" or h.stem == "phase" else None
             if column.stem in (*NUMBERS, *pair):
-                column = _with_unit(column, under, rows, phase)
-                if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
-                    column = column._replace(unit="mm_s_rms")
+                column = _with_unit(column, rows, phase, rms=conventions.rms)
             columns.append(column)
     sensors = _by_name(columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
@@ -250,7 +230,7 @@ def long_rows(
     for column, name in ((c, name) for own in groups for c, name in zip(own, names, strict=True)):
         if _name(column) != name:
             raise Unclear(f"the unit of all {key}s, {name}", column.heading)
-    header = [_name(c) if c.stem != "note" else _remark(c, k) for k, c in enumerate(common)]
+    header = [_name(column, k) for k, column in enumerate(common)]
     long: list[Row] = []
     taken = [tuple(c.heading.name for c in (*common, *own[:wide], *own)) for own in groups]
     for k, (number, _) in enumerate(rows):
@@ -263,23 +243,6 @@ def long_rows(
         rows=tuple(long),
         named=tuple(taken) * len(rows),
     )
-
-
-def _units_row(grid: Grid, headings: Sequence[Heading]) -> dict[int, tuple[int, str]]:
-    """Units in the row below the header, by place; empty where that row holds something else."""
-    units: dict[int, tuple[int, str]] = {}
-    sure, (row, cells) = False, grid.rows[0] if len(grid.rows) > 1 else (0, ())
-    for heading, cell in zip(headings, cells, strict=False):
-        text, stem = show(cell).strip("()[] "), heading.stem
-        if text in ("", "-") or stem == "note":
-            continue
-        quantity = "amplitude" if stem in ("", "vector") else stem
-        known = quantity in (*NUMBERS, "angle") and readable(quantity, text)
-        if _PLAIN.fullmatch(text) or not (known or stem in NUMBERS):
-            return {}
-        units[heading.index] = (row, text)
-        sure = sure or known
-    return units if sure else {}
 
 
 def _halves(
@@ -331,14 +294,15 @@ def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: 
     return unit
 
 
-def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Row], phase: str) -> _Column:
-    """Numbers and their one unit, which the heading states, the row below it, or every cell."""
+def _with_unit(column: _Column, rows: Sequence[Row], phase: str, *, rms: bool) -> _Column:
+    """Numbers and their one unit, which the heading states, or every cell."""
     heading, stem, unit, cells = column
     stated: dict[str, tuple[int | None, Cell]] = {}
     if unit:
-        stated[spelt(unit) if heading.tidy else _unit(column, unit, phase)] = (None, heading.name)
-    if below is not None and (under := _unit(column, below[1], phase, *below)):
-        stated.setdefault(under, below)
+        stated[spelt(unit) if heading.tidy and stem != "mass" else _unit(column, unit, phase)] = (
+            None,
+            heading.name,
+        )
     whole, numbers = bool(stated), dict[Cell, Cell]()
     for cell in dict.fromkeys(cells) if stem in NUMBERS else ():
         match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
@@ -354,20 +318,17 @@ def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Ro
         raise Unclear(f"a number {unit}, as {place} says", heading, row, cell)
     unit = next(iter(stated), "")
     cells = [numbers.get(cell, cell) for cell in cells] if numbers else cells
-    if stem == "phase" and not unit:
-        plain = [text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", "."))]
-        if any(abs(float(text)) > math.tau for text in plain):
+    if stem in ("phase", "angle") and not unit:
+        texts = (text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", ".")))
+        plain = [abs(float(text)) for text in texts]
+        if max(plain, default=0.0) > math.tau or (stem == "angle" and not any(plain)):
             unit = "deg"
-        elif not heading.tidy:
-            raise Unclear("its unit, as in 'Phase (deg)' or 98°: phases so small may be radians", heading)
-    if stem == "amplitude" and unit == "mm_s" and is_severity(heading.name):
-        unit = "mm_s_rms"
+        elif stem == "angle" or not heading.tidy:
+            example = f"'{stem.capitalize()} (deg)' or 98°"
+            raise Unclear(f"its unit, as in {example}: {stem}s so small may be radians", heading)
+    if unit == "mm_s" and not heading.tidy and (rms or _SEVERITY.search(heading.name)):
+        unit = "mm_s" if _PEAK.search(heading.name) else "mm_s_rms"
     return _Column(heading, stem, unit, cells)
-
-
-def is_severity(name: str) -> bool:
-    """Whether a heading says that mm/s alone are rms, as of a vibration severity."""
-    return bool(re.search("velocity|severity", name, re.IGNORECASE)) and not _PEAK.search(name)
 
 
 def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dict[str, dict[str, _Column]]:
@@ -413,28 +374,19 @@ def _pair_by_number(sensors: dict[str, dict[str, _Column]]) -> None:
             sensors[number] = {stem: column for name in pair for stem, column in sensors.pop(name).items()}
 
 
-def _name(column: _Column) -> str:
-    """The name that a column has in a runs or weights table."""
-    if column.stem in ("", "note"):
-        return column.heading.name
-    if column.stem == "speed" and not column.unit and not column.heading.tidy:
-        raise Unclear(f"its unit too, such as '{column.heading.name} (rpm)'", column.heading)
-    return f"{column.stem}_{column.unit}" if column.unit else column.stem
-
-
-def _remark(column: _Column, k: int) -> str:
-    """A name of a remark that no column of a table has."""
-    name = column.heading.name
-    return name if _is_kept(name) else f"note {k} {name}"
-
-
-def _is_kept(name: str) -> bool:
-    """Whether the reader of a runs table knows the name of a column without a reading."""
-    return name == "time_s" or name.casefold().startswith(REMARKS) or bool(DEVIATION.match(name))
+def _name(column: _Column, place: int = 0) -> str:
+    """The name that a column has in a runs or weights table; that of a remark is of no other column."""
+    name, stem = column.heading.name, column.stem
+    if stem == "note":
+        known = name == "time_s" or name.casefold().startswith(REMARKS) or DEVIATION.match(name)
+        return name if known else f"note {place} {name}"
+    if stem == "speed" and not column.unit and not column.heading.tidy:
+        raise Unclear(f"its unit too, such as '{name} (rpm)'", column.heading)
+    return f"{stem}_{column.unit}" if stem and column.unit else stem or name
 
 
 def _once(common: Sequence[_Column]) -> bool:
     """Whether no run has two readings of one speed, so that there can be one sensor only."""
-    keys = [column.cells for column in common if column.stem in ("run", "speed", "repeat")]
-    rows = [tuple(map(show, row)) for row in zip(*keys, strict=True)]
+    keys = (map(show, column.cells) for column in common if column.stem in ("run", "speed", "repeat"))
+    rows = [*zip(*keys, strict=True)]
     return len(set(rows)) == len(rows)

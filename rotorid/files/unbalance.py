@@ -67,7 +67,7 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "unbalance", COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "unbalance", COLUMNS, problems))
     missing = "one column plane or node, not both: a node or a station"
     where = table.only(("plane", "node"), "plane", missing)
     sizes = {"unbalance", "mass", "radius"}
@@ -108,7 +108,7 @@ def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "bow", BOW_COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "bow", BOW_COLUMNS, problems))
     size = table.numbers("bow")
     table.must_be("bow", size >= 0, "a number not below 0")
     nodes, vectors = _vectors(table, "node", size, rotor)

@@ -23,3 +23,6 @@ def test_influence_with_angles_feeds_balance(cli, files, model, tmp_path):
     frame = pd.read_csv(table)
     assert len(frame) == 8
     np.testing.assert_allclose(stored.W, W, rtol=1e-6)
+    # a job of phases that lag does not turn what the table says
+    np.testing.assert_allclose(read_influence(table, phase="lag").W, W, rtol=1e-6)
+    assert "phase_lead_deg" in frame

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from rotorid.tables import TableWarning, read_trials
+from rotorid.tables import InputError, TableWarning, read_trials
 
 
 @pytest.fixture
@@ -211,6 +211,16 @@ def test_values_below_no_name(tmp_path, weights):
     problems = complaints(read_trials, path, weights)
     assert {p.row for p in problems} == {2, 3, 4, 5, 6, 7}
     assert all("a name for column 2 in the header" in p.expected for p in problems)
+
+
+@pytest.mark.parametrize("column", RUNS[0])
+@pytest.mark.parametrize("new", ["", "xyz"])
+def test_one_wrong_heading_is_one_message(tmp_path, weights, column, new):
+    """Of a runs table: nameless, also the last one, or unknown."""
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 1, column, new))
+    with pytest.raises(InputError) as caught:
+        read_trials(path, weights)
+    assert str(caught.value).count("\n") == 0
 
 
 def test_wrong_sep_line(tmp_path, weights):
