@@ -122,7 +122,7 @@ HEAD = "frequency_rad_s,F_re,X_re,X_im\n"
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg,X_re\n1,1,2,3,4\n", ["not some of both"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,-2,3\n", ["0 or more"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,400\n", ["-360 to 360"]),
-        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as its amplitude is given"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as X_amplitude is given"]),
         ("frequency_rad_s,F_re,X_re_furlong\n1,1,2\n", ["no unit"]),
         ("experiment,frequency_rad_s,F_re,X_re,X_im\na,1,1,2,3\na,2,1,2,3\n", ["row 3", "repeat"]),
         ("repeat,frequency_rad_s,F_re,X_re,X_im\n1,1,1,2,3\n1,1,1,2,3\n", ["row 3", "another repeat"]),
