@@ -212,7 +212,7 @@ def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
         ('"g*u"', '"g*u*y1"', r"not linear in the signals: it contains"),
         ('"g*u"', '"g*u + 1"', r"constant one has no influence"),
         ('"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
-        ('[["m", 0]', '[["m", "u"]', r"u in 'u' has no meaning"),
+        ('[["m", 0]', '[["m", "u"]', r"not linear in the signals"),
         ('[["m", 0]', '[["m"]', r"key M: .*expected square matrices"),
         ('w = "v_y2/4"', 'y2 = "1e3*y1"', r"y2: an amplitude needs a name of its own"),
         ('a = "1e3*y1"', 'k = "1e3*y1"', r"k: an amplitude needs a name of its own"),
