@@ -64,12 +64,6 @@ def _expression(value: object) -> object:
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
 
 
-def _two(value: object) -> object:
-    if isinstance(value, list) and len(value) == 2 and not any(isinstance(one, (bool, str)) for one in value):
-        return tuple(value)
-    raise ValueError("two numbers: [lowest, highest], or [value, standard deviation above 0]")
-
-
 def _estimates(value: object) -> object:
     """Names without starting values have None."""
     if not isinstance(value, list):
@@ -85,7 +79,6 @@ Texts = dict[Name, Text]
 Matrix = list[list[Text]]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Std = Annotated[Number, Field(ge=1e-30)]
-Two = BeforeValidator(_two, json_schema_input_type=list[float])
 Estimates = Annotated[
     dict[Name, Number | None],
     BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
@@ -141,11 +134,13 @@ class ModelFile(Settings):
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
     per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
-    bounds: dict[str, Annotated[tuple[Limit, Limit], Two]] = key(
-        "name = [lowest, highest], `inf` for none", default={}
+    bounds: dict[str, tuple[Limit, Limit]] = key(
+        "name = [lowest, highest], `inf` for none", default={}, expected="two numbers: [lowest, highest]"
     )
-    prior: dict[str, Annotated[tuple[Number, Std], Two]] = key(
-        "name = [value, standard deviation]: what is known of it beside the data", default={}
+    prior: dict[str, tuple[Number, Std]] = key(
+        "name = [value, standard deviation]: what is known of it beside the data",
+        default={},
+        expected="two numbers: [value, standard deviation above 0]",
     )
     start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
     errors: AmplitudeErrorKeys | None = key("of readings of amplitudes, one standard deviation", default=None)

@@ -10,10 +10,10 @@ import numpy as np
 
 from fem import Rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.columns import Column, read_table
+from rotorid.files.forces import nodes_in
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of, ratio
 
@@ -105,7 +105,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems, first=True))
     expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm"
     stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
-    nodes, number, values = _nodes(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
+    nodes, number, values = nodes_in(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
     table.must_be("mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …")
     table.must_be(stem, values > 0, "a frequency above 0")
     for name in ("frequency_std", "shape_std"):
@@ -150,21 +150,6 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     )
 
 
-def _nodes(table: Table, stem: str, rotor: Rotor | None) -> list[Node]:
-    """Nodes by number or station, without a rotor by number or label; "" where a complaint is noted."""
-    nodes: list[Node] = list(table.texts(stem))
-    for row, name in enumerate(table.texts(stem)):
-        if rotor is None:
-            nodes[row] = int(name) if name.isascii() and name.isdecimal() else name
-        elif name:
-            try:
-                nodes[row] = rotor.node(name)
-            except ValueError:
-                hint = did_you_mean(name, rotor.stations)
-                table.complain(row, stem, f"a node from 1 to {rotor.n_nodes} or a station{hint}")
-    return nodes
-
-
 def read_compliance(
     path: str | Path, nodes: Sequence[Node] | None = None, rotor: Rotor | None = None
 ) -> tuple[tuple[Node, ...], FloatArray]:
@@ -193,7 +178,7 @@ def read_compliance(
     """
     problems = Problems()
     table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems, first=True))
-    ends = {stem: _nodes(table, stem, rotor) for stem in ("node", "force_node")}
+    ends = {stem: nodes_in(table, stem, rotor) for stem in ("node", "force_node")}
     problems.stop()
     order = tuple(dict.fromkeys([*ends["node"], *ends["force_node"]] if nodes is None else nodes))
     for stem, named in ends.items():

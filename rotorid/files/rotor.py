@@ -70,8 +70,6 @@ USUAL = {
     "clearance": (2e-6, 5e-3, "m", {}),
     "gap": (1e-7, 2e-2, "m", {}),
     "viscosity": (1e-5, 2.0, "Pa·s", {}),
-    "swirl_ratio": (0.0, 1.0, "of the shaft's speed", {"percent": 0.01}),
-    "friction": (0.0, 1.5, "of the normal force", {"percent": 0.01}),
 }
 """What quantities are in machines: from, to, in which unit; other units by their size in that one."""
 
@@ -364,11 +362,8 @@ def _warn_of_units(source: str, rotor: Rotor) -> None:
     for what, item in [("", rotor), *items]:
         for name, (low, high, unit, others) in USUAL.items():
             values = np.atleast_1d(getattr(item, name, 0.0))
-            odd = np.flatnonzero((values > 0) & ((values < low) | (values > high)))
-            for i in odd[:1].tolist():
-                value, place = float(values[i]), what or f"element {i + 1}"
-                meant = [other for other, size in others.items() if low <= value * size <= high]
-                more = f" (and {counted(odd.size - 1, 'more')})" if odd.size > 1 else ""
+            for i in np.flatnonzero((values > 0) & ((values < low) | (values > high)))[:1].tolist():
+                meant = [other for other, size in others.items() if low <= values[i] * size <= high]
+                words = f"{source}, {what or f'element {i + 1}'}: {name} {values[i]:.6g} {unit}"
                 question = f"is this in {[*meant, 'another unit'][0]}?"
-                words = f"{source}, {place}{more}: {name} {value:.6g} {unit}; {question}"
-                warnings.warn(words, TableWarning, stacklevel=3)
+                warnings.warn(f"{words}; {question}", TableWarning, stacklevel=3)
