@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
-    SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
@@ -21,7 +20,6 @@ from fem import (
     Model,
     Rotor,
     Support,
-    too_short,
 )
 from fem.forces import kind_of
 from fem.parameters import expand
@@ -299,20 +297,16 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     last = np.arange(len(length)) == len(length) - 1
     expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
     table.must_be("length", (length > 0) | (last & ~elements), expected)
-    short = too_short(np.where(elements, length, 0.0)) & (length > 0)
-    table.must_be(
-        "length", ~short, f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
-    )
     if not elements.any():
         table.in_header(table.fields["length"].name, "at least one row with a length above 0")
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     of_elements = {column.stem: values(column.stem, getattr(material, column.stem)) for column in OF_ELEMENTS}
     ratio = of_elements["poisson_ratio"]
+    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     for stem in ("diameter", "youngs_modulus"):
         table.must_be(stem, (table.numbers(stem) > 0) | ~elements, "a number above 0")
     table.must_be("inner_diameter", ~(inner >= diameter) | ~elements, "less than the outer diameter")
-    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in ATTACHED)):
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
         table.must_be(stem, ~(values(stem) < 0), f"a number of 0 or more{outwards}")
