@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base import result
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import counted, listing
+from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
 from rotorid.files import units
 from rotorid.files.cells import Grid
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 FREQUENCIES = ("frequency", "speed")
 """Stems of the columns that may hold the frequency."""
-ENOUGH_REPEATS = 10
-"""With fewer repeated readings (beyond the first of each) their scatter is a poor measure of the errors."""
 PARTS = ("amplitude", "phase", "re", "im")
 DERIVATIVE = {"length": 0, "velocity": 1, "acceleration": 2}
 """How often a displacement is differentiated, by the kind of its unit."""
@@ -52,9 +50,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     Where inputs are absent or 0 the row is a free vibration: natural frequency and shape. A known quantity
     that changes from row to row has a column NAME (or NAME_rad_s, NAME_Hz, NAME_rpm, which become rad/s).
 
-    With a column `repeat`, rows of one experiment (or, without names, of one frequency and excitation) are
-    readings of the same: their mean counts, and their scatter, pooled over the table, says how large the
-    errors are unless the model file states them.
+    Readings of one experiment that a column `repeat` tells apart count as rows of their own.
 
     A table of modes (`mode`, `node`, `shape`, as `read_modes` reads it), whose nodes are amplitudes of the
     model, holds free vibrations with their errors.
@@ -79,7 +75,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     Warns
     -----
     TableWarning
-        Where an amplitude of the model is nowhere in the table, and where few repeats tell the errors.
+        Where an amplitude of the model is nowhere in the table.
     """
     from rotorid.identify.operator_model import HarmonicModel
 
@@ -116,8 +112,6 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     varying = {name: table.numbers(name) for name in model.varying}
     signals = {**_unread(model, len(table)), **rows.signals}
     rows = replace(rows, signals=signals, free=free, errors=errors, varying=varying)
-    if "repeat" in table:
-        return _merged(table, rows, model)
     return replace(rows, rounding=_rounding(table, rows, model.outputs))
 
 
@@ -254,8 +248,10 @@ def _rows(table: Table | None, problems: Problems, names: Sequence[str]) -> tupl
     labels = tuple(str(row + 1) for row in range(n))
     if "experiment" in table:
         labels = table.texts("experiment")
+        if "repeat" in table:
+            labels = tuple(map(", ".join, zip(labels, table.texts("repeat"), strict=True)))
         expected = "another name than in row {}; repeated readings of one experiment need a column repeat"
-        table.once("experiment", () if "repeat" in table else labels, expected)
+        table.once("experiment", labels, expected)
     signals = {name: _amplitude(table, name) for name in names if _stems(table, name)}
     problems.stop()
     shown = {name: table.unit(_stems(table, name)[0]) for name in signals}
@@ -325,62 +321,3 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
     if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
         return {}
     return {**covariances, "": np.where(rows.free, steps**2 / 12.0, 0.0)}
-
-
-def _merged(table: Table, rows: Experiments, model: HarmonicModel) -> Experiments:
-    """Repeated readings become their mean, with its covariance; unstated errors come from their scatter."""
-    named = "experiment" in table
-    settings = (rows.frequencies, *(rows.signals[name] for name in model.inputs), *rows.varying.values())
-    setting = [str(values) for values in zip(*settings, strict=True)]
-    keys, heads = rows.names if named else setting, dict[str, int]()
-    for i, key in enumerate(keys):
-        if setting[i] != setting[head := heads.setdefault(key, i)]:
-            words = f"the frequency and the excitation of row {table.rows[head]}, the same experiment"
-            table.complain(i, _frequency_column(table), words)
-    readings = zip(keys, table.texts("repeat"), strict=True)
-    table.once("repeat", readings, "another repeat than in row {}, the same reading")
-    table.problems.stop()
-    first, place = rows.take([*heads.values()]), {key: k for k, key in enumerate(heads)}
-    of, signals, counts = np.array([place[key] for key in keys]), {}, {}
-    for name, z in rows.signals.items():
-        counts[name] = np.bincount(of[~np.isnan(z)], minlength=len(heads))
-        total = np.zeros(len(heads), dtype=complex)
-        np.add.at(total, of, np.nan_to_num(z))
-        signals[name] = np.where(counts[name], total / np.maximum(counts[name], 1), np.nan)
-    labels = first.names if named else tuple(str(i + 1) for i in range(len(heads)))
-    merged = replace(first, names=labels, signals=signals)
-    errors = rows.errors or _scatter(table.source, rows, merged, of, model.outputs)
-    if errors is None:
-        return merged
-    single = replace(merged, errors=errors)
-    means = {
-        name: single.covariance(name) / np.maximum(counts[name], 1)[:, None, None] for name in model.outputs
-    }
-    return replace(merged, covariances=means)
-
-
-def _scatter(
-    source: str, rows: Experiments, merged: Experiments, of: IntArray, outputs: Sequence[str]
-) -> AmplitudeErrors | None:
-    """Errors of one reading, relative to its amplitude, pooled over all repeated ones; None without any."""
-    from rotorid.identify.amplitudes import AmplitudeErrors
-
-    squares, dof = np.zeros(2), np.zeros(2)  # along and across
-    for name in outputs:
-        z, mean = rows.signals[name], merged.signals[name][of]
-        used = ~np.isnan(z) & (mean != 0)
-        n = np.bincount(of[used], minlength=len(merged))
-        used &= n[of] > 1
-        deviation, forced = z[used] / mean[used] - 1.0, ~rows.free[used]
-        squares += np.sum(deviation.real**2), np.sum(deviation.imag[forced] ** 2)
-        dof += np.maximum(n - 1, 0) @ np.stack([np.ones(len(n)), ~merged.free], axis=1)
-    relative, phase = np.sqrt(squares / np.maximum(dof, 1))
-    if not (relative or phase):
-        return None
-    if dof[0] < ENOUGH_REPEATS:
-        message = (
-            f"{source}: the errors come from {counted(int(dof[0]), 'repeated reading')} only: intervals "
-            "may be far too narrow; repeat more readings or state the errors"
-        )
-        warnings.warn(message, TableWarning, stacklevel=4)
-    return AmplitudeErrors(float(relative), float(phase))

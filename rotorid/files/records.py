@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,22 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base import result
-from rotorid.base.text import counted, listing
+from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
 from rotorid.files.columns import Column, read_table
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.problems import Problems
 from rotorid.files.units import TIME, one_of, ratio
 
 if TYPE_CHECKING:
-    from rotorid.files.columns import Table
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
 
 MISSING = {"nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 STD = "_std"
 """At the end of the name of a column: standard deviations of the samples of an output."""
-GAP = 1.5
-"""Times the usual step; a longer one in an otherwise even record is worth a word."""
 
 
 def read_record(
@@ -64,11 +60,6 @@ def read_record(
     ------
     InputError
         With all problems of the file.
-
-    Warns
-    -----
-    TableWarning
-        Where an evenly sampled record has gaps.
     """
     from rotorid.identify.records import Record
 
@@ -110,8 +101,6 @@ def read_record(
         expected = f"a standard deviation above 0 wherever {name} was measured"
         table.complain_where(wrong, deviations[name], expected)
     problems.stop()
-    if not allow_missing:
-        _warn_of_gaps(table)
     unit = table.unit("t")
     alike = {} if sigma is None else {name: value for name, value in sigma.items() if name in table}
     axis = Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale)
@@ -127,16 +116,3 @@ def record_columns(record: Record) -> tuple[result.Column, ...]:
         columns[f"{name}{STD}"] = np.broadcast_to(std, record.t.shape)
     columns |= record.inputs
     return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
-
-
-def _warn_of_gaps(table: Table) -> None:
-    """Say where an even record jumps; nothing is filled in."""
-    steps = np.diff(table.numbers("t"))
-    usual = float(np.median(steps)) if len(steps) > 2 else np.inf
-    gaps = np.flatnonzero(steps > GAP * usual)
-    if gaps.size and (np.abs(steps - usual) <= 0.01 * usual).mean() >= 0.5:
-        message = (
-            f"{table.source}: {counted(gaps.size, 'gap')} longer than the usual step of {usual:.4g} s, the "
-            f"first of {steps[gaps[0]]:.4g} s after row {table.rows[gaps[0]]}; nothing is filled in"
-        )
-        warnings.warn(message, TableWarning, stacklevel=3)
