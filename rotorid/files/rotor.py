@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
+    KINDS,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
@@ -218,41 +219,35 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes, materials and bearings that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    file, stations = None, dict[str, int]()
+    data: Mapping[str, Any] = {"shaft": path.name}
     if path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
         if "shaft" not in data and "masses_kg" in data:
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             problems.add(str(path), None, "shaft", None, expected)
             problems.stop()
-        file = problems.need(read_settings(RotorFile, data, str(path), problems))
-        problems.stop()
-    material = file.material if file else Material()
-    parts = _shaft(path.parent / file.shaft if file else path, material)
-    if file:
-        at = Places(range(1, len(parts["length"]) + 2), stations)
-
-        def name(item: Station) -> None:
-            if item.name in stations:
-                raise InputError([item.problem("name", "a name that no other station has")])
-            stations[item.name] = at(item)
-
-        each(problems, file.station, "station", name)
-        parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), material))
-        supports, parts["forces"] = read_attached(file, at, path.parent, problems)
-        parts["supports"] += supports
-        shear = parts["model"]["shear"] or "poisson_ratio" in data.get("material", {})
-        effects = file.model.model_dump()
-        parts["model"] = effects if file.model.has("shear") else effects | {"shear": shear}
+    file = problems.need(read_settings(RotorFile, data, str(path), problems))
     problems.stop()
-    try:
-        rotor = Rotor(**parts | {"model": Model(**parts["model"]), "stations": stations})
-    except ValueError as error:
-        problems.add(str(path), None, None, None, f"a possible rotor: {error}")
-        problems.stop()
-        raise
+    parts, stations = _shaft(path.parent / file.shaft, file.material), dict[str, int]()
+    at = Places(range(1, len(parts["length"]) + 2), stations)
+
+    def name(item: Station) -> None:
+        if item.name in stations:
+            raise InputError([item.problem("name", "a name that no other station has")])
+        stations[item.name] = at(item)
+
+    each(problems, file.station, "station", name)
+    parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), file.material))
+    supports, forces = read_attached(file, at, path.parent, problems)
+    parts["supports"] += supports
+    problems.stop()
+    effects, has_ratio = file.model.model_dump(), parts.pop("has_ratio") or file.material.has("poisson_ratio")
+    if not file.model.has("shear"):  # nothing else depends on the ratio
+        effects["shear"] = has_ratio
+    more: dict[str, Any] = {"forces": forces, "stations": stations, "model": Model(**effects)}
+    rotor = whole(file, "rotor", lambda _: Rotor(**parts, **more))
     _warn_of_units(str(path), rotor)
-    if file and file.calibration:
+    if file.calibration:
         found = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
         return replace(rotor, calibration=found)
     return rotor
@@ -272,16 +267,9 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    named = dict.fromkeys(name.strip() for name in _tables(data) if name.strip())
-    return (path, *(path.parent / name for name in named))
-
-
-def _tables(data: object) -> Iterator[str]:
-    """Names of tables anywhere in a file."""
-    if isinstance(data, dict):
-        yield from (data[key] for key in ("shaft", "table") if isinstance(data.get(key), str))
-    for one in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
-        yield from _tables(one)
+    items = [data, *(item for kind in KINDS for item in data.get(kind.name, []))]
+    named = [item[key].strip() for item in items for key in ("shaft", "table") if key in item]
+    return (path, *(path.parent / name for name in dict.fromkeys(named)))
 
 
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
@@ -319,7 +307,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
         **{stem: value[elements] for stem, value in of_elements.items()},
         "discs": [Disc(node, *row[:3]) for node, row in enumerate(rows, 1) if any(row[:3])],
         "supports": [Support(node, *row[3:]) for node, row in enumerate(rows, 1) if any(row[3:])],
-        "model": {"shear": "poisson_ratio" in table},  # nothing else depends on it
+        "has_ratio": "poisson_ratio" in table,
     }
 
 
