@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
-    KINDS,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
@@ -267,8 +266,9 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    items = [data, *(item for kind in KINDS for item in data.get(kind.name, []))]
-    named = [item[key].strip() for item in items for key in ("shaft", "table") if key in item]
+    rows = [item for part in data.values() if isinstance(part, list) for item in part]
+    tables = [data, *(row for row in rows if isinstance(row, dict))]
+    named = [table[key].strip() for table in tables for key in ("shaft", "table") if key in table]
     return (path, *(path.parent / name for name in dict.fromkeys(named)))
 
 
