@@ -138,7 +138,7 @@ def _rate(path: Path, clock: str, sampled: Sampled) -> float:
     jumps = np.diff(times)
     usual = float(np.nanmedian(jumps))
     odd = ~(np.abs(jumps - usual) <= LARGEST_SHIFT * abs(usual))
-    at = 1 + int(np.argmax(odd)) if odd.any() else int(np.argmax(wrong))
+    at = 1 + int(np.argmax(odd if odd.any() else wrong[1:]))
     expected = f"times in even steps, {usual:.6g} {unit.name} here, or no such column and a stated rate"
     value = "" if np.isnan(times[at]) else f"{times[at]:.9g}"
     raise refusal(path, expected, at + sampled.first_row, clock, value)
@@ -300,7 +300,7 @@ def _names_of_sets(sets: list[dict[str, Any]]) -> list[str]:
 
 
 def _read_tdms(path: Path) -> Sampled:
-    """Channels of all groups of a TDMS file; where a name occurs twice they are named group/channel."""
+    """Channels of all groups of a TDMS file; a name that stood before is group/channel."""
     import nptdms
     from nptdms.log import log_manager
 
@@ -308,14 +308,11 @@ def _read_tdms(path: Path) -> Sampled:
     file = nptdms.TdmsFile.read(path)
     if file.file_status.incomplete_final_segment:
         raise refusal(path, "a whole TDMS file; its end is missing")
-    channels = [channel for group in file.groups() for channel in group.channels() if len(channel)]
-    unique = len({channel.name for channel in channels}) == len(channels)
-    data: dict[str, AnyArray] = {}
-    clocks = []
-    for channel in channels:
+    data, clocks = dict[str, AnyArray](), []
+    for channel in [channel for group in file.groups() for channel in group.channels() if len(channel)]:
         samples, stated = channel[:], channel.properties
         if getattr(samples, "dtype", np.dtype(object)).kind in "biuf":
-            data[channel.name if unique else f"{channel.group_name}/{channel.name}"] = samples
+            data[f"{channel.group_name}/{channel.name}" if channel.name in data else channel.name] = samples
             if time_unit(channel.name) is None:
                 begun = np.datetime64(stated.get("wf_start_time", 0), "us").astype(np.int64) / 1e6
                 clocks.append((begun + stated.get("wf_start_offset", 0.0), stated.get("wf_increment", 0.0)))
