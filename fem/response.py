@@ -314,7 +314,7 @@ class InfluenceCoefficients(Result):
             Column("speed_rad_s", np.repeat(self.speeds, C * P)),
             Column("sensor", sensors * S),
             Column("plane", planes * S),
-            *polar("influence_m_per_kg_m", "phase_deg", self.W),
+            *polar("influence_m_per_kg_m", "phase_lead_deg", self.W),
         )
         every = Table("influence coefficients", columns)
         if not steady.any():

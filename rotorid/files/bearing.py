@@ -164,7 +164,7 @@ def _matrices(quantity: str, values: Mapping[str, FloatArray]) -> FloatArray:
 def _over_speed(path: Path, kind: str) -> Table:
     """A table of coefficients."""
     problems = Problems()
-    table = problems.need(read_table(path, kind, COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, kind, COLUMNS, problems))
     speed = table.numbers("speed")
     table.must_be("speed", speed >= 0, "a speed of 0 or more")
     rising = np.insert(~(np.diff(speed) <= 0), 0, True)

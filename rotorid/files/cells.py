@@ -29,6 +29,8 @@ MOST_CELLS = 5_000_000
 SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])")
 """#N/A, #DIV/0!, #ИМЯ?"""
+_AROUND = '#"; ,\t'
+"""Around the text of a comment."""
 _VERSION = re.compile(r"schema_version\s*=\s*(\d{1,9})")
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
@@ -63,12 +65,6 @@ class Shown(float):
         self = super().__new__(cls, value)
         self.text = text
         return self
-
-
-class CommentLine(str):
-    """A line of a text file that is a comment."""
-
-    __slots__ = ()
 
 
 Cell = str | int | float | BadCell
@@ -127,16 +123,15 @@ def show(cell: Cell) -> str:
     return cell.value if isinstance(cell, BadCell) else repr(cell)
 
 
-def is_comment(cells: Sequence[Cell], *, in_sheet: bool, below_header: bool) -> bool:
+def is_comment(cells: Sequence[Cell], *, below_header: bool) -> bool:
     """Whether a row is a comment: it begins with `#`, not with an error of a spreadsheet.
 
-    Below the header of a sheet a comment stands alone in its row. A row of a text file is one if its reader
-    has found so: labels such as "#12 coupling" begin with `#`, too.
+    Below the header a comment stands alone in its row: labels such as "#12 coupling" begin with `#`, too.
     """
     first = cells[0] if cells else ""
-    if not in_sheet or not isinstance(first, str):
-        return isinstance(first, CommentLine)
-    if not first.startswith("#") or is_spreadsheet_error(re.split("[,;\t]", first)[0].strip()):
+    if not isinstance(first, str) or not first.startswith("#"):
+        return False
+    if is_spreadsheet_error(re.split("[,;\t]", first)[0].strip()):
         return False
     return not below_header or all(cell == "" for cell in cells[1:])
 
@@ -148,13 +143,18 @@ def is_spreadsheet_error(cell: str) -> bool:
 
 def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
     """Rows with the header in one row, where that is found; those above it become comments."""
-    header = find([[show(cell) for cell in cells] for _, cells in rows[: MOST_ABOVE + 1]])
+    texts = {k: [show(cell) for cell in cells] for k, (_, cells) in enumerate(rows[: 2 * MOST_ABOVE])}
+    filled = [k for k, text in texts.items() if any(text) and not text[0].startswith("#")]
+    header = find([texts[k] for k in filled])
     if header is None:
         return list(rows)
-    first, last, names = header
-    above = [(n, (f"# {' '.join(filter(None, map(show, cells))).lstrip('# ')}",)) for n, cells in rows[:last]]
-    changed = rows[last] if first == last else (rows[last][0], tuple(names))
-    return [*above, changed, *rows[last + 1 :]]
+    last = filled[header[1]]
+    above = [(rows[k][0], (f"# {' '.join(filter(None, texts[k])).lstrip('# ')}",)) for k in range(last)]
+    return [
+        *above,
+        (rows[last][0], tuple(header[2])) if header[0] != header[1] else rows[last],
+        *rows[last + 1 :],
+    ]
 
 
 def make_grid(
@@ -163,6 +163,7 @@ def make_grid(
     separator: str,
     problems: Problems,
     *,
+    comments: Iterable[str] = (),
     complete: bool = True,
     may_be_empty: bool = False,
 ) -> Grid | None:
@@ -170,8 +171,8 @@ def make_grid(
 
     Parameters
     ----------
-    source, rows, separator, complete
-        As in `Grid`.
+    source, rows, separator, comments, complete
+        As in `Grid`; of a sheet the comments stand among the rows.
     problems
         Collects the complaints.
     may_be_empty
@@ -182,32 +183,26 @@ def make_grid(
     Grid or None
         None if there is nothing to read; the problems say why.
     """
-    comments: list[str] = []
-    filled: list[Row] = []
+    texts, filled = [*comments], list[Row]()
     for number, cells in rows:
-        if is_comment(cells, in_sheet=not separator, below_header=bool(filled)):
-            text = (separator or " ").join(map(show, cells)).lstrip("# ").rstrip(" ;,\t")
-            comments.append(text)
-            if version := _VERSION.fullmatch(text):
-                problems.refuse_newer(source, int(version[1]))
+        if not separator and is_comment(cells, below_header=bool(filled)):
+            texts.append(" ".join(map(show, cells)).strip(_AROUND))
         elif not all(cell == "" for cell in cells):
             filled.append((number, cells))
+    for version in filter(None, map(_VERSION.fullmatch, texts)):
+        problems.refuse_newer(source, int(version[1]))
     header_row, header = filled[0][0] if filled else None, [*map(show, filled[0][1])] if filled else []
     while header and not header[-1]:
         header.pop()
     if header_row is None or (len(filled) < 2 and not may_be_empty):
-        expected = (
-            "rows below the header; there are none"
-            if filled
-            else "a table with a header row; the file is empty"
-        )
         if complete:
+            expected = "rows below the header; there are none" if filled else EMPTY
             problems.add(source, header_row, None, None, expected)
         return None
     body, width = filled[1:], len(header)
     if "" in header or any(len(cells) != width for _, cells in body):
         body = [_fit(source, header_row, header, row, separator, problems) for row in body]
-    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
+    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(texts), complete)
 
 
 def _fit(
@@ -302,22 +297,19 @@ def parse_text(
             return None
     plain = ((k, line.strip(';,\t" \xa0\ufeff\r\n')) for k, line in enumerate(lines))
     top = [k for k, line in plain if line and not line.startswith("#")][:MOST_ABOVE]
-    start, names, above = top[0] if top else 0, None, 0
-    if find is not None and (header := _header(lines, top, find)) is not None:
-        start, names = header
-        above = start
+    header = None if find is None else _header(lines, top, find)
+    start, names = header or (top[0] if top else 0, None)
     header_line = lines[start] if top else "".join(line for line in lines if line[:1] != "#")
     separator = declared.group(1) if declared else _separator(header_line)
     if len(lines) + text.count(separator) > MOST_CELLS:
         problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
         return None
-    rows: list[Row] = []
-    complete, below_header = True, False
+    rows, comments, complete = list[Row](), list[str](), True
     for k, line in enumerate(lines):
         stripped = clean(line)
-        comment = stripped[:1] == "#" and is_comment((stripped,), in_sheet=True, below_header=False)
-        if (k < above and stripped) or (comment and not (below_header and separator in line)):
-            rows.append((k + 1, (CommentLine(stripped if comment else f"# {stripped}"),)))
+        comment = k < start or (stripped[:1] == "#" and is_comment((stripped,), below_header=False))
+        if comment and not (k > start and separator in line):
+            comments += filter(None, [stripped.strip(_AROUND)])
             continue
         try:
             cells = tuple(names) if names is not None and k == start else _cells(line, separator)
@@ -326,12 +318,10 @@ def parse_text(
             problems.add(source, k + 1, None, None, f"{rule}: {error}")
             complete = False
             continue
-        alone = not below_header and is_comment(cells, in_sheet=True, below_header=True)
-        if alone:
-            cells = (CommentLine(cells[0]),)  # a comment with a separator in it, as a spreadsheet saves it
-        below_header = below_header or (not alone and any(cells))
         rows.append((k + 1, cells))
-    return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+    return make_grid(
+        source, rows, separator, problems, comments=comments, complete=complete, may_be_empty=may_be_empty
+    )
 
 
 def _header(

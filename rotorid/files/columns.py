@@ -247,9 +247,6 @@ def read_table(
     sheet: str,
     columns: Sequence[Column],
     problems: Problems,
-    *,
-    first: bool = False,
-    may_be_empty: bool = False,
 ) -> Table | None:
     """Read a table from a text file or a workbook.
 
@@ -258,20 +255,18 @@ def read_table(
     source
         A file, of which `.xlsx` is a workbook and everything else text, or the cells of a sheet.
     sheet
-        Name of the sheet in a workbook; the only sheet may have any name (with `first`, the first one).
+        Name of the sheet in a workbook; where none has it, the first one is read.
     columns
         What the table may contain; every other column is a problem.
     problems
         Collects the complaints.
-    may_be_empty
-        Whether a header without rows says something.
 
     Returns
     -------
     Table or None
         None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
     """
-    grid = read_grid(source, sheet, problems, first=first, may_be_empty=may_be_empty)
+    grid = read_grid(source, sheet, problems, first=True)
     return None if grid is None else make_table(grid, columns, problems)
 
 
@@ -334,9 +329,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
         if column is None:
             wrong = f"a known column (did you mean {near[k]!r}?)" if near[k] else ""
         elif column.stem in places:
-            other = grid.header[places[column.stem][0]]
-            one = f"one unit for {column.stem}, not also {other}"
-            wrong = "the column once" if other == names[k] else one
+            wrong = f"the column once, not also {grid.header[places[column.stem][0]]}"
         else:
             try:
                 unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else None
@@ -403,20 +396,20 @@ def _has_columns(
     if not stems:
         fits, column = False, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
-        problems.apart({grid.source})  # that rows are longer than a title is no news
+        problems.drop(grid.source)  # that rows are longer than a title is no news
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
         fits, end = False, seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"
     elif missing:
-        needed = listing(missing[0].names if len(missing) == 1 else [c.names[0] for c in missing], "and")
-        needed = needed.replace(" and ", " or ") if len(missing) == 1 else needed
+        several = f"columns {listing([c.names[0] for c in missing], 'and')}"
+        needed = several if len(missing) > 1 else f"a column {listing(missing[0].names)}"
         column, value = missing[0].names[0], listing(unknown, "and") or None
-        expected = f"{'a column' if len(missing) == 1 else 'columns'} {needed}; the columns are {present}"
+        expected = f"{needed}; the columns are {present}"
     elif unknown:
         what = "a known column" if len(unknown) == 1 else "known columns"
         column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
         expected = f"{what}: {known}; remarks go into 'note'"
-    if expected and not ("" in grid.header and missing and problems.of(grid.source)):
+    if expected and not (fits and missing and problems.of(grid.source)):
         problems.add(grid.source, grid.header_row, column, value, expected)
     return fits
 
@@ -470,12 +463,10 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
 def _named(text: str) -> str:
     if not text:
         raise NotANumber("a name")
-    if text[0] in "=@":
-        raise NotANumber("a name; one that begins with = or @ would be a formula in a spreadsheet")
+    if text[0] in "=@" or not text.isprintable():
+        raise NotANumber("a name without control characters, which does not begin as a formula, with = or @")
     if is_spreadsheet_error(text) or not text.strip("#"):
         raise NotANumber("a name, not an error of the spreadsheet")
-    if not text.isprintable():
-        raise NotANumber("a name without line breaks and control characters")
     return text
 
 

@@ -22,7 +22,6 @@ ANGLES: tuple[Angles, ...] = get_args(Angles)
 ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
 """What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
-VIEWS: tuple[View, ...] = get_args(View)
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
 ERROR_KEYS = (

@@ -12,13 +12,11 @@ _POINT_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\.[0-9]{3})+")
 _MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[ ,.'’][0-9]{3})+(?:[.,][0-9]*)?")
 _WITH_UNIT = re.compile(r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]|[°%µμ]).*")
-_NOT_FINITE = {"nan", "inf", "infinity", "-nan", "ind", "1.#qnan", "1.#inf", "-1.#ind", "1.#ind", "-1.#inf"}
+_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity|ind|1\.#(?:qnan|inf|ind))", re.IGNORECASE)
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes outside occur in no table of this project, but squares of them overflow."""
 LARGEST_STATED = 1e12
 """Of an option."""
-
-_MISSING = {"na", "n/a", "#n/a", "null", "none", "-", "--", "?"}
 
 
 class NotANumber(ValueError):
@@ -106,27 +104,16 @@ def parse_number(text: str, *, comma: bool = False, separator: str = "") -> floa
 
 def _why_no_comma(separator: str) -> str:
     if separator == ",":
-        return (
-            "a number with a decimal point: in a comma-separated file a comma is not a decimal sign "
-            "(separate by ;)"
-        )
-    if separator == "\t":
-        return "a number with a decimal point: this comma may separate thousands (or separate columns by ;)"
-    return "a number; the cell holds text, whose comma may separate thousands"
+        words = "in a comma-separated file a comma is not a decimal sign (separate by ;)"
+        return f"a number with a decimal point: {words}"
+    return "a number with a decimal point: this comma may separate thousands (or separate columns by ;)"
 
 
 def _reason(text: str) -> str:
-    folded = text.casefold()
-    if not text:
-        return "a number"
-    if folded.lstrip("+-") in _NOT_FINITE or folded in _NOT_FINITE:
+    if _NOT_FINITE.fullmatch(text):
         return "a finite number"
-    if folded in _MISSING:
-        return "a number; a missing value is not filled in"
     if _THOUSANDS.fullmatch(text):
         return "a number without thousands separators"
     if "\N{MINUS SIGN}" in text or "\N{EN DASH}" in text:
         return "a number with the minus sign written as -"
-    if _WITH_UNIT.fullmatch(text):
-        return "a number alone; write the unit in the header"
-    return "a number"
+    return "a number alone; write the unit in the header" if _WITH_UNIT.fullmatch(text) else "a number"

@@ -54,8 +54,7 @@ _WEIGHTS = _words(
     action="action",
     unit="unit",
     pieces="pieces",
-    unbalance="unbalance|imbalance",
-    mass="weight|mass|wt|amount",
+    mass="unbalance|imbalance|weight|mass|wt|amount",
     run=_RUN,
 )
 _TIDY = {
@@ -71,34 +70,11 @@ _BESIDE = re.compile(
 )
 """What `rotorid vectors` and instruments write beside the readings."""
 _BESIDE_WEIGHTS = re.compile("date|time|remark|operator", re.IGNORECASE)
-_FILLERS = {
-    "name",
-    "no",
-    "nr",
-    "number",
-    "id",
-    "shaft",
-    "rotor",
-    "machine",
-    "running",
-    "rotational",
-    "nominal",
-}
-_FILLERS |= {
-    "",
-    "measurement",
-    "measuring",
-    "run",
-    "measured",
-    "position",
-    "vibration",
-    "vib",
-    "balance",
-    "balancing",
-    "trial",
-    "correction",
-    "of",
-}
+_FILLERS = re.compile(
+    "(?:|name|no|nr|number|id|shaft|rotor|machine|running|rotational|nominal|measurement|measuring|run|measured"
+    "|position|vibration|vib|balance|balancing|trial|correction|of)",
+    re.IGNORECASE,
+)
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _ORDER = re.compile(r"(?<![^\W_])(?<!\.)([0-9]+(?:\.[0-9]+)?)[xX×](?![^\W_])")
 _PROBE_Y = re.compile(r"(?<![^\W_])[0-9]+[yY](?![^\W_])")
@@ -116,14 +92,21 @@ _BOTH_AT_END = re.compile(
     re.IGNORECASE,
 )
 _SPELLINGS = {
-    "r_min": "rpm",
-    "1_min": "rpm",
-    "cpm": "rpm",
-    "hz": "Hz",
-    **dict.fromkeys(("°", "º", "degree", "degrees"), "deg"),
-    **{"mils": "mil", "micron": "um", "microns": "um", "ips": "in_s", "m_s²": "m_s2", "mm_s²": "mm_s2"},
-    **dict.fromkeys(("gram", "grams", "gr", "gm", "gms"), "g"),
-    **{"ounce": "oz", "ounces": "oz", "lbs": "lb", "pound": "lb", "pounds": "lb"},
+    other: unit
+    for unit, others in {
+        "rpm": "r_min 1_min cpm",
+        "Hz": "hz",
+        "deg": "° º degree degrees",
+        "mil": "mils",
+        "um": "micron microns",
+        "in_s": "ips",
+        "m_s2": "m_s²",
+        "mm_s2": "mm_s²",
+        "g": "gram grams gr gm gms",
+        "oz": "ounce ounces",
+        "lb": "lbs pound pounds",
+    }.items()
+    for other in others.split()
 }
 
 
@@ -218,9 +201,11 @@ def read_headings(
     return headings
 
 
-def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None) -> bool:
-    """Whether cells are surely the header of a runs table: most of its columns, or run and speed."""
-    stems = {heading.stem for heading in read_headings(cells, named)}
+def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, weights: bool) -> bool:
+    """Whether cells are surely the header of a table: most of its columns; of runs, run and speed."""
+    stems = {heading.stem for heading in read_headings(cells, named, weights=weights)}
+    if weights:
+        return {"plane", "mass"} <= stems
     stems |= set(READING) if "vector" in stems else set()
     return len(stems & _NEEDED) > len(_NEEDED) / 2 or {"run", "speed"} <= stems
 
@@ -230,38 +215,51 @@ def find_header(
 ) -> tuple[int, int, Sequence[str]] | None:
     """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
-    Two rows make one header where a name in the upper one stands over several columns: `Bearing 1` over
-    `mils` and `deg`.
+    Rows make one header where a name in the upper one stands over several columns, `Bearing 1` over `mils`
+    and `deg`, and where the lower one has units.
     """
     for at, cells in enumerate(rows[:MOST_ABOVE]):
-        if weights:
-            stems = {heading.stem for heading in read_headings(cells, weights=True)}
-            if "plane" in stems and stems & {"mass", "unbalance"}:
-                return at, at, cells
+        last, names, below = at, cells, rows[at + 1 :]
+        both = None if weights or not below else _joined(cells, below[0])
+        if both is not None and looks_like_header(both, named, weights=False):
+            last, names = at + 1, both
+        elif not looks_like_header(cells, named, weights=weights):
             continue
-        both = _joined(cells, rows[at + 1]) if at + 1 < len(rows) else None
-        if both is not None and looks_like_header(both, named):
-            return at, at + 1, both
-        if looks_like_header(cells, named):
-            return at, at, cells
+        units_below = None if last + 1 >= len(rows) else _with_units(names, rows[last + 1], weights=weights)
+        return (at, last, names) if units_below is None else (at, last + 1, units_below)
     return None
+
+
+def _with_units(names: Sequence[str], below: Sequence[str], *, weights: bool) -> list[str] | None:
+    """Names with the units of the row below them; None where that row holds something else."""
+    joined, sure = [*names], False
+    for heading, cell in zip(read_headings(names, weights=weights), below, strict=False):
+        text, stem = cell.strip("()[] "), heading.stem
+        if text in ("", "-") or stem == "note":
+            continue
+        quantity = "amplitude" if stem in ("", "vector") else "phase" if stem == "angle" else stem
+        known = quantity in (*MEASURED, "mass") and readable(quantity, text)
+        if not known and (stem not in (*MEASURED, "mass") or re.match("[0-9.,+-]", text)):
+            return None
+        sure = sure or known
+        if not heading.unit:
+            joined[heading.index] = f"{heading.name} ({text})"
+        elif not (known and read_unit(quantity, heading.unit) == read_unit(quantity, text)):
+            joined[heading.index] = f"{quantity} ({heading.unit}, {text})"  # explained as no unit
+    return joined if sure else None
 
 
 def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
     """The names of two rows of headings; None where no upper name stands over several lower ones."""
-    names, group, several = [], "", False
-    for k, heading in enumerate(read_headings(lower)):
-        above = upper[k] if k < len(upper) else ""
-        if re.fullmatch(r"[0-9.,+-]+", heading.name) and heading.name.strip("-"):
+    names, group, several = list[str](), "", False
+    for above, heading in zip([*upper, *[""] * len(lower)], read_headings(lower), strict=False):
+        if re.fullmatch(r"-*[0-9.,+][0-9.,+-]*", heading.name):
             return None
-        if heading.stem in READING and not heading.sensor:
-            several = several or (above in ("", group) and bool(group))
-            group = above or group
-            names.append(f"{group} {heading.name}".strip())
-        else:
-            group = ""
-            names.append(" ".join(filter(None, (above, heading.name.strip("-")))))
-    filled = [name for name in names if name]
+        reading = heading.stem in READING and not heading.sensor
+        several = several or (reading and bool(group) and above in ("", group))
+        group = (above or group) if reading else ""
+        names.append(f"{group if reading else above} {heading.name.strip('-')}".strip())
+    filled = [*filter(None, names)]
     return names if several and len(set(filled)) == len(filled) else None
 
 
@@ -272,7 +270,8 @@ def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Hea
     if beside or name.casefold().startswith(REMARKS):
         return replace(unknown, stem="note")
     if (tidy := _TIDY[weights].fullmatch(name)) is not None:
-        return replace(unknown, stem=tidy[1] or tidy[0], unit=tidy[2] or "", tidy=True)
+        stem = (tidy[1] or tidy[0]).replace("unbalance", "mass")
+        return replace(unknown, stem=stem, unit=tidy[2] or "", tidy=True)
     order = None if probes or weights else _ORDER.search(name)
     if order is not None and order[1] != "1":
         return replace(unknown, stem=f"{order[1]}X")
@@ -319,7 +318,7 @@ def _with_rest(heading: Heading, outside: str, match: re.Match[str], inside: str
     if quantity in READING and not inside and (at_end := _AT_END.search(after)):  # velocity DE mm/s
         after, inside = after[: at_end.start()], at_end[0]
     words = [word for word in f"{before} {after}".split() if word.casefold() not in ("vibration", "vib")]
-    if quantity not in READING and any(word.casefold().strip(".#") not in _FILLERS for word in words):
+    if quantity not in READING and any(not _FILLERS.fullmatch(word.strip(".#")) for word in words):
         return Heading(heading.index, heading.name, sensor=heading.name)
     return replace(heading, unit=inside, sensor=" ".join(words) if quantity in READING else "")
 
@@ -329,14 +328,11 @@ def _of_weights(unknown: Heading, outside: str, inside: str) -> Heading:
     for stem, role in _WEIGHTS.items():
         if match := role.search(outside):
             after = _bare(outside[match.end() :])
-            unit = inside or (after if after.casefold() not in _FILLERS else "")
+            unit = inside or ("" if _FILLERS.fullmatch(after) else after)
             if stem == "hole" and unit and readable("phase", unit):
                 stem = "angle"
-            if stem in ("mass", "unbalance") and unit and readable("mass", unit):
-                stem = units.weight(read_unit("mass", unit)[0]).kind
-            measured = stem in ("mass", "unbalance", "angle")
-            plane = _bare(outside[: match.start()]) if measured else ""
-            return replace(unknown, stem=stem, unit=unit if measured else "", sensor=plane)
+            unit = unit if stem in ("mass", "angle") else ""
+            return replace(unknown, stem=stem, unit=unit, sensor=_bare(outside[: match.start()]))
     whole = f"{outside} {inside}".strip()
     at_end = _AT_END.search(whole)
     if at_end and at_end["angle"]:

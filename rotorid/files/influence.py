@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import suppress
 from dataclasses import asdict, fields, replace
 from itertools import islice, product
 from pathlib import Path
@@ -23,7 +22,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes, show
+from rotorid.files.cells import Grid, read_bytes
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 from rotorid.files.headings import read_headings, read_unit, readable
@@ -40,8 +39,6 @@ if TYPE_CHECKING:
 
 
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
-_OLDER = re.compile(r"(?:std_(?:re|im)|correlation|common)_")
-"""Columns of errors that versions before 1.0 wrote, with rows of a plane `(baseline)`: passed over."""
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
@@ -190,27 +187,24 @@ def load_influence(
 
 
 def _tidied(grid: Grid) -> Grid:
-    """Without columns and rows of older versions; weights per vibration in influence_<unit> and phase_deg."""
-    header = [f"note {name}" if _OLDER.match(name) else name for name in grid.header]
-    rows = grid.rows
-    if "plane" in header:
-        rows = tuple(row for row in rows if show(row[1][header.index("plane")]) != "(baseline)")
-    named = dict[int, _Halves]()
-    for k, name in enumerate(header):
-        if match := _NAMED.fullmatch(name):
-            with suppress(UnitError):
-                named[k] = _halves(match[1])
-    if len(named) == 1 and next(iter(named.values())).reciprocal:
-        [(at, (vibration, weight, _))] = named.items()
-        header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(header)]
-        header[at] = f"influence_{weight.name}_per_{vibration.name}"
-        vectors = [vector_in(cells[at]) for _, cells in rows]
-        if "phase_deg" not in header and all(vectors):
-            header.append("phase_deg")
-            rows = tuple(
-                (number, (*cells[:at], vector[0], *cells[at + 1 :], vector[1].rstrip("° ")))
-                for (number, cells), vector in zip(rows, filter(None, vectors), strict=True)
-            )
+    """The table with weights per vibration in influence_<unit> and phase_deg."""
+    header, rows = [*grid.header], grid.rows
+    for at, name in enumerate(grid.header):
+        match = _NAMED.fullmatch(name)
+        try:
+            vibration, weight, reciprocal = _halves(match[1] if match else "")
+        except UnitError:
+            continue
+        if reciprocal:
+            header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(header)]
+            header[at] = f"influence_{weight.name}_per_{vibration.name}"
+            vectors = [vector_in(cells[at]) or ("", "") for _, cells in rows]
+            if "phase_deg" not in header and ("", "") not in vectors:
+                header.append("phase_deg")
+                rows = tuple(
+                    (number, (*cells[:at], size, *cells[at + 1 :], angle.rstrip("° ")))
+                    for (number, cells), (size, angle) in zip(rows, vectors, strict=True)
+                )
     return replace(grid, header=tuple(header), rows=rows)
 
 
@@ -386,20 +380,20 @@ def fit_to_readings(
         if unit_of(our).kind != unit_of(their).kind:
             expected = f"coefficients in {our or 'no unit'} or a unit that converts, as the {table} table has"
             problems.add(source, None, column, their or "no unit", expected)
-    rows = [nearest_speed(influence.speeds, float(speed), tolerance_percent) for speed in trials.speeds]
-    speeds = zip(trials.speeds.tolist(), rows, strict=True)
-    lacking = [("speed", show_speed(speed, rpm), "runs") for speed, row in speeds if row is None]
-    lacking += [("sensor", repr(name), "runs") for name in trials.sensors if name not in influence.sensors]
-    lacking += [("plane", repr(name), "weights") for name in trials.planes if name not in influence.planes]
-    there = {"sensor": influence.sensors, "plane": influence.planes}
-    for what, name, table in lacking:
-        known = show_speeds(influence.speeds, rpm) if what == "speed" else listing(there[what], "and")
-        hint, where = (
-            did_you_mean(name.strip("'"), there.get(what, ())),
-            "at" if what == "speed" else f"of {what}",
-        )
-        expected = f"coefficients {where} {name}, as the {table} table has; there are {known}{hint}"
-        problems.add(source, None, what, None, expected)
+    rows = [nearest_speed(influence.speeds, v, tolerance_percent) for v in trials.speeds.tolist()]
+    for speed in trials.speeds[[row is None for row in rows]]:
+        known = show_speeds(influence.speeds, rpm)
+        expected = f"coefficients at {show_speed(speed, rpm)}, as the runs table has; there are {known}"
+        problems.add(source, None, "speed", None, expected)
+    pairs_of_names = (trials.sensors, influence.sensors), (trials.planes, influence.planes)
+    for what, table, (names, there) in zip(
+        ("sensor", "plane"), ("runs", "weights"), pairs_of_names, strict=True
+    ):
+        for name in names:
+            if name not in there:
+                hint = f"there are {listing(there, 'and')}{did_you_mean(name, there)}"
+                expected = f"coefficients of {what} {name!r}, as the {table} table has; {hint}"
+                problems.add(source, None, what, None, expected)
     if len(problems):
         return None
     columns = [influence.sensors.index(name) for name in trials.sensors]

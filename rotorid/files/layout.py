@@ -149,10 +149,9 @@ def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None
 
 def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
-    first = grids[0]
+    first, rows = grids[0], list[Row]()
     if len(grids) == 1:
         return first
-    rows: list[Row] = []
     for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
@@ -160,49 +159,34 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
-    name = listing([grid.source for grid in grids], "and")
-    return replace(first, source=name, rows=tuple(rows), named=())
+    source = listing([grid.source for grid in grids], "and")
+    return replace(first, source=source, rows=tuple(rows), named=())
 
 
 def _names_of(columns: Columns | None) -> dict[str, str]:
     """Names of a runs table by the names that the job says its file has."""
-    stated = {} if columns is None else columns.in_file()
-    return {name: columns.written(field) for name, field in stated.items() if columns is not None}
+    return (
+        {} if columns is None else {name: columns.written(field) for name, field in columns.in_file().items()}
+    )
 
 
 def _are_there(columns: Columns, grid: Grid, problems: Problems) -> bool:
     """Whether the file has the columns that the job names; else a problem of the job."""
-    there, before = [name for name in grid.header if name], len(problems)
+    there, before = [*filter(None, grid.header)], len(problems)
     for name, field in columns.in_file().items():
         if name not in there and columns.written(field) not in there:
-            known = f"its columns are {listing(there, 'and')}"
-            expected = f"a column of {grid.source}{did_you_mean(name, there)}; {known}"
-            columns.complain(problems, field, expected)
+            hint = f"{did_you_mean(name, there)}; its columns are {listing(there, 'and')}"
+            columns.complain(problems, field, f"a column of {grid.source}{hint}")
     return len(problems) == before
 
 
 def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
     headings = read_headings(grid.header, named)
-    stems = [heading.stem for heading in headings if heading.tidy]
-    if len(set(stems)) < len(stems):
-        return grid  # a column of a runs table stands there twice
     for heading in headings:
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"
             raise Unclear(f"readings at the running speed (1X) alone: {other}", heading)
-    needed = {"run", "speed", "sensor", *READING}
-    if named.keys().isdisjoint(grid.header) and is_long(grid, headings, needed):
-        return grid
     return long_rows(grid, headings, READING, "sensor", conventions)
-
-
-def is_long(grid: Grid, headings: Sequence[Heading], needed: set[str]) -> bool:
-    """Whether a table has its form already, and plain numbers."""
-    stems = {h.stem for h in headings if h.tidy and (h.unit or h.stem != "phase")}
-    places = [h.index for h in headings if h.stem in NUMBERS]
-    plain = needed <= stems and all(h.tidy or h.stem == "" or _is_kept(h.name) for h in headings)
-    cells = {show(cells[k]) for _, cells in grid.rows for k in places} if plain else ()
-    return plain and all(map(_PLAIN.fullmatch, cells))
 
 
 def long_rows(
@@ -225,15 +209,12 @@ def long_rows(
         Where something has no reading, or several.
     """
     phase = conventions.labels.phase if key == "sensor" else ""
-    below = _units_row(grid, headings)
-    rows = grid.rows[1:] if below else grid.rows
-    columns = []
+    rows, columns = grid.rows, list[_Column]()
     for h in headings:
         cells = [cells[h.index] for _, cells in rows]
         for column in _halves(_Column(h, h.stem, h.unit, cells), headings, rows, pair):
-            under = below.get(h.index) if column.stem != "phase" or h.stem == "phase" else None
             if column.stem in (*NUMBERS, *pair):
-                column = _with_unit(column, under, rows, phase)
+                column = _with_unit(column, rows, phase)
                 if conventions.rms and column.unit == "mm_s" and not (h.tidy or _PEAK.search(h.name)):
                     column = column._replace(unit="mm_s_rms")
             columns.append(column)
@@ -263,23 +244,6 @@ def long_rows(
         rows=tuple(long),
         named=tuple(taken) * len(rows),
     )
-
-
-def _units_row(grid: Grid, headings: Sequence[Heading]) -> dict[int, tuple[int, str]]:
-    """Units in the row below the header, by place; empty where that row holds something else."""
-    units: dict[int, tuple[int, str]] = {}
-    sure, (row, cells) = False, grid.rows[0] if len(grid.rows) > 1 else (0, ())
-    for heading, cell in zip(headings, cells, strict=False):
-        text, stem = show(cell).strip("()[] "), heading.stem
-        if text in ("", "-") or stem == "note":
-            continue
-        quantity = "amplitude" if stem in ("", "vector") else stem
-        known = quantity in (*NUMBERS, "angle") and readable(quantity, text)
-        if _PLAIN.fullmatch(text) or not (known or stem in NUMBERS):
-            return {}
-        units[heading.index] = (row, text)
-        sure = sure or known
-    return units if sure else {}
 
 
 def _halves(
@@ -331,14 +295,15 @@ def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: 
     return unit
 
 
-def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Row], phase: str) -> _Column:
-    """Numbers and their one unit, which the heading states, the row below it, or every cell."""
+def _with_unit(column: _Column, rows: Sequence[Row], phase: str) -> _Column:
+    """Numbers and their one unit, which the heading states, or every cell."""
     heading, stem, unit, cells = column
     stated: dict[str, tuple[int | None, Cell]] = {}
     if unit:
-        stated[spelt(unit) if heading.tidy else _unit(column, unit, phase)] = (None, heading.name)
-    if below is not None and (under := _unit(column, below[1], phase, *below)):
-        stated.setdefault(under, below)
+        stated[spelt(unit) if heading.tidy and stem != "mass" else _unit(column, unit, phase)] = (
+            None,
+            heading.name,
+        )
     whole, numbers = bool(stated), dict[Cell, Cell]()
     for cell in dict.fromkeys(cells) if stem in NUMBERS else ():
         match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
@@ -354,12 +319,14 @@ def _with_unit(column: _Column, below: tuple[int, str] | None, rows: Sequence[Ro
         raise Unclear(f"a number {unit}, as {place} says", heading, row, cell)
     unit = next(iter(stated), "")
     cells = [numbers.get(cell, cell) for cell in cells] if numbers else cells
-    if stem == "phase" and not unit:
-        plain = [text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", "."))]
-        if any(abs(float(text)) > math.tau for text in plain):
+    if stem in ("phase", "angle") and not unit:
+        texts = (text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", ".")))
+        plain = [abs(float(text)) for text in texts]
+        if max(plain, default=0.0) > math.tau or (stem == "angle" and not any(plain)):
             unit = "deg"
-        elif not heading.tidy:
-            raise Unclear("its unit, as in 'Phase (deg)' or 98°: phases so small may be radians", heading)
+        elif stem == "angle" or not heading.tidy:
+            example = f"'{stem.capitalize()} (deg)' or 98°"
+            raise Unclear(f"its unit, as in {example}: {stem}s so small may be radians", heading)
     if stem == "amplitude" and unit == "mm_s" and is_severity(heading.name):
         unit = "mm_s_rms"
     return _Column(heading, stem, unit, cells)

@@ -102,7 +102,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         With all problems of the cells, or else with all contradictions between them.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems))
     expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm"
     stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
     nodes, number, values = nodes_in(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
@@ -177,7 +177,7 @@ def read_compliance(
         With all problems of the cells, or else with all contradictions between them.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems))
     ends = {stem: nodes_in(table, stem, rotor) for stem in ("node", "force_node")}
     problems.stop()
     order = tuple(dict.fromkeys([*ends["node"], *ends["force_node"]] if nodes is None else nodes))

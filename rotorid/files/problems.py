@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rotorid.base.suggestions import suggest
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files.input_file import STANDARD_INPUT
-
-__all__ = ["InputError", "Problem", "Problems", "TableWarning"]
-__all__ += ["printable", "quote", "suggest"]
 
 _T = TypeVar("_T")
 LONGEST_VALUE = 60
@@ -97,12 +93,9 @@ class Problems:
     def __len__(self) -> int:
         return len(self._items)
 
-    def apart(self, files: Collection[str]) -> Problems:
-        """Those of some files, taken out of these."""
-        own = Problems()
-        own.extend(problem for problem in self._items if problem.file in files)
-        self._items = [problem for problem in self._items if problem.file not in files]
-        return own
+    def drop(self, file: str) -> None:
+        """Forget those of a file."""
+        self._items = [problem for problem in self._items if problem.file != file]
 
     def of(self, file: str) -> list[Problem]:
         """Problems of one file so far."""

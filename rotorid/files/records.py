@@ -72,7 +72,7 @@ def read_record(
         for name in (*model.outputs, *deviations.values())
         if name not in model.inputs
     ]
-    table = problems.need(read_table(Path(path), "record", columns, problems, first=True))
+    table = problems.need(read_table(Path(path), "record", columns, problems))
     clear = not len(problems)  # otherwise a misspelt column would be called missing
     for name, field in table.fields.items():
         for row, expected in field.doubts.items():

@@ -275,7 +275,7 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
     """What a rotor table says, by the attributes of a rotor."""
     problems = Problems()
-    table = problems.need(read_table(path, "rotor", COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "rotor", COLUMNS, problems))
 
     def values(stem: str, none: float = 0.0) -> Any:  # noqa: ANN401
         return np.where(table.is_blank(stem), none, table.numbers(stem, none))

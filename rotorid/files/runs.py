@@ -253,35 +253,35 @@ def merge_speeds(
     """
     values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
     run, *others = (table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table)
-    distinct = sorted({float(values[row]) for row in usable})
-    breaks = [not k or not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
-    place = dict(zip(distinct, (np.cumsum(breaks) - 1).tolist(), strict=True))
-    index = {row: place[float(values[row])] for row in usable}
+    distinct = np.unique(values[usable])
+    apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
+    index = dict(
+        zip(usable, np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist(), strict=True)
+    )
     remedy = f"within the tolerance of {band:g} %; write the nominal speed, or set "
     remedy += "speed_tolerance_percent smaller"
     first: dict[tuple[object, ...], int] = {}
-    read: list[dict[tuple[str, float], None]] = [{} for _ in range(sum(breaks))]
-    unclear = set[tuple[int, str]]()
-    for row in usable:
-        g, one = index[row], first.setdefault((index[row], run[row], *(each[row] for each in others)), row)
+    read: dict[int, dict[tuple[str, float], None]] = defaultdict(dict)
+    unclear: dict[tuple[int, str], int] = {}
+    for row, g in index.items():
+        one = first.setdefault((g, run[row], *(each[row] for each in others)), row)
         read[g][run[row], float(values[row])] = None
-        if values[one] != values[row] and (g, run[row]) not in unclear:
+        if values[one] != values[row] and unclear.setdefault((g, run[row]), row) == row:
             other = table.shown("speed", one)
             table.complain(row, "speed", f"one speed: run {run[row]!r} has {other} as well, {remedy}")
-            unclear.add((g, run[row]))
     merged, alike = [], []
-    for g, pairs in enumerate(read):
+    for g, pairs in sorted(read.items()):
         speeds = sorted({speed for _, speed in pairs})
         merged.append(float(np.mean([speed for _, speed in pairs])) if len(speeds) > 1 else speeds[0])
+        shown = [show_speed(speed, unit) for speed in speeds]
         if g not in {k for k, _ in unclear} and not same_speed(speeds[0], speeds[-1], band):
-            shown = [show_speed(speed, unit) for speed in speeds]
             chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
             expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
             table.as_whole(table.fields["speed"].name, expected)
         if not same_speed(speeds[0], speeds[-1], UNSAID):
-            numbers = ", ".join(f"{speed * unit.scale:.6g}" for speed in speeds)
+            numbers = ", ".join(words.split()[0] for words in shown)
             alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
-    steady = any(len(pairs) > len({name for name, _ in pairs}) for pairs in read)
+    steady = any(len(pairs) > len({name for name, _ in pairs}) for pairs in read.values())
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
     of = "of one run, or of different ones," if steady else "of different runs"
     words = f"speeds {of} within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
@@ -359,14 +359,11 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
 
 def _complain_about_repeats(table: Table) -> None:
     """Two readings of one run, speed and sensor must say that they are repeats."""
-    stem = "repeat" if "repeat" in table else "sensor"
-    expected = "one reading per run, speed and sensor (row {} has the same); "
-    expected += "repeated readings need a column repeat"
-    if stem == "repeat":
-        expected = "another repeat than in row {}, the same reading"
-    speed = table.numbers("speed").tolist()
-    names = {s: table.texts(s) for s in ("run", "sensor", stem)}.values()
-    keys = zip(speed, *names, strict=True)
+    stem, expected = "repeat", "another repeat than in row {}, the same reading"
+    if stem not in table:
+        stem, expected = "sensor", "one reading per run, speed and sensor (row {} has the same); "
+        expected += "repeated readings need a column repeat"
+    keys = zip(table.numbers("speed").tolist(), *map(table.texts, {"run", "sensor", stem}), strict=True)
     table.once(stem, (key if all(key) else None for key in keys), expected)
 
 

@@ -68,13 +68,13 @@ class SlowRoll:
 
 
 def make_slow_roll(
-    said: Source | Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
+    source: Source | Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
 ) -> SlowRoll | None:
     """Slow-roll vectors for the sensors of a job, or None and problems.
 
     Parameters
     ----------
-    said
+    source
         A runs table, or by sensor `amplitude` (in its unit, or without one in that of the readings) and
         `phase_deg`.
     trials
@@ -84,30 +84,29 @@ def make_slow_roll(
     problems
         Collects the complaints.
     """
-    before, words = len(problems), list[str]()
-    vectors: ComplexArray
-    speeds = None
-    if isinstance(said, Mapping):
-        given, vectors = _stated(said, trials, conventions, problems)
-    else:
-        own = Problems()  # those of the job must not hide what is wrong with this file, nor the reverse
-        runs = make_trials(said, None, conventions, None, own)
-        problems.extend(own)
-        if runs is None or not _fits(runs, source_name(said), trials, problems):
-            return None
-        given, vectors = runs.sensors, runs.mean[0]
-        if len(runs.speeds) > 1:
-            band = conventions.speed_tolerance_percent
-            near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
-            rows = [row for row in near if row is not None]
-            unit = units.SPEED[trials.labels.speed_unit]
-            if len(rows) < len(near):
-                missing = show_speed(float(trials.speeds[near.index(None)]), unit)
-                expected = (
-                    "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
-                    f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
+    before, words, speeds = len(problems), list[str](), None
+    own, sensors = units.vibration(trials.labels.vibration_unit), trials.sensors
+    if isinstance(source, Mapping):
+        given, vectors = tuple(source), np.zeros((1, len(source)), dtype=complex)
+        for k, (name, vector) in enumerate(source.items()):
+            unit = vector.amplitude.unit if vector.amplitude.unit.name else own
+            if name not in sensors:
+                vector.complain(
+                    problems, "", f"a sensor of the runs table, not {name!r}{_known(name, sensors)}"
                 )
-                problems.add(source_name(said), None, "speed", None, expected)
+            elif unit.kind != own.kind:
+                vector.complain(problems, "amplitude", _other_unit(own.name))
+            reading = np.array([unit.to_si(vector.amplitude.value)]), np.radians([vector.phase])
+            vectors[:, k] = conventions.labels.vibration_from(*reading)
+    else:
+        its = Problems()  # those of the job must not hide what is wrong here
+        runs = make_trials(source, None, conventions, None, its)
+        problems.extend(its)
+        if runs is None:
+            return None
+        place, given, vectors = source_name(source), runs.sensors, runs.mean[0]
+        rows = _fitting(runs, place, trials, conventions.speed_tolerance_percent, problems)
+        if len(runs.speeds) > 1:
             vectors, speeds = vectors[rows], trials.speeds
         elif runs.speeds[0] > SLOW * trials.speeds.min():
             slow, lowest = (trials.labels.speed_words(float(one.speeds.min())) for one in (runs, trials))
@@ -117,58 +116,46 @@ def make_slow_roll(
             )
     if len(problems) > before:
         return None
-    whole = np.zeros((len(vectors), len(trials.sensors)), dtype=complex)
-    for k, name in enumerate(given):
-        if name in trials.sensors:  # others are refused already, or are no part of these readings
-            whole[:, trials.sensors.index(name)] = vectors[:, k]
-    if lacking := [name for name in trials.sensors if name not in given]:
+    whole = np.zeros((len(vectors), len(sensors)), dtype=complex)
+    there = [name for name in given if name in sensors]
+    whole[:, [sensors.index(name) for name in there]] = vectors[:, [given.index(name) for name in there]]
+    if lacking := [name for name in sensors if name not in given]:
         words.append(
             f"there is no slow-roll vector for {'sensors' if len(lacking) > 1 else 'sensor'} "
             f"{listing(map(repr, lacking), 'and')}: its readings are used as they are (amplitude = 0 says "
             "that nothing is to be subtracted)"
         )
-    return SlowRoll(trials.sensors, whole if speeds is not None else whole[0], speeds, tuple(words))
+    return SlowRoll(sensors, whole if speeds is not None else whole[0], speeds, tuple(words))
 
 
-def _stated(
-    said: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
-) -> tuple[tuple[str, ...], ComplexArray]:
-    """Sensors and vectors (1, C) of the job file, for all speeds."""
-    own = units.vibration(trials.labels.vibration_unit)
-    size, angle = np.zeros((1, len(said))), np.zeros((1, len(said)))
-    for k, (name, vector) in enumerate(said.items()):
-        amplitude, phase = vector.amplitude, vector.phase
-        if name not in trials.sensors:
-            hint = did_you_mean(name, trials.sensors)
-            known = listing(trials.sensors, "and")
-            expected = f"a sensor of the runs table, not {name!r}{hint}; its sensors are {known}"
-            vector.complain(problems, "", expected)
-        else:
-            unit = amplitude.unit if amplitude.unit.name else own
-            if unit.kind != own.kind:
-                vector.complain(problems, "amplitude", _other_unit(own.name))
-            size[0, k], angle[0, k] = unit.to_si(amplitude.value), np.radians(phase)
-    return tuple(said), conventions.labels.vibration_from(size, angle)
-
-
-def _fits(runs: Trials, source: str, trials: Trials, problems: Problems) -> bool:
-    """Whether a slow run has the units and sensors of the job; else problems."""
-    before = len(problems)
-    ours, its = (units.vibration(one.labels.vibration_unit) for one in (trials, runs))
-    if its.kind != ours.kind:
-        problems.add(source, None, "amplitude", its.name or "no unit", _other_unit(ours.name))
-    if len(runs.runs) > 1:
-        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
-        problems.add(source, None, "run", runs.runs[1], expected)
-    for name in runs.sensors:
-        if name not in trials.sensors:
-            hint, known = did_you_mean(name, trials.sensors), listing(trials.sensors, "and")
-            problems.add(source, None, "sensor", name, f"a sensor of the job{hint}; its sensors are {known}")
-    return len(problems) == before
+def _known(name: str, sensors: tuple[str, ...]) -> str:
+    return f"{did_you_mean(name, sensors)}; its sensors are {listing(sensors, 'and')}"
 
 
 def _other_unit(name: str) -> str:
     return f"an amplitude in {name or 'no unit'}, as the readings have, or in a unit that converts to it"
+
+
+def _fitting(runs: Trials, place: str, trials: Trials, band: float, problems: Problems) -> list[int]:
+    """Which speed of a slow run belongs to each speed of the job; problems where it is no slow run of it."""
+    name, ours = runs.labels.vibration_unit, trials.labels.vibration_unit
+    if units.vibration(name).kind != units.vibration(ours).kind:
+        problems.add(place, None, "amplitude", name or "no unit", _other_unit(ours))
+    if len(runs.runs) > 1:
+        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
+        problems.add(place, None, "run", runs.runs[1], expected)
+    for sensor in runs.sensors:
+        if sensor not in trials.sensors:
+            expected = f"a sensor of the job{_known(sensor, trials.sensors)}"
+            problems.add(place, None, "sensor", sensor, expected)
+    near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
+    if len(runs.speeds) > 1 and None in near:
+        unit = units.SPEED[trials.labels.speed_unit]
+        missing = show_speed(float(trials.speeds[near.index(None)]), unit)
+        expected = "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
+        expected += f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
+        problems.add(place, None, "speed", None, expected)
+    return [row or 0 for row in near]
 
 
 def subtract_slow_roll(trials: Trials, roll: SlowRoll) -> Trials:

@@ -53,7 +53,7 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "unbalance", COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "unbalance", COLUMNS, problems))
     where = table.only(("plane", "node"), "plane", "one column plane or node, not both: a node or a station")
     sizes = {"unbalance", "mass", "radius"}
     present = sizes & {*table.fields}
@@ -91,7 +91,7 @@ def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "bow", BOW_COLUMNS, problems, first=True))
+    table = problems.need(read_table(path, "bow", BOW_COLUMNS, problems))
     size = table.numbers("bow")
     table.must_be("bow", size >= 0, "a number not below 0")
     if len(table) < 3:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column as Told
+from rotorid.base.arrays import ComplexArray
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
@@ -59,76 +58,37 @@ def _sweeps(table: Table, labels: Labels) -> Iterator[Readings]:
     """The rows of each run as vectors of its sensors, by rising time or, without times, speed."""
     vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     covariances = runs_table.covariances(table, vectors) if "amplitude_std" in table else None
-    runs, names, speeds = (
-        np.array(table.texts("run")),
-        np.array(table.texts("sensor")),
-        table.numbers("speed"),
-    )
+    runs, names, speeds = np.array(table.texts("run")), table.texts("sensor"), table.numbers("speed")
+    instants = table.numbers("time" if "time" in table else "speed")
     for run in dict.fromkeys(runs.tolist()):
         rows = np.flatnonzero(runs == run)
-        instants, first, place = np.unique(
-            table.numbers("time" if "time" in table else "speed")[rows],
-            return_index=True,
-            return_inverse=True,
-        )
-        sensors = tuple(dict.fromkeys(names[rows].tolist()))
-        column = [sensors.index(name) for name in names[rows]]
-        Z = np.full((len(instants), len(sensors)), complex(np.nan, np.nan))
-        Z[place, column] = vectors[rows]
+        instant, first, place = np.unique(instants[rows], return_index=True, return_inverse=True)
+        sensors = tuple(dict.fromkeys(names[row] for row in rows))
+        at = place, [sensors.index(names[row]) for row in rows]
+        Z = np.full((len(instant), len(sensors)), complex(np.nan, np.nan))
+        Z[at] = vectors[rows]
         stated = None
         if covariances is not None:
             stated = np.full((*Z.shape, 2, 2), np.nan)
-            stated[place, column] = covariances[rows]
-        timed = instants if "time" in table else None
+            stated[at] = covariances[rows]
+        timed = instant if "time" in table else None
         yield Readings(run, timed, speeds[rows][first], sensors, Z, stated, labels)
 
 
 def _complain_about_twins(table: Table) -> None:
     """A sensor is read once at a time, and all at one speed."""
     stem = "time" if "time" in table else "speed"
-    runs, instants, speeds = table.texts("run"), table.numbers(stem).tolist(), table.numbers("speed")
+    runs, instants, speeds = table.texts("run"), table.numbers(stem), table.numbers("speed")
     where = "time" if stem == "time" else "speed; vectors read one after the other need a column time_s"
-    keys = (
-        key if key[2] == key[2] else None for key in zip(runs, table.texts("sensor"), instants, strict=True)
-    )
-    table.once("sensor", keys, f"another sensor than in row {{}}, which has the same run and {where}")
+    keys = [*zip(runs, table.texts("sensor"), instants.tolist(), strict=True)]
+    known = (None if unknown else key for key, unknown in zip(keys, np.isnan(instants), strict=True))
+    table.once("sensor", known, f"another sensor than in row {{}}, which has the same run and {where}")
     first: dict[tuple[str, float], int] = {}
-    for row, key in enumerate(zip(runs, instants, strict=True)):
-        other = first.setdefault(key, row)
+    for row, (run, _, instant) in enumerate(keys):
+        other = first.setdefault((run, instant), row)
         if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)
-
-
-def runs_columns(
-    found: Sequence[tuple[Readings, FloatArray, ComplexArray, FloatArray]],
-) -> tuple[Told, ...]:
-    """A runs table with errors: of each sweep speeds (M,), vectors (M, C), covariances of their parts."""
-    labels = found[0][0].labels
-    unit, speed = f"_{labels.vibration_unit}" if labels.vibration_unit else "", units.SPEED[labels.speed_unit]
-    runs = [sweep.run for sweep, speeds, _, _ in found for _ in range(len(speeds) * len(sweep.sensors))]
-    sensors = [name for sweep, speeds, _, _ in found for _ in speeds for name in sweep.sensors]
-    every = np.concatenate([np.repeat(speeds, len(sweep.sensors)) for sweep, speeds, _, _ in found])
-    vectors = np.concatenate([Z.ravel() for _, _, Z, _ in found])
-    amplitude, phase = labels.vibration(vectors)
-    size = np.maximum(np.abs(vectors), np.finfo(float).tiny)
-    u = np.stack((vectors.real, vectors.imag), -1) / size[:, None]
-    parts = np.concatenate([C.reshape(-1, 2, 2) for *_, C in found])
-    along, across = (np.sqrt(np.einsum("ni,nij,nj->n", d, parts, d)) for d in (u, u[:, ::-1] * [-1, 1]))
-    columns = (
-        Told("run", runs),
-        Told(f"speed_{speed.name}", np.round(every * speed.scale, 9)),
-        Told("sensor", sensors),
-        Told(f"amplitude{unit}", amplitude),
-        Told("phase_deg", phase),
-    )
-    if np.isnan(along).any():
-        return columns
-    return (
-        *columns,
-        Told(f"amplitude_std{unit}", along * labels.vibration_scale),
-        Told("phase_std_deg", np.degrees(across / size)),
-    )
 
 
 def read_slow_roll(path: Path, sweep: Readings) -> tuple[ComplexArray, tuple[str, ...]]:

@@ -7,9 +7,7 @@ Its angle is one in degrees (`270°`), a hole, blade or position of the job's pl
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,23 +22,20 @@ from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, re
 from rotorid.files.conventions import FULL_TURN, Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, Unclear, explained, is_long, long_rows
+from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of
 
+MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
 COLUMNS = (
     Column("run"),
     Column("plane"),
-    Column(
-        "mass", one_of(units.MASS), ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb"), required=False
-    ),
-    Column("unbalance", one_of(units.UNBALANCE), ("unbalance_g_mm", "unbalance_oz_in"), required=False),
-    Column("angle", one_of(units.ANGLE), ("angle_deg",)),
+    Column("mass", units.weight, MASSES),
+    Column("angle", one_of(units.ANGLE), ("angle_deg",), lenient=True),
 )
 _PLACES = ("angle", "hole", "clock")
 """Columns that say where a weight is; the first that is filled in counts."""
 _BESIDE = (*_PLACES[1:], "action", "unit", "pieces")
-_PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
@@ -72,106 +67,64 @@ def read_weights(
     problems
         Collects the complaints.
     """
-    find = partial(find_header, weights=True)
+    find, before = partial(find_header, weights=True), len(problems)
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     if grid is None:
         return None
-    before = len(problems)
     with explained(grid, problems):
-        grid = _long(grid, conventions)
-    one = runs is not None and len(runs) == 1  # whose name need not stand there
+        grid = _one_weight_a_row(grid, conventions)
+    if len(problems) > before:
+        return None
     there = {name.partition("_")[0] for name in grid.header}
+    one = runs is not None and len(runs) == 1  # whose name need not stand there
     columns = (
         Column("run", required=not one),
-        COLUMNS[1],
-        replace(COLUMNS[2], required=there.isdisjoint(("mass", "unbalance"))),
-        COLUMNS[3],
-        replace(COLUMNS[4], required=there.isdisjoint(_PLACES), lenient=True),
+        *COLUMNS[1:3],
+        replace(COLUMNS[3], required=there.isdisjoint(_PLACES)),
         *(Column(stem, required=False, blank=True, lenient=True) for stem in _BESIDE if stem in there),
     )
-    table = make_table(grid, columns, problems) if len(problems) == before else None
+    table = make_table(grid, columns, problems)
     if table is None:
         return None
-    several = "one column of weights, mass_<unit> or unbalance_<unit>, not both"
-    what = table.only(("mass", "unbalance"), "mass_g", several)
-    if what is None:
-        return None
-    size, plane = table.numbers(what), table.texts("plane")
-    table.must_be(
-        what,
-        size > 0,
-        "a weight above 0 (a run without weights has no row here; what was removed is a weight 180° away)",
-    )
-    known = {name.casefold(): name for name in runs or ()} | {name: name for name in runs or ()}
+    size, plane, stem = table.numbers("mass"), table.texts("plane"), "run" if "run" in table else "plane"
+    expected = "a weight above 0 (a run without weights has no row here; what was removed is one 180° away)"
+    table.must_be("mass", size > 0, expected)
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
-    run = [known.get(name, known.get(name.casefold(), name)) for name in names]
-    angle = _angles(table, conventions)
-    planes = tuple(dict.fromkeys(name for name in plane if name))
-    values = conventions.labels.weight_from(size, angle)
+    known = {name.casefold(): name for name in runs or ()}
+    run = [name if name in (runs or ()) else known.get(name.casefold(), name) for name in names]
+    values = conventions.labels.weight_from(size, _angles(table, conventions))
+    planes = tuple(dict.fromkeys(filter(None, plane)))
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
-    seen: dict[tuple[str, str, complex], int] = {}
-    for i in range(len(table)):
+    rows: dict[tuple[str, str, complex], int] = {}
+    for i, key in enumerate(zip(run, plane, values.tolist(), strict=True)):
         if runs is not None and run[i] and run[i] not in runs:
             hint = f"{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
             table.complain(i, "run", f"a run of the runs table{hint}")
-        elif run[i] and plane[i] and size[i] > 0 and np.isfinite(angle[i]):
-            first = seen.setdefault((run[i], plane[i], complex(values[i])), i)
-            if first != i:
-                stem = "run" if "run" in table else "plane"
-                table.complain(i, stem, f"each weight once (row {table.rows[first]} says the same)")
+        elif run[i] and plane[i] and size[i] > 0 and np.isfinite(values[i]):
+            if rows.setdefault(key, i) != i:
+                table.complain(i, stem, f"each weight once (row {table.rows[rows[key]]} says the same)")
             elif runs is not None:
                 total[runs.index(run[i]), planes.index(plane[i])] += values[i]
-    return Weights(planes, total, table.unit(what), tuple(seen))
+    return Weights(planes, total, table.unit("mass"), tuple(rows))
 
 
-def _long(grid: Grid, conventions: Conventions) -> Grid:
-    """The table with one row a weight, as far as its columns are clear."""
+def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:
+    """The table with one row a weight and its columns by their own names; blank rows say nothing."""
     headings = read_headings(grid.header, weights=True)
-    stems = [heading.stem for heading in headings if heading.stem not in ("", "note")]
-    sizes = {"mass", "unbalance"} & {*stems}
-    wide = "plane" not in stems and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
-    if len(sizes) == 1 and (wide or ("plane" in stems and len({*stems}) == len(stems))):
-        [size] = sizes
-        headings = [replace(h, stem="mass" if h.stem == size else h.stem) for h in headings]
-        if "unit" in stems:
-            grid = _with_units(grid, {h.stem: h.index for h in headings})
-        if not is_long(grid, headings, {"plane", "mass"}) or "unit" in stems:
-            headings = headings if wide else [replace(h, sensor="") for h in headings]
-            grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
-            grid = replace(grid, header=tuple(_size_name(name, size) for name in grid.header))
-    header = [name.partition("_")[0] for name in grid.header]
-    filled = ("mass", "unbalance", *_PLACES, *(() if wide else ("plane",)))
-    places = [k for k, stem in enumerate(header) if stem in filled]
+    at = {h.stem: h.index for h in headings}
+    wide = "plane" not in at and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
+    if {"unit", "mass"} <= at.keys():
+        k, unit = at["mass"], at["unit"]
+        with_units = [
+            (n, (*r[:k], f"{show(r[k])} {show(r[unit])}".strip(), *r[k + 1 :])) for n, r in grid.rows
+        ]
+        grid = replace(grid, rows=tuple(with_units))
+    headings = headings if wide else [replace(h, sensor="") for h in headings]
+    grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
+    filled = ("mass", *_PLACES, *(() if wide else ("plane",)))
+    places = [k for k, name in enumerate(grid.header) if name.partition("_")[0] in filled]
     kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in places)]
-    named = tuple(grid.named[k] for k in kept if grid.named)
-    grid = replace(grid, rows=tuple(grid.rows[k] for k in kept), named=named)
-    if "angle" not in grid.header:
-        return grid
-    at = grid.header.index("angle")
-    texts = [show(row[at]) for _, row in grid.rows]
-    plain = [abs(float(text.replace(",", "."))) for text in texts if _PLAIN.fullmatch(text)]
-    if any(plain) and max(plain) <= math.tau:
-        heading = next(heading for heading in headings if heading.stem == "angle")
-        raise Unclear(f"its unit too, such as '{heading.name} (deg)'", heading)
-    return replace(grid, header=(*grid.header[:at], "angle_deg", *grid.header[at + 1 :]))
-
-
-def _with_units(grid: Grid, at: Mapping[str, int]) -> Grid:
-    """The table with the units of a column `unit` behind its weights."""
-    rows = []
-    for number, row in grid.rows:
-        cell = f"{show(row[at['mass']])} {show(row[at['unit']])}".strip()
-        rows.append((number, (*row[: at["mass"]], cell, *row[at["mass"] + 1 :])))
-    return replace(grid, rows=tuple(rows))
-
-
-def _size_name(name: str, size: str) -> str:
-    """The name of the column of weights: mass or unbalance, as its unit says."""
-    stem, _, unit = name.partition("_")
-    if stem != "mass":
-        return name
-    kind = units.WEIGHT[unit].kind if unit in units.WEIGHT else size
-    return f"{kind}_{unit}" if unit else kind
+    return replace(grid, rows=tuple(grid.rows[k] for k in kept), named=tuple(grid.named[k] for k in kept))
 
 
 def _angles(table: Table, conventions: Conventions) -> FloatArray:
@@ -185,14 +138,13 @@ def _angles(table: Table, conventions: Conventions) -> FloatArray:
             angle[i] = degree.to_si(_by_name(table, i, stem, conventions))
         except NotANumber as error:
             table.complain(i, stem, str(error))
-    wrong = np.abs(angle) > FULL_TURN
-    table.complain_where(wrong, places[0], "an angle from -360 to 360 degrees")
+    table.complain_where(np.abs(angle) > FULL_TURN, places[0], "an angle from -360 to 360 degrees")
     for i, action in enumerate(table.texts("action") if "action" in table else ()):
         if action.casefold() in ("remove", "removed"):
             angle[i] = degree.to_si((angle[i] * degree.scale + 180.0) % 360.0)
         elif action.casefold() not in ("", "add", "added"):
             table.complain(i, "action", "add or remove")
-    return np.where(wrong, math.nan, angle)
+    return angle
 
 
 def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float:

@@ -110,8 +110,8 @@ def _untidy(name: str, table: str, header: Sequence[str]) -> str:
     columns = runs_table.COLUMNS if table in READINGS else weights_table.COLUMNS
     stems = [found.stem for one in header if (found := column_of(one, columns)) is not None]
     needed = {column.stem for column in columns if column.required}
-    if table not in READINGS and "unbalance" not in stems:
-        needed.add("mass")
+    if any(name.startswith("unbalance_") for name in header):
+        needed.discard("mass")
     if needed <= set(stems) and len(set(stems)) == len(stems):
         return ""
     form = "run, speed, sensor, amplitude, phase" if table in READINGS else "run, plane, mass, angle"

@@ -216,9 +216,9 @@ def test_results_as_tables_json_and_text():
     )
     W = fem.influence(rotor, [7, 12], ["A", 22], [100.0, 200.0, 300.0])
     frame = W.to_frame()
-    assert list(frame.columns) == ["speed_rad_s", "sensor", "plane", "influence_m_per_kg_m", "phase_deg"]
+    assert list(frame.columns) == ["speed_rad_s", "sensor", "plane", "influence_m_per_kg_m", "phase_lead_deg"]
     row = frame[(frame.speed_rad_s == 200.0) & (frame.sensor == 22) & (frame.plane == 7)].iloc[0]
-    back = row.influence_m_per_kg_m * np.exp(1j * np.radians(row.phase_deg))
+    back = row.influence_m_per_kg_m * np.exp(1j * np.radians(row.phase_lead_deg))
     assert back == pytest.approx(W.W[1, 1, 0], rel=1e-12)
     assert frame.phase_deg.between(0, 360, inclusive="left").all()
     document = json.loads(json.dumps(W.to_dict()))

@@ -155,8 +155,8 @@ def test_standard_deviations_beside_the_outputs(cli, tmp_path):
         (ROWS[1], "1,0.5,1,nan,0.3", "row 3, column y_std: found 'nan', expected a finite number"),
         ("y_std,z_std", "y_std,note", "column y_std: expected standard deviations of all outputs or none"),
         ("t_s,y,z,", "t_s,y,note,", "column z: expected a column z"),
-        ("y_std", "y_sd", "column y_sd: found 'y_sd', expected one unit for y"),
-        ("y_std,z_std", "y_std,z_sdt", "column z_sdt: found 'z_sdt', expected one unit for z"),
+        ("y_std", "y_sd", "column y_sd: found 'y_sd', expected the column once, not also y"),
+        ("y_std,z_std", "y_std,z_sdt", "column z_sdt: found 'z_sdt', expected the column once, not also z"),
         ("y_std", "y_std_mm", "without a unit"),
     ],
 )

@@ -34,8 +34,6 @@ def test_plain_numbers(text, value):
         ("-Infinity", "a finite number"),
         ("1e999", "a finite number"),
         ("1.#QNAN", "a finite number"),
-        ("n/a", "not filled in"),
-        ("-", "not filled in"),
         ("1 234", "thousands"),
         ("1,234.5", "thousands"),
         ("1'234", "thousands"),
@@ -62,8 +60,6 @@ def test_decimal_comma_needs_semicolons():
         parse_number("1,5", separator=",")
     with pytest.raises(NotANumber, match="this comma may separate thousands"):
         parse_number("1,5", separator="\t")
-    with pytest.raises(NotANumber, match="text, whose comma may separate thousands"):
-        parse_number("1,5")
     with pytest.raises(NotANumber, match="decimal comma, as elsewhere"):
         parse_number("1.500", comma=True)
 

@@ -204,23 +204,6 @@ def test_a_table_for_people_has_one_standard_deviation_of_each_coefficient(tmp_p
     assert correct(again, baseline_of(trials(replace(LABELS, phase=phase)))).weights.shape == (2,)
 
 
-OLDER = """\
-# phase = lag
-# angles = with rotation
-# errors.amplitude_percent = 3
-speed_rpm,sensor,plane,influence_um_pp_per_g,phase_deg,std_re_um_pp_per_g,correlation_re_im_P,common_1_re
-1000,A,(baseline),7,40,1,0,0
-1000,A,P,2,90,1,0,0
-"""
-
-
-def test_a_table_of_an_older_version_is_read_as_far_as_its_columns_go(tmp_path):
-    (tmp_path / "w.csv").write_text(OLDER)
-    old = read_influence(tmp_path / "w.csv", phase="lead")
-    np.testing.assert_allclose(old.W, [[[-2j * 0.5e-6 / 1e-3]]], rtol=1e-14)
-    assert (old.planes, old.labels.phase, old.known_errors) == (("P",), "lead", False)
-
-
 def without(key):
     return lambda document: document["influence"].pop(key)
 

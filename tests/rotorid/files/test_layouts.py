@@ -310,12 +310,13 @@ EXPLAINED = {
     ),
     "units row against headings": (
         UNITS_ROW.replace("amplitude,", "amplitude_um,"),
-        "runs.csv, row 2, column amplitude_um: found 'um pp', expected a number in um, as the heading says",
+        "runs.csv, row 2, column amplitude (um, um pp): found 'amplitude (um, um pp)', expected a unit of "
+        "vibration, such as um pp or mm/s rms, not 'um, um pp' (a label: amplitude_div)",
     ),
     "units row with a word": (
         UNITS_ROW.replace("um pp", "um px"),
-        "runs.csv, row 2, column amplitude: found 'um px', expected a unit of vibration, such as um pp or "
-        "mm/s rms, not 'um px' (a label: amplitude_div)",
+        "runs.csv, row 2, column amplitude (um px): found 'amplitude (um px)', expected a unit of vibration, "
+        "such as um pp or mm/s rms, not 'um px' (a label: amplitude_div)",
     ),
     "a unit against the heading": (
         PREAMBLE.replace("4,9", "4,9 um"),
@@ -323,8 +324,8 @@ EXPLAINED = {
         "heading says",
     ),
     "a vector of a weight": (
-        WIDE_VECTORS.replace("B", "Trial weight"),
-        f"runs.csv, row 1, column Trial weight: found 'Trial weight', expected {KNOWN}",
+        WIDE_VECTORS.replace("um pp;um pp", "um pp;g").replace("B", "Trial weight"),
+        f"runs.csv, row 2, column Trial weight (g): found 'Trial weight (g)', expected {KNOWN}",
     ),
     "thousands": (
         VECTORS.replace("4,9∠", "1.004,9∠"),

@@ -201,8 +201,8 @@ BAD_COLUMNS = [
     (RUNS, "speed_rpm", "speed", "speed", "which is missing"),
     (RUNS, "amplitude_um_pp", "amplitude_um_pk", "amplitude_um_pk", "um_pp (peak to peak)"),
     (RUNS, "amplitude_um_pp", "ampltude_um_pp", "ampltude_um_pp", "did you mean 'amplitude_um_pp'?"),
-    (WEIGHTS, "mass_g", "mass_gram", "mass_gram", "one of the units kg, g, mg, oz or lb"),
-    (WEIGHTS, "mass_g", "unbalance_gmm", "unbalance_gmm", "did you mean 'g_mm'?"),
+    (WEIGHTS, "mass_g", "mass_gran", "mass_gran", "a unit of weight: kg, g, mg"),
+    (WEIGHTS, "mass_g", "unbalance_gmn", "unbalance_gmn", "did you mean 'g_m'?"),
 ]
 
 
@@ -233,15 +233,17 @@ def test_unknown_and_repeated_columns(bad):
     problems = bad([[*line, "x"] for line in RUNS[:1]] + [[*line, 1] for line in RUNS[1:]])
     the_only(problems, "runs.csv", 1, "x", "x", "a known column: run, speed_rpm")
     problems = bad([[*line, line[3]] for line in RUNS])
-    the_only(problems, "runs.csv", 1, "amplitude_um_pp", "amplitude_um_pp", "the column once")
+    the_only(problems, "runs.csv", 1, "amplitude_um_pp", "amplitude_um_pp", "one column of the amplitude")
 
 
 def test_mixed_units(bad):
     mixed = [[*RUNS[0], "amplitude_mil_pp"], *([*line, 1] for line in RUNS[1:])]
-    words = "one unit for amplitude, not also amplitude_um_pp"
+    words = "one column of the amplitude, and 'amplitude_um_pp' could be it too"
     the_only(bad(mixed), "runs.csv", 1, "amplitude_mil_pp", "amplitude_mil_pp", words)
     both = [[*WEIGHTS[0], "unbalance_g_mm"], *([*line, 1] for line in WEIGHTS[1:])]
-    the_only(bad(weights=both), "weights.csv", 1, "unbalance_g_mm", None, "not both")
+    the_only(
+        bad(weights=both), "weights.csv", 1, "unbalance_g_mm", "unbalance_g_mm", "one column of the mass"
+    )
 
 
 def test_equal_rows(bad):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_ups import drawn, table
 
-from rotorid.files.vectors_table import read_vectors, runs_columns
+from rotorid.files.vectors_table import read_vectors
 from rotorid.tables import InputError
 
 HEAD = "run,speed_rpm,sensor,amplitude_um_pp,phase_deg,time_s,amplitude_std_um_pp,phase_std_deg\n"
@@ -36,11 +36,6 @@ def test_a_table_comes_back(tmp_path):
         (back,) = read_vectors(path, "lag" if lag else "lead")
         np.testing.assert_allclose(back.vectors, sweep.vectors, rtol=1e-9)
         np.testing.assert_allclose(back.covariances, sweep.covariances, rtol=1e-8, atol=1e-20)
-        frame = {
-            c.name: c.values for c in runs_columns([(back, back.speeds, back.vectors, back.covariances)])
-        }
-        assert set(frame) == set(HEAD.strip().split(",")) - {"time_s"}
-        np.testing.assert_allclose(frame["amplitude_std_um_pp"], 2.0, rtol=1e-8)
 
 
 def test_runs_have_their_own_speeds_and_order(tmp_path):
@@ -84,13 +79,6 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
 def test_what_cannot_be_is_refused_in_words(tmp_path, text, words):
     with pytest.raises(InputError, match=words):
         read(tmp_path, text)
-
-
-def test_a_table_without_known_errors_has_no_columns_of_them(tmp_path):
-    _, sweep = drawn()
-    unknown = np.full((*sweep.vectors.shape, 2, 2), np.nan)
-    names = [c.name for c in runs_columns([(sweep, sweep.speeds, sweep.vectors, unknown)])]
-    assert names == ["run", "speed_rpm", "sensor", "amplitude_m", "phase_deg"]
 
 
 LONG = """\

@@ -383,7 +383,8 @@ QUESTIONS = {
     ),
     "radians or degrees": (
         "Run,Plane,Mass (g),Angle\ntrial P1,P1,10,3\n",
-        "row 1, column Angle: found 'Angle', expected its unit too, such as 'Angle (deg)'",
+        "row 1, column Angle: found 'Angle', expected its unit, as in 'Angle (deg)' or 98°: angles so small "
+        "may be radians",
     ),
     "no unit in one cell": (
         "run,plane,weight,angle_deg\ntrial P1,P1,10 g,3\ntrial P2,P2,10,3\n",
