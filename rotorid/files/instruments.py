@@ -173,19 +173,13 @@ def _read_text(path: Path) -> Sampled:
             raise refusal(
                 path, f"rows of numbers; counted below row {above}: {str(error).strip()}"
             ) from error
-    numbers = np.empty((len(names), len(frame)))
-    for row, name, place in zip(numbers, names, places, strict=True):
-        cells = frame[place]
-        if comma and not pd.api.types.is_numeric_dtype(cells):
-            cells = cells.str.replace(",", ".")
-        row[:] = pd.to_numeric(cells, errors="coerce")
-        wrong = np.isnan(row) & cells.notna().to_numpy()
-        if wrong.any():
-            at = int(np.argmax(wrong))
-            raise refusal(path, "a number alone", at + above + 1, name, str(frame[place][at]))
-    filled = np.flatnonzero(~np.isnan(numbers).all(axis=0))
-    count = filled[-1] + 1 if filled.size else 0
-    return Sampled(dict(zip(names, numbers[:, :count], strict=True)), first_row=above + 1)
+    cells = frame[places].replace(",", ".", regex=True) if comma else frame[places]
+    table = cells.apply(pd.to_numeric, errors="coerce")
+    for at, k in np.argwhere((table.isna() & cells.notna()).to_numpy())[:1]:
+        raise refusal(path, "a number alone", at + above + 1, names[k], str(frame[places[k]][at]))
+    filled = np.flatnonzero(table.notna().any(axis=1))
+    numbers = np.array(table[: filled[-1] + 1 if filled.size else 0].to_numpy(dtype=float).T, order="C")
+    return Sampled(dict(zip(names, numbers, strict=True)), first_row=above + 1)
 
 
 def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str]:
