@@ -195,8 +195,6 @@ class HarmonicFile:
         Guessed values of parameters.
     errors
         Stated errors of the amplitudes, or None.
-    path
-        Where it was read.
     unmeasured
         Outputs that a model in time does not show.
     prior
@@ -207,7 +205,6 @@ class HarmonicFile:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
     errors: AmplitudeErrors | None = None
-    path: Path | None = None
     unmeasured: tuple[str, ...] = ()
     prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -280,7 +277,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         start = {name: value for name, value in estimate.items() if value is not None} | file.start
         tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
         bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
-        return HarmonicFile(model, bounds, guess, errors, path, tuple({*unseen} & {*model.outputs}), prior)
+        return HarmonicFile(model, bounds, guess, errors, tuple({*unseen} & {*model.outputs}), prior)
 
     return whole(_read(path), "model of amplitudes", read)
 

@@ -65,8 +65,6 @@ class MeasuredModes:
         Relative amplitudes with their signs, a column per mode, shape (n, k); any scale of each mode.
     frequency_std, shape_std
         Relative standard deviations (0.013 = 1.3 %), shapes (k,) and (n, k); None where none are stated.
-    files
-        What was read.
     critical
         They are critical speeds, and what moves then, not of the rotor at rest.
     """
@@ -76,7 +74,6 @@ class MeasuredModes:
     shapes: FloatArray
     frequency_std: FloatArray | None = None
     shape_std: FloatArray | None = None
-    files: tuple[Path, ...] = ()
     critical: bool = False
 
 
@@ -145,7 +142,6 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         shapes=shapes,
         frequency_std=table.numbers("frequency_std")[heads] if "frequency_std" in table else None,
         shape_std=table.numbers("shape_std")[index] if "shape_std" in table else None,
-        files=(Path(path),),
         critical=stem == "critical_speed",
     )
 

@@ -72,6 +72,9 @@ Records = Annotated[
 ]
 
 
+Order = Annotated[Whole, Field(ge=1)]
+
+
 class ChannelKeys(Settings):
     """A sensor: `[channels.NAME]`."""
 
@@ -113,7 +116,7 @@ class WaveformsFile(Settings):
     amplitude: Vibration | None = key(
         "unit in which vectors are written, default that of the first channel", default=None, example="um"
     )
-    orders: listed(Positive) = key("orders, default 1", default=(1.0,), example="orders = [1, 2]")  # type: ignore[valid-type]
+    orders: listed(Order) = key("orders, default 1", default=(1,), example="orders = [1, 2]")  # type: ignore[valid-type]
     rate: Positive | None = key("samples a second, where the records do not say", "rate_Hz", None)
     speeds: listed(Positive) | None = key(  # type: ignore[valid-type]
         "speeds at which vectors are wanted",
@@ -153,7 +156,7 @@ class Waveforms:
     records: tuple[WaveformRecord, ...]
     tacho: TachoSettings
     labels: Labels
-    orders: tuple[float, ...]
+    orders: tuple[int, ...]
     speeds: tuple[float, ...] | None
     files: tuple[Path, ...]
     unstated: bool
@@ -290,7 +293,7 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
         find_vectors(
             record,
             waveforms.tacho,
-            tuple(int(order) for order in waveforms.orders),
+            waveforms.orders,
             derivative=None if unit is None else DERIVATIVE[unit.kind],
             speeds=None if waveforms.speeds is None else np.array(waveforms.speeds),
         )

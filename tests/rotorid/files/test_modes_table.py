@@ -57,7 +57,6 @@ def test_modes_are_read(tmp_path):
     assert found.shapes.tolist() == [[1, 1], [1.46, 0.12], [1.02, -1.047]]
     assert found.frequency_std is None
     assert found.shape_std is None
-    assert found.files == (tmp_path / "modes.csv",)
 
 
 @pytest.mark.parametrize(
