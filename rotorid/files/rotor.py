@@ -218,8 +218,8 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes, materials and bearings that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": path.name}
-    if path.suffix.lower() == ".toml":
+    data: Mapping[str, Any] = {"shaft": "this table"}
+    if is_file := path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
         if "shaft" not in data and "masses_kg" in data:
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
@@ -227,7 +227,7 @@ def read_rotor(path: str | Path) -> Rotor:
             problems.stop()
     file = problems.need(read_settings(RotorFile, data, str(path), problems))
     problems.stop()
-    parts, stations = _shaft(path.parent / file.shaft, file.material), dict[str, int]()
+    parts, stations = _shaft(path.parent / file.shaft if is_file else path, file.material), dict[str, int]()
     at = Places(range(1, len(parts["length"]) + 2), stations)
 
     def name(item: Station) -> None:
