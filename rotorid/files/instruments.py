@@ -13,6 +13,7 @@ import csv
 import logging
 import re
 import warnings
+import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -34,6 +35,8 @@ from rotorid.files.units import TIME, Unit, spelt
 
 LARGEST_SHIFT = 0.3
 """Of a time from its place, in steps: times may be rounded; a missing sample shifts one by 0.5 or more."""
+LARGEST = 8_000_000_000
+"""Bytes of all arrays: a small file may unpack to more than any memory."""
 HEAD = 65_536
 """Bytes in which the form of a text file shows."""
 RATES = ("fs", "rate", "sample_rate")
@@ -215,9 +218,10 @@ def _read_wav(path: Path) -> Sampled:
 
 
 def _read_mat(path: Path) -> Sampled:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     try:
+        _check_size(path, sum(int(np.prod(shape, dtype=float)) * 8 for _, shape, _ in whosmat(path)))
         arrays = loadmat(path, squeeze_me=True)
     except NotImplementedError:
         expected = "a MAT file before version 7.3: in MATLAB save('file.mat', 'names', …, '-v7')"
@@ -227,8 +231,15 @@ def _read_mat(path: Path) -> Sampled:
 
 def _read_npz(path: Path) -> Sampled:
     """Of an archive of NumPy; pickled objects in it are not read."""
+    with zipfile.ZipFile(path) as archive:
+        _check_size(path, sum(entry.file_size for entry in archive.infolist()))
     with np.load(path, allow_pickle=False) as file:
         return _of_arrays(path, {name: np.squeeze(file[name]) for name in file.files})
+
+
+def _check_size(path: Path, size: int) -> None:
+    if size > LARGEST:
+        raise refusal(path, f"arrays of at most {LARGEST // 10**9} GB, not {size / 1e9:.3g} GB")
 
 
 def _of_arrays(path: Path, arrays: Mapping[str, AnyArray]) -> Sampled:

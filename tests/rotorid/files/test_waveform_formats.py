@@ -235,6 +235,16 @@ def test_pickles_are_not_read_and_new_mat_files_are_explained(tmp_path):
     refused(tmp_path / "a.mat", "a MAT file before version 7.3", "'-v7'")
 
 
+def test_a_small_archive_of_huge_arrays_is_not_unpacked(tmp_path, monkeypatch):
+    monkeypatch.setattr("rotorid.files.instruments.LARGEST", 10_000_000)
+    arrays = {"a": np.zeros(2_000_000), "fs": 1.0}
+    np.savez_compressed(tmp_path / "a.npz", **arrays)
+    savemat(tmp_path / "a.mat", arrays, do_compression=True)
+    for name in ("a.npz", "a.mat"):
+        assert (tmp_path / name).stat().st_size < 100_000
+        refused(tmp_path / name, "at most 0 GB, not 0.016 GB")
+
+
 def test_sets_of_uff_are_named_by_line_node_or_number(tmp_path):
     channels = drawn()
     for binary in (0, 1):
