@@ -142,7 +142,7 @@ def _support(item: _SupportKeys, node: int, folder: Path) -> Support:
             raise ValueError(f"{NAMES[min(twice)]} once: {table.source} has this column, too")
         values |= columns
     if not values:
-        raise ValueError("its stiffness is missing, or its damping")
+        raise ValueError("its stiffness is missing, or its damping, here and in a table over speed")
     for quantity, entries in ENTRIES.items():
         used = {*entries} & values.keys()
         if used and (quantity in values or len({entries[0], entries[3]} & used) == 1):
@@ -169,9 +169,6 @@ def _over_speed(path: Path, kind: str) -> Table:
     table.must_be("speed", speed >= 0, "a speed of 0 or more")
     rising = np.insert(~(np.diff(speed) <= 0), 0, True)
     table.must_be("speed", rising, "a speed above that of the row before (ascending, each once)")
-    if not any(name in table for name in NAMES):
-        expected = f"a column of coefficients, such as {listing([*NAMES.values()][:3])}"
-        table.in_header(NAMES["stiffness"], expected)
     for name in _DIAGONAL if kind == "bearing" else ():
         table.must_be(name, table.numbers(name) >= 0, OUTWARDS)
     if len(table) == 1:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import PlainValidator, create_model
 
-from fem import NodeForce
+from fem import NodeForce, Rotor
 from fem.forces import FORCES, Film, kind_of
 from rotorid.base.registry import find
 from rotorid.base.suggestions import did_you_mean
@@ -16,6 +16,10 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.settings import NotNegative, Positive, Settings, key
+
+if TYPE_CHECKING:
+    from rotorid.files.columns import Table
+    from rotorid.reduction import SmallModel
 
 T = TypeVar("T")
 S = TypeVar("S", bound=Settings)
@@ -121,6 +125,22 @@ def node_number(value: int | str, nodes: Collection[int], stations: Mapping[str,
         hint = did_you_mean(str(value), stations)
         raise ValueError(f"a node from 1 to {nodes.stop - 1} or a station{hint}")
     raise ValueError(f"one of the nodes {listing(map(str, nodes))}")
+
+
+def nodes_in(table: Table, stem: str, rotor: Rotor | SmallModel | None) -> list[int | str]:
+    """Nodes in cells; without a rotor labels too, "" where there is a problem."""
+    nodes: list[int | str] = []
+    for row, name in enumerate(table.texts(stem)):
+        try:
+            if rotor is None:
+                nodes.append(int(name) if name.isascii() and name.isdecimal() else name)
+            else:
+                numbers = getattr(rotor, "nodes", range(1, getattr(rotor, "n_nodes", 0) + 1))
+                nodes.append(node_number(name, numbers, getattr(rotor, "stations", {})) if name else "")
+        except ValueError as error:
+            table.complain(row, stem, str(error))
+            nodes.append("")
+    return nodes
 
 
 @dataclasses.dataclass(frozen=True)

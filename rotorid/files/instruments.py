@@ -28,7 +28,6 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import decode
 from rotorid.files.cells import readable as why_not_readable
-from rotorid.files.decimal_numbers import NotANumber, decimal_comma, has_decimal_comma, parse_number
 from rotorid.files.headings import read_unit, readable
 from rotorid.files.input_file import first_bytes
 from rotorid.files.problems import InputError, Problem, Problems, printable
@@ -43,6 +42,7 @@ HEAD = 65_536
 RATES = ("fs", "rate", "sample_rate")
 """Names of a rate in Hz, in any case; `dt` is the time between samples in s."""
 RESPONSE = 4
+_NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?")
 _DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"}
 _ORDER = {8: 0, 11: 1, 12: 2}
 """How often a quantity of these data types of dataset 58 is differentiated."""
@@ -141,7 +141,7 @@ def _rate(path: Path, clock: str, sampled: Sampled) -> float:
     jumps = np.diff(times)
     usual = float(np.nanmedian(jumps))
     odd = ~(np.abs(jumps - usual) <= LARGEST_SHIFT * abs(usual))
-    at = 1 + int(np.argmax(odd)) if odd.any() else int(np.argmax(wrong))
+    at = 1 + int(np.argmax(odd if odd.any() else wrong[1:]))
     expected = f"times in even steps, {usual:.6g} {unit.name} here, or no such column and a stated rate"
     value = "" if np.isnan(times[at]) else f"{times[at]:.9g}"
     raise refusal(path, expected, at + sampled.first_row, clock, value)
@@ -149,27 +149,40 @@ def _rate(path: Path, clock: str, sampled: Sampled) -> float:
 
 def _read_text(path: Path) -> Sampled:
     """A column a channel; a preamble may stand above the header, a row of units below it."""
-    head = first_bytes(path, HEAD)
+    import pandas as pd
+
+    head, problems = first_bytes(path, HEAD), Problems()
     wide = head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     if len(head) == HEAD and not wide:
         head = head[: head.rfind(b"\n") + 1] or head
-    problems = Problems()
     lines = re.split(r"\r\n|\n|\r", problems.need(decode(str(path), head, problems)))
     later = lines[len(lines) // 2 :]
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in later))
-    rows = [[cell.strip() for cell in _cells(line, separator)] for line in lines]
-    comma = decimal_comma((cell for row in rows[len(lines) // 2 :] for cell in row if "," in cell), separator)
-    kinds = [tuple(_is_number(cell, comma=comma) for cell in row) for row in rows]
+    rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator), []))] for line in lines]
+    kinds = [tuple(_NUMBER.fullmatch(cell) is not None for cell in row) for row in rows]
     usual = Counter(kind for kind in kinds if any(kind)).most_common(1)
     if not usual:
         raise refusal(path, "a table: a column a channel, a row a sample, and names above the numbers")
-    kind, above = usual[0][0], kinds.index(usual[0][0])
-    places = [i for i, is_number in enumerate(kind) if is_number]
+    above, places = kinds.index(usual[0][0]), np.flatnonzero(usual[0][0]).tolist()
     names = _names(path, rows[:above], places)
-    encoding = "utf-16" if wide else "latin-1"
-    columns = dict(zip(names, places, strict=True))
-    table = _numbers(path, encoding, separator, comma, columns, above)
-    return Sampled(dict(zip(names, table, strict=True)), first_row=above + 1)
+    comma = separator != "," and any("," in row[i] for row in rows[above:] for i in places if i < len(row))
+    form: dict[str, Any] = {"sep": separator, "decimal": "," if comma else ".", "low_memory": False}
+    with path.open(encoding="utf-16" if wide else "latin-1", errors="replace", newline="") as text:
+        for _ in range(above):
+            text.readline()
+        try:
+            frame = pd.read_csv(text, header=None, skip_blank_lines=False, skipinitialspace=True, **form)
+        except ValueError as error:  # a ParserError too
+            raise refusal(
+                path, f"rows of numbers; counted below row {above}: {str(error).strip()}"
+            ) from error
+    cells = frame[places].replace(",", ".", regex=True) if comma else frame[places]
+    table = cells.apply(pd.to_numeric, errors="coerce")
+    for at, k in np.argwhere((table.isna() & cells.notna()).to_numpy())[:1]:
+        raise refusal(path, "a number alone", at + above + 1, names[k], str(frame[places[k]][at]))
+    filled = np.flatnonzero(table.notna().any(axis=1))
+    numbers = np.array(table[: filled[-1] + 1 if filled.size else 0].to_numpy(dtype=float).T, order="C")
+    return Sampled(dict(zip(names, numbers, strict=True)), first_row=above + 1)
 
 
 def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str]:
@@ -181,54 +194,9 @@ def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str
     below = [spelt(cell.strip("[]() ")) for cell in names]
     if len(headers) > 1 and below[0] in TIME:
         names = [f"{headers[-2][i]}_{unit}".strip("#_ ") for i, unit in zip(places, below, strict=True)]
-    for i, name in enumerate(names):
-        if not name or name in names[:i]:
-            raise refusal(path, "a name for each column of numbers, each once", len(preamble), None, name)
+    if bad := [name for name in names if not name or names.count(name) > 1]:
+        raise refusal(path, "a name for each column of numbers, each once", len(preamble), None, bad[0])
     return names
-
-
-def _is_number(text: str, *, comma: bool) -> bool:
-    try:
-        parse_number(text, comma=comma and has_decimal_comma(text))
-    except NotANumber:
-        return False
-    return True
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator), [])
-
-
-def _numbers(
-    path: Path, encoding: str, separator: str, comma: bool, columns: dict[str, int], above: int
-) -> FloatArray:
-    """Shape (columns, rows) of the rows below so many; NaN where a cell is blank."""
-    import pandas as pd
-
-    form: dict[str, Any] = {"sep": separator, "decimal": "," if comma else ".", "low_memory": False}
-    with path.open(encoding=encoding, errors="replace", newline="") as text:
-        for _ in range(above):
-            text.readline()
-        try:
-            frame = pd.read_csv(text, header=None, skip_blank_lines=False, skipinitialspace=True, **form)
-        except ValueError as error:  # a ParserError too
-            text_of = str(error).strip().replace("row", "line 1 +")  # rows count from 0, lines from 1
-            reason = re.sub(
-                r"line (1 \+ )?(\d+)", lambda m: f"line {int(m[2]) + above + bool(m[1])}", text_of
-            )
-            raise refusal(path, f"rows of numbers ({reason})") from error
-    numbers = np.empty((len(columns), len(frame)))
-    for row, (name, place) in zip(numbers, columns.items(), strict=True):
-        cells = frame[place]
-        if comma and not pd.api.types.is_numeric_dtype(cells):
-            cells = cells.str.replace(",", ".")
-        row[:] = pd.to_numeric(cells, errors="coerce")
-        wrong = np.isnan(row) & cells.notna().to_numpy()
-        if wrong.any():
-            at = int(np.argmax(wrong))
-            raise refusal(path, "a number alone", at + above + 1, name, str(frame[place][at]))
-    filled = np.flatnonzero(~np.isnan(numbers).all(axis=0))
-    return numbers[:, : filled[-1] + 1 if filled.size else 0]
 
 
 def _read_wav(path: Path) -> Sampled:
@@ -278,22 +246,20 @@ def _of_arrays(path: Path, arrays: Mapping[str, AnyArray]) -> Sampled:
     """Vectors by their names, or one matrix (N, C) with its `channels`; times, a rate or `dt` beside them."""
     numbers = {name: array for name, array in arrays.items() if array.dtype.kind in "biuf"}
     channels = {name: array for name, array in numbers.items() if array.ndim == 1 and array.size}
-    matrices = [array for array in numbers.values() if array.ndim == 2]
-    if len(matrices) == 1 and all(time_unit(name) for name in channels):
-        (matrix,) = matrices
+    matrices, fit = [array for array in numbers.values() if array.ndim > 1], bool(channels)
+    if matrices:
+        matrix = matrices[0]
         listed = arrays.get("channels", arrays.get("names", np.arange(1, matrix.shape[1] + 1)))
         names = [str(name).strip() for name in np.atleast_1d(listed)]
-        if len({*names}) != matrix.shape[1] or len(names) > min(matrix.shape):
-            size = " × ".join(map(str, matrix.shape))
-            words = "a matrix with a row a sample, a column a channel and a name for each"
-            raise refusal(path, f"{words}; it is {size} with the names {listing(names, 'and')}")
-        channels = dict(zip(names, matrix.T, strict=True)) | channels
-    elif matrices or not channels:
-        shapes = listing((f"{name} {array.shape}" for name, array in arrays.items()), "and")
+        fit = len(matrices) == 1 and all(map(time_unit, channels))
+        fit = fit and len({*names}) == matrix.shape[1] and len(names) <= len(matrix)
+        channels |= dict(zip(names, matrix.T, strict=False))
+    if not fit:
+        shapes = listing((f"{name} {array.shape}" for name, array in arrays.items()), "and") or "nothing"
         expected = (
-            "a vector for each channel, or one matrix with a column a channel, their names in channels,"
+            "a vector for each channel, or one matrix with a row a sample, a column a channel, their names"
         )
-        raise refusal(path, f"{expected} and t or fs; it has {shapes or 'nothing'}")
+        raise refusal(path, f"{expected} in channels, and t or fs; it has {shapes}")
     scalars = {name.casefold(): float(array) for name, array in numbers.items() if array.ndim == 0}
     rates = [scalars[name] for name in RATES if name in scalars]
     rates += [1.0 / scalars["dt"]] if scalars.get("dt") else []
@@ -339,7 +305,7 @@ def _names_of_sets(sets: list[dict[str, Any]]) -> list[str]:
 
 
 def _read_tdms(path: Path) -> Sampled:
-    """Channels of all groups of a TDMS file; where a name occurs twice they are named group/channel."""
+    """Channels of all groups of a TDMS file; a name that stood before is group/channel."""
     import nptdms
     from nptdms.log import log_manager
 
@@ -347,14 +313,11 @@ def _read_tdms(path: Path) -> Sampled:
     file = nptdms.TdmsFile.read(path)
     if file.file_status.incomplete_final_segment:
         raise refusal(path, "a whole TDMS file; its end is missing")
-    channels = [channel for group in file.groups() for channel in group.channels() if len(channel)]
-    unique = len({channel.name for channel in channels}) == len(channels)
-    data: dict[str, AnyArray] = {}
-    clocks = []
-    for channel in channels:
+    data, clocks = dict[str, AnyArray](), []
+    for channel in [channel for group in file.groups() for channel in group.channels() if len(channel)]:
         samples, stated = channel[:], channel.properties
         if getattr(samples, "dtype", np.dtype(object)).kind in "biuf":
-            data[channel.name if unique else f"{channel.group_name}/{channel.name}"] = samples
+            data[f"{channel.group_name}/{channel.name}" if channel.name in data else channel.name] = samples
             if time_unit(channel.name) is None:
                 begun = np.datetime64(stated.get("wf_start_time", 0), "us").astype(np.int64) / 1e6
                 clocks.append((begun + stated.get("wf_start_offset", 0.0), stated.get("wf_increment", 0.0)))

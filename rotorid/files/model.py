@@ -1,8 +1,8 @@
 """Model files of `identify`, `fit` and `simulate`: equations, matrices or states, in one description.
 
 Matrices serve both worlds. In time they are M y'' + C y' + K y = f; of amplitudes, with p = d/dt, the rows
-of (M p² + C p + K) Y = F. An output that is a number times a displacement y or its rate, z = s y or s p y,
-takes that amplitude's place, y = z / s or z / (s p); any other one adds an equation.
+of (M p² + C p + K) Y = F. An output that is a number times a displacement y, z = s y, takes that amplitude's
+place, y = z / s; any other one adds an equation.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ _NOT_BESIDE = {
 _TOKEN = re.compile(
     r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[A-Za-z\u0370-\u03ff][A-Za-z0-9_\u0370-\u03ff]*"
 )
+_SCALED = re.compile(r"(?:([0-9.]+(?:[eE][-+]?[0-9]+)?) *\* *)?(\w+)")
+"""A number times a name, or a name alone."""
 
 
 def _name(value: str) -> str:
@@ -60,12 +62,6 @@ def _expression(value: object) -> object:
     if isinstance(value, str) and value.strip():
         return value
     raise ValueError('a number, or an expression in quotes, such as "-a*x"')
-
-
-def _two(value: object) -> object:
-    if isinstance(value, list) and len(value) == 2 and not any(isinstance(one, (bool, str)) for one in value):
-        return tuple(value)
-    raise ValueError("two numbers: [lowest, highest], or [value, standard deviation above 0]")
 
 
 def _estimates(value: object) -> object:
@@ -83,7 +79,6 @@ Texts = dict[Name, Text]
 Matrix = list[list[Text]]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Std = Annotated[Number, Field(ge=1e-30)]
-Two = BeforeValidator(_two, json_schema_input_type=list[float])
 Estimates = Annotated[
     dict[Name, Number | None],
     BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
@@ -139,11 +134,13 @@ class ModelFile(Settings):
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
     per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
-    bounds: dict[str, Annotated[tuple[Limit, Limit], Two]] = key(
-        "name = [lowest, highest], `inf` for none", default={}
+    bounds: dict[str, tuple[Limit, Limit]] = key(
+        "name = [lowest, highest], `inf` for none", default={}, expected="two numbers: [lowest, highest]"
     )
-    prior: dict[str, Annotated[tuple[Number, Std], Two]] = key(
-        "name = [value, standard deviation]: what is known of it beside the data", default={}
+    prior: dict[str, tuple[Number, Std]] = key(
+        "name = [value, standard deviation]: what is known of it beside the data",
+        default={},
+        expected="two numbers: [value, standard deviation above 0]",
     )
     start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
     errors: AmplitudeErrorKeys | None = key("of readings of amplitudes, one standard deviation", default=None)
@@ -198,8 +195,6 @@ class HarmonicFile:
         Guessed values of parameters.
     errors
         Stated errors of the amplitudes, or None.
-    path
-        Where it was read.
     unmeasured
         Outputs that a model in time does not show.
     prior
@@ -210,7 +205,6 @@ class HarmonicFile:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
     errors: AmplitudeErrors | None = None
-    path: Path | None = None
     unmeasured: tuple[str, ...] = ()
     prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -228,8 +222,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     reduce --model` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its
     `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
     `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
-    those not in the table are 0. An output that is a number times a displacement or velocity is measured in
-    place of it; other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
+    those not in the table are 0. An output that is a number times a displacement is measured in place of it;
+    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
     parameter of initial values alone is left out, with a warning. Explicit time, constant loads and
     nonlinear terms are refused. An amplitude that `[outputs]` do not show, or that is not measured, is
     predicted.
@@ -262,7 +256,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         estimate, errors = file.estimate, None
         if file.M:
             equations, inputs, unseen = _of_amplitudes(file)
-            used = {name for text in equations for name in _words(text)}
+            used = {*_TOKEN.findall(" ".join(equations))}
             estimate = {name: value for name, value in estimate.items() if name in used}
             if lost := listing(sorted(file.estimate.keys() - used), "and"):
                 words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
@@ -283,7 +277,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         start = {name: value for name, value in estimate.items() if value is not None} | file.start
         tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
         bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
-        return HarmonicFile(model, bounds, guess, errors, path, tuple({*unseen} & {*model.outputs}), prior)
+        return HarmonicFile(model, bounds, guess, errors, tuple({*unseen} & {*model.outputs}), prior)
 
     return whole(_read(path), "model of amplitudes", read)
 
@@ -379,66 +373,39 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
     """
     y, inputs, force = file.names, list(file.inputs or ()), file.force
     constants = {*file.estimate, *file.known} - {*file.per_record}
-    states = {x: (x, "") for x in y} | {f"v_{x}": (x, "/p") for x in y}
     matrices = {"*p**2": file.M, "*p": file.damping, "": file.K}
     entries = [one for matrix in matrices.values() for row in matrix for one in row]
-    texts = [*force.values(), *file.outputs.values()]
-    for text, allowed in [
-        *((one, set()) for one in entries),
-        *((text, {*states, *inputs}) for text in texts),
-    ]:
-        if isinstance(text, str):
-            for name in sorted(expressions.names(expressions.parse(text)) - constants - allowed):
-                raise ValueError(
-                    f"{name} in {text!r} has no meaning for amplitudes: M, C and K hold parameters and known "
-                    "numbers, the same in all tests; what changes with the time t must be a measured input"
-                )
+    allowed = {*constants, *inputs, *y, *(f"v_{x}" for x in y)}
+    for text in (*entries, *force.values(), *file.outputs.values()):
+        for name in sorted(expressions.names(expressions.parse(str(text))) - allowed):
+            raise ValueError(
+                f"{name} in '{text}' has no meaning for amplitudes: M, C and K hold parameters and known "
+                "numbers, the same in all tests; what changes with the time t must be a measured input"
+            )
     if not inputs and not force:
         inputs = [f"{FORCE}{x}" for x in y]
         force = dict(zip(y, inputs, strict=True))
-    put: dict[str, str] = {}
-    more: dict[str, str] = {}
+    put, more = dict[str, str](), list[str]()
     for output, text in file.outputs.items():
-        state, scale = _scaled(str(text), file)
-        base, rate = states.get(state, ("", ""))
-        if base and base not in put:
-            plain = (output, scale, rate) == (base, "1", "")
-            put[base] = output if plain else f"({output}{rate}/({scale}))"
+        match = _SCALED.fullmatch(str(text))
+        if match and match[2] in y and match[2] not in put:
+            put[match[2]] = output if match[0] == output else f"({output}/({match[1] or 1}))"
         else:
-            more[output] = str(text)
-    unseen, strange = [x for x in y if x not in put], force.keys() - {*y}
+            more.append(f"{output} = {text}")
+    unseen = [x for x in y if x not in put]
     names = [*constants, *inputs, *file.outputs, *unseen]
-    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(strange)
+    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(force.keys() - {*y})
     if wrong:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )
-    put = {x: put.get(x, x) for x in y}
-    put |= {f"v_{x}": f"(p*{text})" for x, text in put.items()}
+    put |= {f"v_{x}": f"(p*{put.get(x, x)})" for x in y}
     equations = []
     for i, name in enumerate(y):
-        terms = []
-        for j, other in enumerate(y):
-            parts = [f"({m[i][j]}){power}" for power, m in matrices.items() if m[i][j] != 0]
-            terms += [f"({' + '.join(parts)})*{other}"] if parts else []
-        if not terms:
+        columns = [(j, x, power) for j, x in enumerate(y) for power in matrices]
+        row = [(matrices[power][i][j], f"{power}*{x}") for j, x, power in columns]
+        if not (terms := [f"({entry}){factor}" for entry, factor in row if entry != 0]):
             raise ValueError(f"the row of {name} in M, C and K is empty: leave this coordinate out")
         equations.append(f"{' + '.join(terms)} = {force.get(name, 0)}")
-    equations += [f"{output} = {text}" for output, text in more.items()]
-    equations = [_TOKEN.sub(lambda found: put.get(found[0], found[0]), text) for text in equations]
+    equations = [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in (*equations, *more)]
     return equations, inputs, unseen if file.outputs else []
-
-
-def _words(text: str) -> set[str]:
-    return {word for word in _TOKEN.findall(text) if word[0].isalpha()}
-
-
-def _scaled(text: str, file: ModelFile) -> tuple[str, str]:
-    """The name and the number of an output that is number · name; "" for any other."""
-    import sympy
-
-    known = {sympy.Symbol(name): sympy.Rational(repr(value)) for name, value in file.known.items()}
-    scale, symbol = sympy.expand(expressions.parse(text).subs(known)).as_coeff_Mul()
-    if symbol.is_Symbol and scale.is_Rational:
-        return symbol.name, f"{scale.p}/{scale.q}" if scale.q != 1 else str(scale.p)
-    return "", ""

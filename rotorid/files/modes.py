@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from fem import Rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.columns import Column, read_table
+from rotorid.files.forces import nodes_in
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of, ratio
 
@@ -27,7 +26,6 @@ COMPLIANCE = {
 }
 RECIPROCAL = 1e-3
 """So far, relative, the two entries of a pair of nodes may differ: rounding, not a contradiction."""
-LARGEST_PERCENT = 1000.0
 FREQUENCIES = ("frequency", "speed", "critical_speed")
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": Unit("percent", "ratio", 1.0, 100.0)})
@@ -67,8 +65,6 @@ class MeasuredModes:
         Relative amplitudes with their signs, a column per mode, shape (n, k); any scale of each mode.
     frequency_std, shape_std
         Relative standard deviations (0.013 = 1.3 %), shapes (k,) and (n, k); None where none are stated.
-    files
-        What was read.
     critical
         They are critical speeds, and what moves then, not of the rotor at rest.
     """
@@ -78,7 +74,6 @@ class MeasuredModes:
     shapes: FloatArray
     frequency_std: FloatArray | None = None
     shape_std: FloatArray | None = None
-    files: tuple[Path, ...] = ()
     critical: bool = False
 
 
@@ -106,82 +101,49 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     problems = Problems()
     table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems))
     expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm"
-    stem = table.only(FREQUENCIES, "frequency_rad_s", expected)
-    nodes, number = _nodes(table, "node", rotor), table.numbers("mode")
+    stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
+    nodes, number, values = nodes_in(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
     table.must_be("mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …")
+    table.must_be(stem, values > 0, "a frequency above 0")
     for name in ("frequency_std", "shape_std"):
-        fits = (table.numbers(name) >= 0) & (table.numbers(name) <= LARGEST_PERCENT / 100)
-        table.must_be(name, fits, f"a standard deviation from 0 to {LARGEST_PERCENT:g} percent")
-    table.must_be(stem or "", table.numbers(stem or "") > 0, "a frequency above 0")
-    stem = problems.need(stem)
+        table.must_be(name, table.numbers(name) >= 0, "a standard deviation of 0 or more")
     problems.stop()
-    rows = {int(mode): np.flatnonzero(number == mode).tolist() for mode in np.unique(number)}
-    heads = [members[0] for members in rows.values()]
-    for mode, (given, head) in enumerate(zip(rows, heads, strict=True), start=1):
-        if given != mode:
-            table.complain(head, "mode", f"modes numbered from 1 without a gap; there is no mode {mode}")
-            break
-    for name, what in ((stem, "a frequency"), ("frequency_std", "a standard deviation")):
-        if name in table:
-            _complain_about_changes(table, name, what, rows)
-    frequencies = table.numbers(stem)
-    for low, high in pairwise(heads):
-        if frequencies[high] <= frequencies[low]:
-            below = f"{table.shown(stem, low)} in row {table.rows[low]}"
-            words = f"a frequency above that of the mode before ({below}): modes are numbered from the lowest"
-            table.complain(high, stem, words)
-    stands = list(zip(number.tolist(), nodes, strict=True))
+    modes, heads, of = np.unique(number, return_index=True, return_inverse=True)
+    for i in np.flatnonzero(modes != np.arange(1, len(modes) + 1))[:1]:
+        table.complain(heads[i], "mode", f"modes numbered from 1 without a gap; there is no mode {i + 1}")
+    for name in {stem, "frequency_std"} & {*table.fields}:
+        first = table.numbers(name)[heads][of]
+        for head in heads[table.is_blank(name)[heads]]:
+            table.complain(head, name, f"a number in the first row of mode {number[head]:g}")
+        for row in np.flatnonzero(np.abs(table.numbers(name) - first) > 1e-9 * first):
+            head = heads[of[row]]
+            expected = f"{table.shown(name, head)} as in row {table.rows[head]}, the same mode, or a blank"
+            table.complain(row, name, expected)
+    for low in np.flatnonzero(np.diff(values[heads]) <= 0):
+        below = f"{table.shown(stem, heads[low])} in row {table.rows[heads[low]]}"
+        words = f"a frequency above that of the mode before ({below}): modes are numbered from the lowest"
+        table.complain(heads[low + 1], stem, words)
+    stands = list(zip(of.tolist(), nodes, strict=True))
     table.once("node", stands, "another node than in row {}: each stands once in a mode")
-    distinct = tuple(dict.fromkeys(nodes))
-    for mode, members in rows.items():
-        lost = [str(node) for node in distinct if (mode, node) not in stands]
-        if lost:
-            expected = f"mode {mode} at node {listing(lost, 'and')} too: every mode needs the same nodes"
-            problems.add(table.source, table.rows[members[-1]], "node", None, expected)
+    distinct, place = tuple(dict.fromkeys(nodes)), {stand: row for row, stand in enumerate(stands)}
+    for mode in range(len(modes)):
+        if lost := [str(node) for node in distinct if (mode, node) not in place]:
+            expected = f"mode {mode + 1} at node {listing(lost, 'and')} too: every mode needs the same nodes"
+            problems.add(table.source, table.rows[np.flatnonzero(of == mode)[-1]], "node", None, expected)
     problems.stop()
-    place = {stand: row for row, stand in enumerate(stands)}
-    index = np.array([[place[mode, node] for mode in rows] for node in distinct])
+    index = np.array([[place[mode, node] for mode in range(len(modes))] for node in distinct])
     shapes = table.numbers("shape")[index]
-    for head, moves in zip(heads, shapes.any(axis=0), strict=True):
-        if not moves:
-            table.complain(head, "shape", "a shape that is not 0 at every node of its mode")
+    for head in heads[~shapes.any(axis=0)]:
+        table.complain(head, "shape", "a shape that is not 0 at every node of its mode")
     problems.stop()
     return MeasuredModes(
         nodes=distinct,
-        frequencies=frequencies[heads],
+        frequencies=values[heads],
         shapes=shapes,
         frequency_std=table.numbers("frequency_std")[heads] if "frequency_std" in table else None,
         shape_std=table.numbers("shape_std")[index] if "shape_std" in table else None,
-        files=(Path(path),),
         critical=stem == "critical_speed",
     )
-
-
-def _complain_about_changes(table: Table, stem: str, what: str, rows: dict[int, list[int]]) -> None:
-    """What belongs to a mode stands in its first row; further rows repeat it or are blank."""
-    values, blank = table.numbers(stem), table.is_blank(stem)
-    for mode, (head, *others) in rows.items():
-        if blank[head]:
-            table.complain(head, stem, f"{what} in the first row of mode {mode}")
-        for row in others:
-            if abs(values[row] - values[head]) > 1e-9 * values[head]:
-                words = f"{table.shown(stem, head)} as in row {table.rows[head]}, the same mode, or a blank"
-                table.complain(row, stem, words)
-
-
-def _nodes(table: Table, stem: str, rotor: Rotor | None) -> list[Node]:
-    """Nodes by number or station, without a rotor by number or label; "" where a complaint is noted."""
-    nodes: list[Node] = list(table.texts(stem))
-    for row, name in enumerate(table.texts(stem)):
-        if rotor is None:
-            nodes[row] = int(name) if name.isascii() and name.isdecimal() else name
-        elif name:
-            try:
-                nodes[row] = rotor.node(name)
-            except ValueError:
-                hint = did_you_mean(name, rotor.stations)
-                table.complain(row, stem, f"a node from 1 to {rotor.n_nodes} or a station{hint}")
-    return nodes
 
 
 def read_compliance(
@@ -212,7 +174,7 @@ def read_compliance(
     """
     problems = Problems()
     table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems))
-    ends = {stem: _nodes(table, stem, rotor) for stem in ("node", "force_node")}
+    ends = {stem: nodes_in(table, stem, rotor) for stem in ("node", "force_node")}
     problems.stop()
     order = tuple(dict.fromkeys([*ends["node"], *ends["force_node"]] if nodes is None else nodes))
     for stem, named in ends.items():
@@ -220,11 +182,10 @@ def read_compliance(
         table.complain_where(strange, stem, f"one of the nodes {listing(map(str, order))}")
     pairs, values = list(zip(*ends.values(), strict=True)), table.numbers("compliance")
     table.once("force_node", pairs, "another pair of nodes than in row {}")
-    expected = "a number above 0: a node moves in the direction of a force on it"
     moves = [a != b or value > 0 for (a, b), value in zip(pairs, values, strict=True)]
-    table.must_be("compliance", moves, expected)
+    table.must_be("compliance", moves, "a number above 0: a node moves in the direction of a force on it")
     problems.stop()
-    row_of = {pair: row for row, pair in enumerate(pairs)}
+    alpha, row_of = np.full((len(order), len(order)), np.nan), {pair: row for row, pair in enumerate(pairs)}
     for row, (a, b) in enumerate(pairs):
         back = row_of.get((b, a), row)
         if back < row and abs(values[row] - values[back]) > RECIPROCAL * max(abs(values[[row, back]])):
@@ -233,24 +194,20 @@ def read_compliance(
                 f"a force at node {a} moves node {b} as much as a force at node {b} moves node {a}"
             )
             table.complain(row, "compliance", expected)
-    alpha, lost = np.empty((len(order), len(order))), []
-    for p, a in enumerate(order):
-        for q, b in enumerate(order[p:], start=p):
-            given = [values[row_of[pair]] for pair in ((a, b), (b, a)) if pair in row_of]
-            alpha[p, q] = alpha[q, p] = np.mean(given) if given else np.nan
-            lost += [] if given else [f"{a} with {b}"]
+        p, q = order.index(a), order.index(b)
+        alpha[p, q] = alpha[q, p] = values[[row, back]].mean()
+    lost = [f"{order[p]} with {order[q]}" for p, q in np.argwhere(np.triu(np.isnan(alpha)))]
     name = table.fields["compliance"].name
     if lost:
         table.as_whole(name, f"a row for every pair of nodes; missing: {listing(lost, 'and')}")
     problems.stop()
     scale = np.sqrt(np.diag(alpha))
-    lowest, vectors = np.linalg.eigh(alpha / np.outer(scale, scale))
-    if lowest[0] <= len(order) * np.finfo(float).eps:
-        involved = [str(node) for node, x in zip(order, vectors[:, 0], strict=True) if abs(x) > 0.1]
+    lowest = np.linalg.eigvalsh(alpha / np.outer(scale, scale))[0]
+    if lowest <= len(order) * np.finfo(float).eps:
         expected = (
             "compliances that are a positive definite matrix, as those of every shaft on springs are: the "
-            f"smallest eigenvalue of α_ij / √(α_ii α_jj) is {lowest[0]:.2g}. Check those between nodes "
-            f"{listing(involved, 'and')}, give more digits, or nodes farther apart"
+            f"smallest eigenvalue of α_ij / √(α_ii α_jj) is {lowest:.2g}. Check them, give more digits, or "
+            "nodes farther apart"
         )
         table.as_whole(name, expected)
     problems.stop()

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotorid.base import result
-from rotorid.base.text import counted, listing
+from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
-from rotorid.files.cells import Grid
-from rotorid.files.columns import Column, make_table, read_grid
-from rotorid.files.problems import Problems, TableWarning
-from rotorid.files.units import TIME, Unit, UnitError, one_of
+from rotorid.files.columns import Column, read_table
+from rotorid.files.problems import Problems
+from rotorid.files.units import TIME, one_of, ratio
 
 if TYPE_CHECKING:
-    from rotorid.files.columns import Table
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
 
 MISSING = {"nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 STD = "_std"
 """At the end of the name of a column: standard deviations of the samples of an output."""
-GAP = 1.5
-"""Times the usual step; a longer one in an otherwise even record is worth a word."""
 
 
 def read_record(
@@ -66,54 +60,53 @@ def read_record(
     ------
     InputError
         With all problems of the file.
-
-    Warns
-    -----
-    TableWarning
-        Where an evenly sampled record has gaps.
     """
     from rotorid.identify.records import Record
 
     taken = {*model.outputs, *model.inputs}
     deviations = {name: name + STD for name in model.outputs if name + STD not in taken}
-    problems = Problems()
-    grid = problems.need(read_grid(Path(path), "record", problems, first=True))
-    if allow_missing:
-        grid = _blanked(grid, {*model.outputs, *deviations.values()})
-    columns = [Column("t", one_of(TIME), ("t_s",))]
-    needed = measured and not allow_missing
-    columns += [Column(name, _no_unit, (name,), needed, blank=True) for name in model.outputs]
-    columns += [Column(name, _no_unit, (name,), False, blank=True) for name in deviations.values()]
-    columns += [Column(name, _no_unit, (name,)) for name in model.inputs if name not in model.outputs]
-    table = problems.need(make_table(grid, columns, problems))
+    problems, needed = Problems(), {} if allow_missing or not measured else dict.fromkeys(model.outputs, True)
+    columns = [Column("t", one_of(TIME), ("t_s",)), *(Column(name, ratio) for name in model.inputs)]
+    columns += [
+        Column(name, ratio, (), name in needed, blank=True, lenient=allow_missing)
+        for name in (*model.outputs, *deviations.values())
+        if name not in model.inputs
+    ]
+    table = problems.need(read_table(Path(path), "record", columns, problems))
     clear = not len(problems)  # otherwise a misspelt column would be called missing
-    t = table.numbers("t")
+    for name, field in table.fields.items():
+        for row, expected in field.doubts.items():
+            if table.shown(name, row).strip().casefold() not in MISSING:
+                table.complain(row, name, expected)
+    t, outputs = table.numbers("t"), {name: table.numbers(name) for name in model.outputs if name in table}
     for late in np.flatnonzero(np.diff(t) <= 0) + 1:
         before = f"{table.shown('t', late - 1)} of row {table.rows[late - 1]}"
         table.complain(late, "t", f"a time above {before}: sort the rows; repeated runs are other records")
-    outputs = {name: table.numbers(name) for name in model.outputs if name in table}
-    if measured:
-        _complain_about_outputs(table, list(outputs), model.outputs, allow_missing=allow_missing)
-    own = {name: table.numbers(column) for name, column in deviations.items() if column in table}
-    if own and sigma is not None:
-        table.in_header(deviations[next(iter(own))], "no such column together with --sigma")
-    else:
-        for name in sorted(own.keys() ^ outputs.keys()) if own and clear else ():
-            column, other = (name, name + STD) if name in own else (name + STD, next(iter(own)) + STD)
-            table.in_header(
-                column, f"a column {column}, as there is {other}: deviations of all outputs or none"
-            )
-        for name in [name for name in outputs if name in own]:
-            sizes, column = own[name], deviations[name]
-            wrong = ~np.isnan(outputs[name]) & ~(sizes > 0) & ~(np.isnan(sizes) & ~table.is_blank(column))
-            table.complain_where(wrong, column, f"a standard deviation above 0 wherever {name} was measured")
+    if measured and clear and not outputs:
+        table.in_header(None, f"a column for at least one output of the model: {listing(model.outputs)}")
+    for name, values in outputs.items() if measured else ():
+        if not allow_missing:
+            expected = "a number (--allow-missing: blanks were not measured)"
+            table.complain_where(table.is_blank(name), name, expected)
+        elif np.isnan(values).all():
+            table.as_whole(name, "a number in at least one row, or no such column")
+    stated = {name: table.numbers(column) for name, column in deviations.items() if column in table}
+    if stated and clear and (sigma is not None or stated.keys() != outputs.keys()):
+        expected = "standard deviations of all outputs or none, and no such column together with --sigma"
+        table.in_header(deviations[next(iter(stated))], expected)
+    for name in stated.keys() & outputs.keys():
+        std = stated[name]
+        unknown = np.isnan(std) & (table.is_blank(deviations[name]) | allow_missing)
+        wrong = ~np.isnan(outputs[name]) & ((std <= 0) | unknown)
+        expected = f"a standard deviation above 0 wherever {name} was measured"
+        table.complain_where(wrong, deviations[name], expected)
     problems.stop()
-    if not allow_missing:
-        _warn_of_gaps(table)
     unit = table.unit("t")
-    stated = own or None if sigma is None else {k: value for k, value in sigma.items() if k in table}
+    alike = {} if sigma is None else {name: value for name, value in sigma.items() if name in table}
     axis = Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale)
-    return Record(t, outputs, {k: table.numbers(k) for k in model.inputs}, stated, str(path), axis)
+    return Record(
+        t, outputs, {k: table.numbers(k) for k in model.inputs}, stated or alike or None, str(path), axis
+    )
 
 
 def record_columns(record: Record) -> tuple[result.Column, ...]:
@@ -123,54 +116,3 @@ def record_columns(record: Record) -> tuple[result.Column, ...]:
         columns[f"{name}{STD}"] = np.broadcast_to(std, record.t.shape)
     columns |= record.inputs
     return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
-
-
-def _no_unit(name: str) -> Unit:
-    if name:
-        raise UnitError(
-            "the name of the model alone, without a unit: values are in the units of the model (and standard "
-            f"deviations of an output NAME in a column NAME{STD})"
-        )
-    return Unit("", "model")
-
-
-def _blanked(grid: Grid, columns: set[str]) -> Grid:
-    """Words for "missing" in these columns become blanks."""
-    places = [name in columns for name in grid.header]
-    rows = tuple(
-        (
-            number,
-            tuple(
-                "" if may and isinstance(cell, str) and cell.strip().casefold() in MISSING else cell
-                for may, cell in zip(places, cells, strict=True)
-            ),
-        )
-        for number, cells in grid.rows
-    )
-    return replace(grid, rows=rows)
-
-
-def _complain_about_outputs(
-    table: Table, names: list[str], outputs: tuple[str, ...], *, allow_missing: bool
-) -> None:
-    if not names and not len(table.problems):
-        table.in_header(None, f"a column for at least one output of the model: {listing(outputs)}")
-    for name in names:
-        blank = table.is_blank(name)
-        if not allow_missing:
-            table.complain_where(blank, name, "a number (--allow-missing: blanks were not measured)")
-        elif blank.all():
-            table.as_whole(name, "a number in at least one row, or no such column")
-
-
-def _warn_of_gaps(table: Table) -> None:
-    """Say where an even record jumps; nothing is filled in."""
-    steps = np.diff(table.numbers("t"))
-    usual = float(np.median(steps)) if len(steps) > 2 else np.inf
-    gaps = np.flatnonzero(steps > GAP * usual)
-    if gaps.size and (np.abs(steps - usual) <= 0.01 * usual).mean() >= 0.5:
-        message = (
-            f"{table.source}: {counted(gaps.size, 'gap')} longer than the usual step of {usual:.4g} s, the "
-            f"first of {steps[gaps[0]]:.4g} s after row {table.rows[gaps[0]]}; nothing is filled in"
-        )
-        warnings.warn(message, TableWarning, stacklevel=3)

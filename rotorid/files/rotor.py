@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field
 
 from fem import (
-    SHORTEST,
     STEEL_DENSITY,
     STEEL_MODULUS,
     STEEL_POISSON,
@@ -21,7 +20,6 @@ from fem import (
     Model,
     Rotor,
     Support,
-    too_short,
 )
 from fem.forces import kind_of
 from fem.parameters import expand
@@ -70,8 +68,6 @@ USUAL = {
     "clearance": (2e-6, 5e-3, "m", {}),
     "gap": (1e-7, 2e-2, "m", {}),
     "viscosity": (1e-5, 2.0, "Pa·s", {}),
-    "swirl_ratio": (0.0, 1.0, "of the shaft's speed", {"percent": 0.01}),
-    "friction": (0.0, 1.5, "of the normal force", {"percent": 0.01}),
 }
 """What quantities are in machines: from, to, in which unit; other units by their size in that one."""
 
@@ -222,41 +218,35 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes, materials and bearings that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    file, stations = None, dict[str, int]()
-    if path.suffix.lower() == ".toml":
+    data: Mapping[str, Any] = {"shaft": "this table"}
+    if is_file := path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
         if "shaft" not in data and "masses_kg" in data:
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             problems.add(str(path), None, "shaft", None, expected)
             problems.stop()
-        file = problems.need(read_settings(RotorFile, data, str(path), problems))
-        problems.stop()
-    material = file.material if file else Material()
-    parts = _shaft(path.parent / file.shaft if file else path, material)
-    if file:
-        at = Places(range(1, len(parts["length"]) + 2), stations)
-
-        def name(item: Station) -> None:
-            if item.name in stations:
-                raise InputError([item.problem("name", "a name that no other station has")])
-            stations[item.name] = at(item)
-
-        each(problems, file.station, "station", name)
-        parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), material))
-        supports, parts["forces"] = read_attached(file, at, path.parent, problems)
-        parts["supports"] += supports
-        shear = parts["model"]["shear"] or "poisson_ratio" in data.get("material", {})
-        effects = file.model.model_dump()
-        parts["model"] = effects if file.model.has("shear") else effects | {"shear": shear}
+    file = problems.need(read_settings(RotorFile, data, str(path), problems))
     problems.stop()
-    try:
-        rotor = Rotor(**parts | {"model": Model(**parts["model"]), "stations": stations})
-    except ValueError as error:
-        problems.add(str(path), None, None, None, f"a possible rotor: {error}")
-        problems.stop()
-        raise
+    parts, stations = _shaft(path.parent / file.shaft if is_file else path, file.material), dict[str, int]()
+    at = Places(range(1, len(parts["length"]) + 2), stations)
+
+    def name(item: Station) -> None:
+        if item.name in stations:
+            raise InputError([item.problem("name", "a name that no other station has")])
+        stations[item.name] = at(item)
+
+    each(problems, file.station, "station", name)
+    parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), file.material))
+    supports, forces = read_attached(file, at, path.parent, problems)
+    parts["supports"] += supports
+    problems.stop()
+    effects, has_ratio = file.model.model_dump(), parts.pop("has_ratio") or file.material.has("poisson_ratio")
+    if not file.model.has("shear"):  # nothing else depends on the ratio
+        effects["shear"] = has_ratio
+    more: dict[str, Any] = {"forces": forces, "stations": stations, "model": Model(**effects)}
+    rotor = whole(file, "rotor", lambda _: Rotor(**parts, **more))
     _warn_of_units(str(path), rotor)
-    if file and file.calibration:
+    if file.calibration:
         found = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
         return replace(rotor, calibration=found)
     return rotor
@@ -276,16 +266,10 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    named = dict.fromkeys(name.strip() for name in _tables(data) if name.strip())
-    return (path, *(path.parent / name for name in named))
-
-
-def _tables(data: object) -> Iterator[str]:
-    """Names of tables anywhere in a file."""
-    if isinstance(data, dict):
-        yield from (data[key] for key in ("shaft", "table") if isinstance(data.get(key), str))
-    for one in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
-        yield from _tables(one)
+    rows = [item for part in data.values() if isinstance(part, list) for item in part]
+    tables = [data, *(row for row in rows if isinstance(row, dict))]
+    named = [table[key].strip() for table in tables for key in ("shaft", "table") if key in table]
+    return (path, *(path.parent / name for name in dict.fromkeys(named)))
 
 
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
@@ -301,20 +285,16 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     last = np.arange(len(length)) == len(length) - 1
     expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
     table.must_be("length", (length > 0) | (last & ~elements), expected)
-    short = too_short(np.where(elements, length, 0.0)) & (length > 0)
-    table.must_be(
-        "length", ~short, f"at least 1/{SHORTEST} of the longer neighbour's length: join this row with it"
-    )
     if not elements.any():
         table.in_header(table.fields["length"].name, "at least one row with a length above 0")
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     of_elements = {column.stem: values(column.stem, getattr(material, column.stem)) for column in OF_ELEMENTS}
     ratio = of_elements["poisson_ratio"]
+    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     for stem in ("diameter", "youngs_modulus"):
         table.must_be(stem, (table.numbers(stem) > 0) | ~elements, "a number above 0")
     table.must_be("inner_diameter", ~(inner >= diameter) | ~elements, "less than the outer diameter")
-    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in ATTACHED)):
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
         table.must_be(stem, ~(values(stem) < 0), f"a number of 0 or more{outwards}")
@@ -327,7 +307,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
         **{stem: value[elements] for stem, value in of_elements.items()},
         "discs": [Disc(node, *row[:3]) for node, row in enumerate(rows, 1) if any(row[:3])],
         "supports": [Support(node, *row[3:]) for node, row in enumerate(rows, 1) if any(row[3:])],
-        "model": {"shear": "poisson_ratio" in table},  # nothing else depends on it
+        "has_ratio": "poisson_ratio" in table,
     }
 
 
@@ -364,11 +344,8 @@ def _warn_of_units(source: str, rotor: Rotor) -> None:
     for what, item in [("", rotor), *items]:
         for name, (low, high, unit, others) in USUAL.items():
             values = np.atleast_1d(getattr(item, name, 0.0))
-            odd = np.flatnonzero((values > 0) & ((values < low) | (values > high)))
-            for i in odd[:1].tolist():
-                value, place = float(values[i]), what or f"element {i + 1}"
-                meant = [other for other, size in others.items() if low <= value * size <= high]
-                more = f" (and {counted(odd.size - 1, 'more')})" if odd.size > 1 else ""
+            for i in np.flatnonzero((values > 0) & ((values < low) | (values > high)))[:1].tolist():
+                meant = [other for other, size in others.items() if low <= values[i] * size <= high]
+                words = f"{source}, {what or f'element {i + 1}'}: {name} {values[i]:.6g} {unit}"
                 question = f"is this in {[*meant, 'another unit'][0]}?"
-                words = f"{source}, {place}{more}: {name} {value:.6g} {unit}; {question}"
-                warnings.warn(words, TableWarning, stacklevel=3)
+                warnings.warn(f"{words}; {question}", TableWarning, stacklevel=3)

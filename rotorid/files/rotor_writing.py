@@ -14,7 +14,15 @@ from rotorid.files.bearing import support_tables
 from rotorid.files.forces import force_tables, in_si
 from rotorid.files.input_file import each_file_once
 from rotorid.files.problems import InputError, Problem
-from rotorid.files.rotor import OF_ELEMENTS, DiscKeys, Effects, Material, read_rotor
+from rotorid.files.rotor import (
+    OF_ELEMENTS,
+    CalibrationKeys,
+    DiscKeys,
+    Effects,
+    Material,
+    Parameter,
+    read_rotor,
+)
 from rotorid.files.table_writing import write_files
 from rotorid.files.toml_writing import toml_bytes
 
@@ -105,15 +113,15 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     }
 
 
-def _calibration(found: Calibration) -> dict[str, Any]:
-    R = np.where(np.abs(found.correlation) < 1e-20, 0.0, found.correlation)
+def _calibration(calibration: Calibration) -> dict[str, Any]:
+    R = np.where(np.abs(calibration.correlation) < 1e-20, 0.0, calibration.correlation)
     np.fill_diagonal(R, 1.0)
-    columns = found.names, found.values.tolist(), found.std.tolist(), R.tolist()
-    keys = "name", "value", "std", "correlation"
+    columns = calibration.names, calibration.values.tolist(), calibration.std.tolist(), R.tolist()
     table = {
-        "needs_trial_run": found.needs_trial_run,
-        "lack_of_fit": found.lack_of_fit,
-        "parameter": [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)],
-        "data": [{"file": name, "sha256": value} for name, value in found.data.items()],
+        "lack_of_fit": calibration.lack_of_fit,
+        "parameter": [
+            dict(zip(Parameter.model_fields, row, strict=True)) for row in zip(*columns, strict=True)
+        ],
+        "data": [{"file": name, "sha256": value} for name, value in calibration.data.items()],
     }
-    return {name: part for name, part in table.items() if part not in ([], 0.0) or part is False}
+    return {"needs_trial_run": calibration.needs_trial_run, **in_si(CalibrationKeys, table)}

@@ -16,7 +16,6 @@ from pydantic import Field, PlainValidator
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import FloatArray
 from rotorid.base.complex_numbers import polar
-from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached, support_tables
 from rotorid.files.forces import Place, Places, each, force_tables, whole
@@ -187,25 +186,18 @@ def equations_of(
     Raises
     ------
     ValueError
-        Matrices that are not finite, coordinates that nothing holds, names that do not exist.
+        Coordinates that nothing holds, dampers at none.
     """
-    M, C, K = matrices = np.array([motion.M, motion.C, motion.K], dtype=float)
-    if not np.isfinite(matrices).all():
-        raise ValueError("M, C or K holds numbers that are not finite: such a model cannot be written")
+    M, C, K = motion.M, motion.C, motion.K
     free = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [name not in dampers for name in motion.coordinates]
     on, off = np.flatnonzero(~free), np.flatnonzero(free)
     if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
         raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
     bent = np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
     M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K - K[:, off] @ bent @ np.eye(len(K))[on]))
-    names, damping = [motion.coordinates[i] for i in on], C.astype(object)
-    allowed = {f"{kind}{name}" for name in names for kind in ("", "v_", FORCE)}
-    for name in (*dampers, *inputs, *(outputs or ())):
-        if name not in allowed:
-            raise ValueError(f"no {name!r} in this model: it has {listing(names, 'and')}")
-    for i, name in enumerate(names):
-        if name in dampers:
-            damping[i, i] = f"{damping[i, i]!r} + d_{name}" if damping[i, i] else f"d_{name}"
+    names, damping = [motion.coordinates[i] for i in on], C.astype(float).astype(object)
+    for i in [names.index(name) for name in dampers]:
+        damping[i, i] = f"{damping[i, i]!r} + d_{names[i]}" if damping[i, i] else f"d_{names[i]}"
     data: dict[str, Any] = {
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +25,7 @@ from rotorid.base.words import Phase
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase
-from rotorid.files.instruments import Sampled, read_samples, refusal
+from rotorid.files.instruments import read_samples, refusal
 from rotorid.files.problems import InputError, Problems, TableWarning
 from rotorid.files.settings import (
     NotNegative,
@@ -70,6 +72,9 @@ Records = Annotated[
 ]
 
 
+Order = Annotated[Whole, Field(ge=1)]
+
+
 class ChannelKeys(Settings):
     """A sensor: `[channels.NAME]`."""
 
@@ -111,7 +116,7 @@ class WaveformsFile(Settings):
     amplitude: Vibration | None = key(
         "unit in which vectors are written, default that of the first channel", default=None, example="um"
     )
-    orders: listed(Positive) = key("orders, default 1", default=(1.0,), example="orders = [1, 2]")  # type: ignore[valid-type]
+    orders: listed(Order) = key("orders, default 1", default=(1,), example="orders = [1, 2]")  # type: ignore[valid-type]
     rate: Positive | None = key("samples a second, where the records do not say", "rate_Hz", None)
     speeds: listed(Positive) | None = key(  # type: ignore[valid-type]
         "speeds at which vectors are wanted",
@@ -151,7 +156,7 @@ class Waveforms:
     records: tuple[WaveformRecord, ...]
     tacho: TachoSettings
     labels: Labels
-    orders: tuple[float, ...]
+    orders: tuple[int, ...]
     speeds: tuple[float, ...] | None
     files: tuple[Path, ...]
     unstated: bool
@@ -181,39 +186,39 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
         channels = data.get("channels")
         given = channels if isinstance(channels, dict) else {}
         options["channels"] = {name: given.get(name, {}) for name in wanted}
-    if any(key.startswith("speeds_") for key in options):
+    if "speeds_rad_s" in options:
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}
     if settings is None:
         options["records"] = [str(path) for path in paths]
-    source = "the options" if settings is None else str(settings)
+    source, read = str(settings or "the options"), list[Path]()
     if settings is not None and len(paths) > 1:
         words = "one waveforms file alone, whose [records] are files; or records without it"
         problems.add(source, None, None, None, words)
     file = problems.need(read_settings(WaveformsFile, data | options, source, problems))
     problems.stop()
-    folder = Path() if settings is None else settings.parent
-    read = {run: folder / name for run, name in file.records.items()}
-    records = []
-    for run, path in read.items():
+    records, quantity = list[WaveformRecord](), file.amplitude
+    for run, name in file.records.items():
+        read.append(path := (settings.parent if settings else Path()) / name)
         try:
-            records.append(_record(run, path, file))
+            record, measured = _record(run, path, file)
         except InputError as error:
             problems.extend(error.problems)
-    problems.stop()
-    quantity = file.amplitude or records[0][1][0]
-    for record, measured in records:
+            continue
+        records.append(record)
+        quantity = quantity or measured[0]
         for sensor, unit in zip(record.sensors, measured, strict=True):
             if unit.kind != quantity.kind and not {unit.kind, quantity.kind} <= DERIVATIVE.keys():
                 expected = f"a unit that can become that of the amplitudes, {quantity.name or 'none'}"
                 problems.add(record.source, None, sensor.name, unit.name, expected)
     problems.stop()
+    unit = problems.need(quantity)
     return Waveforms(
-        tuple(record for record, _ in records),
+        tuple(records),
         TachoSettings(file.pulses, file.edge, file.tacho_level),
-        Labels(quantity.name, quantity.scale, phase=file.phase or "lead"),
+        Labels(unit.name, unit.scale, phase=file.phase or "lead"),
         file.orders,
         file.speeds,
-        (*([] if settings is None else [settings]), *read.values()),
+        (*filter(None, [settings]), *read),
         file.phase is None,
     )
 
@@ -226,25 +231,42 @@ def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, 
         raise refusal(path, "a rate: a channel t_s of times, --rate, or rate_Hz in a waveforms file")
     if sampled.rate is not None and abs(rate / sampled.rate - 1.0) > SAME_RATE:
         raise refusal(path, f"the rate that the file has, {sampled.rate:.6g} Hz, not {rate:.6g} Hz")
+    stems = Counter(_parted(name)[0] for name in sampled.channels)
+    named = {name: name for name in sampled.channels}
+    named |= {stem: name for name in sampled.channels if stems[stem := _parted(name)[0]] == 1}
+    there = listing(sampled.channels, "and")
     if file.tacho is None:
-        expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file); "
-        raise refusal(path, f"{expected}the channels are {listing(sampled.channels, 'and')}")
-    name, _ = _find(path, sampled, file.tacho)
-    pulses = _samples(path, sampled, name)
-    tacho = Channel(name, pulses if sampled.scale == 1.0 else pulses * np.float32(sampled.scale))
-    channels = file.channels or _all_but(sampled, tacho.name)
+        expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file)"
+        raise refusal(path, f"{expected}; the channels are {there}")
+
+    def channel(name: str) -> tuple[str, AnyArray]:
+        """A channel, named with or without its unit, and its samples without gaps."""
+        if name not in named:
+            hint = did_you_mean(name, named)
+            raise refusal(path, f"a channel of this name{hint}; the channels are {there}", column=name)
+        samples = sampled.channels[named[name]]
+        if samples.dtype.kind == "f" and not (finite := np.isfinite(samples)).all():
+            at = int(np.argmin(finite))
+            value = "" if np.isnan(samples[at]) else str(samples[at])
+            raise refusal(path, "a number in each sample", at + sampled.first_row, named[name], value)
+        return named[name], samples.astype(np.int8) if samples.dtype.kind == "b" else samples
+
+    marks, pulses = channel(file.tacho)
+    tacho = Channel(marks, pulses if sampled.scale == 1.0 else pulses * np.float32(sampled.scale))
+    short = {name: stem for stem, name in named.items() if name != marks}
+    channels = file.channels or {stem: ChannelKeys(channel=name) for name, stem in short.items()}
     sensors, measured = [], []
-    for name, channel in channels.items():
-        column, in_name = _find(path, sampled, channel.channel or name)
-        unit = channel.unit or in_name or file.unit or Unit("", "label ''")
+    for name, keys in channels.items():
+        column, samples = channel(keys.channel or name)
+        in_name = _parted(column)[1]
+        unit = keys.unit or in_name or file.unit or Unit("", "label ''")
         if in_name is not None and in_name.name != unit.name:
             raise refusal(path, f"the unit {in_name.name} of its name, not {unit.name}", column=column)
         if unit.name.endswith(("_pp", "_rms")) and unit.kind in DERIVATIVE:
             expected = f"the unit of a sample, {unit.name.rpartition('_')[0]}, not {unit.name}"
             raise refusal(path, expected, column=column)
-        signal_path = SignalPath(channel.high_pass, channel.high_pass_order, channel.delay)
-        factor = channel.scale * unit.to_si(sampled.scale)
-        samples = _samples(path, sampled, column)
+        factor = keys.scale * unit.to_si(sampled.scale)
+        signal_path = SignalPath(keys.high_pass, keys.high_pass_order, keys.delay)
         sensors.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
         measured.append(unit)
     if not sensors:
@@ -252,42 +274,10 @@ def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, 
     return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), measured
 
 
-def _all_but(sampled: Sampled, tacho: str) -> dict[str, ChannelKeys]:
-    """Settings of all channels but the tacho, named without their units where that tells them apart."""
-    channels: dict[str, ChannelKeys] = {}
-    for name in sampled.channels:
-        stem = _parted(name)[0]
-        if name != tacho:
-            channels[name if stem in channels else stem] = ChannelKeys(channel=name)
-    return channels
-
-
 def _parted(name: str) -> tuple[str, Unit | None]:
     """A channel's name without the unit in it, and that: `B1X_um`, `B1X [mm/s]`."""
     match = _NAMED_UNIT.fullmatch(spelt(name))
     return (name, None) if match is None else (name[: match.end(1)], VIBRATION[match[2]])
-
-
-def _find(path: Path, sampled: Sampled, name: str) -> tuple[str, Unit | None]:
-    """The channel of this name, with or without its unit, and the unit in the name."""
-    parted = {channel: _parted(channel) for channel in sampled.channels}
-    alike = [channel for channel, (stem, _) in parted.items() if stem == name]
-    chosen = [name] if name in parted else alike
-    if len(chosen) != 1:
-        hint = did_you_mean(name, [*parted, *(stem for stem, _ in parted.values())])
-        expected = f"a channel of this name{hint}; the channels are {listing(alike or parted, 'and')}"
-        raise refusal(path, expected, column=name)
-    return chosen[0], parted[chosen[0]][1]
-
-
-def _samples(path: Path, sampled: Sampled, name: str) -> AnyArray:
-    """A channel without gaps."""
-    samples = sampled.channels[name]
-    if samples.dtype.kind == "f" and not (finite := np.isfinite(samples)).all():
-        at = int(np.argmin(finite))
-        value = "" if np.isnan(samples[at]) else str(samples[at])
-        raise refusal(path, "a number in each sample", at + sampled.first_row, name, value)
-    return samples.astype(np.int8) if samples.dtype.kind == "b" else samples
 
 
 def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
@@ -303,7 +293,7 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
         find_vectors(
             record,
             waveforms.tacho,
-            tuple(int(order) for order in waveforms.orders),
+            waveforms.orders,
             derivative=None if unit is None else DERIVATIVE[unit.kind],
             speeds=None if waveforms.speeds is None else np.array(waveforms.speeds),
         )
@@ -321,46 +311,44 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
 def vectors_columns(each: Sequence[Vectors], labels: Labels) -> tuple[Column, ...]:
     """A runs table of records of the same sensors and orders, one row an instant and a sensor."""
     unit, scale = labels.vibration_unit, labels.vibration_scale
-    plain = unit.removesuffix("_pp").removesuffix("_rms")
-    end = f"_{unit}" if unit else ""
-    shown = 1 if unit.endswith("_rms") else 0
-    counts = [(len(one.times), len(one.sensors)) for one in each]
+    plain, end = unit.removesuffix("_pp").removesuffix("_rms"), f"_{unit}" if unit else ""
+    rms, as_read = int(unit.endswith("_rms")), scale if plain == unit else VIBRATION[plain].scale
 
-    def joined(parts: Sequence[FloatArray]) -> FloatArray:
-        """Values (P, C), or (P,) of all sensors, of each record, as one column."""
-        wide = [np.broadcast_to(part.T, count[::-1]).T for part, count in zip(parts, counts, strict=True)]
-        return significant(np.concatenate([part.ravel() for part in wide]), DIGITS)
+    def column(
+        name: str, values: Callable[[Vectors], FloatArray], form: str = "", heading: str | None = None
+    ) -> Column:
+        """Values (P, C), or (P, 1) of all sensors, of each record."""
+        wide = [np.broadcast_to(values(one), one.gap.shape).ravel() for one in each]
+        return Column(name, significant(np.concatenate(wide), DIGITS), form.format if form else None, heading)
 
-    columns = [
-        Column("run", [one.run for one in each for _ in one.times for _ in one.sensors], str),
-        Column("time_s", joined([one.times for one in each])),
-        Column("speed_rpm", joined([one.speeds * RPM for one in each]), "{:.1f}".format, "rpm"),
-        Column("sensor", [name for one in each for _ in one.times for name in one.sensors], str),
-    ]
-    for k, order in enumerate(each[0].orders):
-        name = "" if order == 1 else f"order{order}_"
-        about = unit.replace("_", " ") if order == 1 else f"{order}×"
-        vectors = [one.vectors[:, :, k] for one in each]
-        amplitude, phase = zip(*(labels.vibration(one) for one in vectors), strict=True)
-        turned = [
-            np.degrees(np.minimum(one.tangential[:, :, k] / np.maximum(np.abs(z), 1e-300), np.pi))
-            for one, z in zip(each, vectors, strict=True)
-        ]
-        std = joined([one.radial[:, :, k] * scale for one in each])
-        columns += [
-            Column(f"{name}amplitude{end}", joined(amplitude), "{:.4g}".format, about),
-            Column(f"{name}phase_deg", joined(phase), "{:.1f}°".format, "phase"),
-            Column(f"{name}amplitude_std{end}", std, "{:.2g}".format, "±"),
-            Column(f"{name}phase_std_deg", joined(turned), "{:.2g}°".format, "±"),
-        ]
-    overall = joined([one.overall[..., shown] * scale for one in each])
-    gap = joined([one.gap * (scale if plain == unit else VIBRATION[plain].scale) for one in each])
+    def order_columns(k: int, order: int) -> tuple[Column, ...]:
+        name, about = ("", unit.replace("_", " ")) if order == 1 else (f"order{order}_", f"{order}×")
+
+        def turned(one: Vectors) -> FloatArray:
+            size = np.maximum(np.abs(one.vectors[..., k]), 1e-300)
+            return np.degrees(np.minimum(one.tangential[..., k] / size, np.pi))
+
+        def vector(part: int) -> Callable[[Vectors], FloatArray]:
+            return lambda one: labels.vibration(one.vectors[..., k])[part]
+
+        return (
+            column(f"{name}amplitude{end}", vector(0), "{:.4g}", about),
+            column(f"{name}phase_deg", vector(1), "{:.1f}°", "phase"),
+            column(f"{name}amplitude_std{end}", lambda one: one.radial[..., k] * scale, "{:.2g}", "±"),
+            column(f"{name}phase_std_deg", turned, "{:.2g}°", "±"),
+        )
+
+    orders = [order_columns(k, order) for k, order in enumerate(each[0].orders)]
     ends = ["end of the record" if near else "" for one in each for near in one.end for _ in one.sensors]
     return (
-        *columns,
-        Column(f"overall{end}", overall, "{:.4g}".format, "all"),
-        Column(f"gap_{plain}" if plain else "gap", gap, "{:.4g}".format, "gap"),
-        Column("turns", joined([one.turns for one in each]), "{:.0f}".format),
+        Column("run", [one.run for one in each for _ in one.times for _ in one.sensors], str),
+        column("time_s", lambda one: one.times[:, None]),
+        column("speed_rpm", lambda one: one.speeds[:, None] * RPM, "{:.1f}", "rpm"),
+        Column("sensor", [name for one in each for _ in one.times for name in one.sensors], str),
+        *chain.from_iterable(orders),
+        column(f"overall{end}", lambda one: one.overall[..., rms] * scale, "{:.4g}", "all"),
+        column(f"gap_{plain}" if plain else "gap", lambda one: one.gap * as_read, "{:.4g}", "gap"),
+        column("turns", lambda one: one.turns[:, None], "{:.0f}"),
         Column("note", ends),
     )
 

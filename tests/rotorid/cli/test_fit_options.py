@@ -153,10 +153,10 @@ def test_standard_deviations_beside_the_outputs(cli, tmp_path):
         (ROWS[1], "1,0.5,1,0.1,-0.3", "row 3, column z_std: found '-0.3'"),
         (ROWS[1], "1,0.5,1,,0.3", "row 3, column y_std: found nothing (a blank), expected a standard"),
         (ROWS[1], "1,0.5,1,nan,0.3", "row 3, column y_std: found 'nan', expected a finite number"),
-        ("y_std,z_std", "y_std,note", "column z_std: expected a column z_std, as there is y_std"),
+        ("y_std,z_std", "y_std,note", "column y_std: expected standard deviations of all outputs or none"),
         ("t_s,y,z,", "t_s,y,note,", "column z: expected a column z"),
-        ("y_std", "y_sd", "column y_sd: found 'y_sd', expected the name of the model alone"),
-        ("y_std,z_std", "y_std,z_sdt", "of an output NAME in a column NAME_std)"),
+        ("y_std", "y_sd", "column y_sd: found 'y_sd', expected the column once, not also y"),
+        ("y_std,z_std", "y_std,z_sdt", "column z_sdt: found 'z_sdt', expected the column once, not also z"),
         ("y_std", "y_std_mm", "without a unit"),
     ],
 )
@@ -182,7 +182,10 @@ def test_standard_deviations_where_nothing_was_measured(cli, tmp_path):
     bad = saved(tmp_path, "b.csv", with_std([*ROWS, "4,0.06,0.13,NaN,0.2"]))
     refused(cli("fit", model, bad, "--allow-missing"), "wherever y was measured")
     alone = saved(tmp_path, "a.csv", "t_s,z,y_std,z_std\n0,2,1,1\n1,1,1,1\n")
-    refused(cli("fit", model, alone, "--allow-missing"), "column y: expected a column y, as there is y_std")
+    refused(
+        cli("fit", model, alone, "--allow-missing"),
+        "column y_std: expected standard deviations of all outputs or none",
+    )
 
 
 def test_standard_deviations_are_stated_once(cli, tmp_path):

@@ -122,14 +122,10 @@ HEAD = "frequency_rad_s,F_re,X_re,X_im\n"
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg,X_re\n1,1,2,3,4\n", ["not some of both"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,-2,3\n", ["0 or more"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,400\n", ["-360 to 360"]),
-        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as its amplitude is given"]),
+        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as X_amplitude is given"]),
         ("frequency_rad_s,F_re,X_re_furlong\n1,1,2\n", ["no unit"]),
         ("experiment,frequency_rad_s,F_re,X_re,X_im\na,1,1,2,3\na,2,1,2,3\n", ["row 3", "repeat"]),
-        ("repeat,frequency_rad_s,F_re,X_re,X_im\n1,1,1,2,3\n1,1,1,2,3\n", ["row 3", "another repeat"]),
-        (
-            "experiment,repeat,frequency_rad_s,F_re,X_re,X_im\na,1,1,1,2,3\na,2,2,1,2,3\na,3,1,4,2,3\n",
-            ["row 3", "row 4", "the frequency and the excitation of row 2"],
-        ),
+        ("experiment,repeat,frequency_rad_s,F_re,X_re\na,1,1,1,2\na,1,1,1,2\n", ["row 3", "another name"]),
         ("", ["empty"]),
     ],
 )
@@ -140,50 +136,11 @@ def test_complaints_name_file_row_and_column(table, text, messages):
         assert message in str(caught.value)
 
 
-def test_repeats_become_their_mean_and_tell_the_errors(table):
-    rng = np.random.default_rng(4)
-    truth = {1.0: 3 - 4j, 2.0: 0.02 + 0.01j}
-    lines = ["frequency_rad_s,repeat,F_re,X_re,X_im"]
-    readings = {w: [] for w in truth}
-    for k in range(200):
-        for w, z in truth.items():
-            noisy = z * (1 + 0.02 * rng.standard_normal() + 0.01j * rng.standard_normal())
-            readings[w].append(noisy)
-            lines.append(f"{w},{k},1,{noisy.real!r},{noisy.imag!r}")
-    rows = table("\n".join(lines) + "\n")
-    assert len(rows) == 2
-    np.testing.assert_allclose(
-        rows.signals["X"], [np.mean(readings[1.0]), np.mean(readings[2.0])], rtol=1e-12
-    )
-    for i, w in enumerate(truth):
-        unit = rows.signals["X"][i] / abs(rows.signals["X"][i])
-        turn = np.array([[unit.real, unit.imag], [-unit.imag, unit.real]])
-        own = turn @ rows.covariances["X"][i] @ turn.T / abs(truth[w]) ** 2
-        np.testing.assert_allclose(np.sqrt(np.diag(own) * 200), [0.02, 0.01], rtol=0.09)
-        assert abs(own[0, 1]) < 1e-12
-
-
-def test_few_repeats_are_named(table):
-    with pytest.warns(TableWarning, match="1 repeated reading only"):
-        rows = table("frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,3\n1,b,1,2.1,3\n2,a,1,2,3\n")
-    assert (rows.covariances["X"][:, 0, 0] > 0).all()
-
-
-def test_stated_errors_hold_for_one_reading_and_means_are_better(tmp_path, model_file):
-    file = model_file(SMALL + "[errors]\namplitude_percent = 2\nphase_deg = 1\n")
-    path = tmp_path / "data.csv"
-    path.write_text(
-        "frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,0\n1,b,1,4,0\n2,a,1,5,0\n", encoding="utf-8"
-    )
-    rows = read_measurements(path, file)
-    covariance = rows.covariance("X")
-    np.testing.assert_allclose(covariance[0], np.diag([0.06**2, (3 * math.radians(1)) ** 2]) / 2, atol=1e-18)
-    np.testing.assert_allclose(covariance[1], np.diag([0.1**2, (5 * math.radians(1)) ** 2]), atol=1e-18)
-
-
-def test_without_names_other_forces_are_other_experiments(table):
-    rows = table("frequency_rad_s,repeat,F_re,X_re,X_im\n1,a,1,2,3\n1,a,2,4,6\n1,b,2,4,6\n")
-    assert len(rows) == 2
+def test_repeated_readings_stay_apart(table):
+    rows = table("experiment,repeat,frequency_rad_s,F_re,X_re,X_im\na,1,1,1,2,3\na,2,1,1,2.1,3\n")
+    assert rows.names == ("a, 1", "a, 2")
+    np.testing.assert_array_equal(rows.signals["X"], [2 + 3j, 2.1 + 3j])
+    assert not rows.stated
 
 
 SMALL = 'equations = ["(m*p**2 + b*p + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c", "b"]\n'

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,11 +120,7 @@ def test_outputs_that_do_not_show_a_mass(tmp_path, three):
     np.testing.assert_allclose(found.values, [TRUTH["d_x7"], TRUTH["d_x12"]], rtol=1e-6)
 
 
-def test_writing_refuses(three):
-    with pytest.raises(ValueError, match="K holds numbers that are not finite"):
-        equations_of(replace(three, K=three.K * np.nan), {})
-    with pytest.raises(ValueError, match="no 'f_x8' in this model: it has x7, x12 and x18"):
-        equations_of(three, {}, inputs=["f_x8"])
+def test_what_nothing_holds_is_refused():
     loose = fem.Motion(np.diag([1.0, 0.0]), np.zeros((2, 2)), np.diag([1.0, 0.0]), ("x1", "x2"), 0.0)
     with pytest.raises(ValueError, match="neither mass nor damping need stiffness"):
         equations_of(loose, {})
@@ -212,7 +207,7 @@ def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
         ('"g*u"', '"g*u*y1"', r"not linear in the signals: it contains"),
         ('"g*u"', '"g*u + 1"', r"constant one has no influence"),
         ('"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
-        ('[["m", 0]', '[["m", "u"]', r"u in 'u' has no meaning"),
+        ('[["m", 0]', '[["m", "u"]', r"not linear in the signals"),
         ('[["m", 0]', '[["m"]', r"key M: .*expected square matrices"),
         ('w = "v_y2/4"', 'y2 = "1e3*y1"', r"y2: an amplitude needs a name of its own"),
         ('a = "1e3*y1"', 'k = "1e3*y1"', r"k: an amplitude needs a name of its own"),

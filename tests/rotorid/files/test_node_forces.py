@@ -121,11 +121,6 @@ UNLIKELY = [
     ("journal_bearing", [*BEARING[:3], "viscosity_Pa_s = 28"], "viscosity 28 Pa·s; is this in another unit?"),
     ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "viscosity 5e-06 Pa·s; is this"),
     ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length 300 m; is this in mm?"),
-    (
-        "annular_seal",
-        [*SEAL[:2], "swirl_ratio = 40", SEAL[3]],
-        "swirl_ratio 40 of the shaft's speed; is this in percent?",
-    ),
     ("stop", ["gap_m = 0.2", "stiffness_N_per_m = 1e7"], "gap 0.2 m; is this in another unit?"),
 ]
 

@@ -1,13 +1,12 @@
 """Model files and time records: what is read, and what is said about everything that cannot be used."""
 
 import re
-import warnings
 
 import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
+from rotorid.tables import InputError, read_ode_model, read_record
 
 MODEL = """
 inputs = ["u"]
@@ -164,16 +163,6 @@ def test_missing_samples_are_honoured_where_the_user_says_so(tmp_path, model):
 def test_nothing_measured_at_all(tmp_path, model):
     path = saved(tmp_path, "r.csv", "t_s,u\n0,1\n1,2\n")
     assert "at least one output" in refusal(lambda: read_record(path, model, allow_missing=True))
-
-
-def test_a_gap_in_an_even_record_is_said(tmp_path, model):
-    rows = [f"{k / 10},1,2,3" for k in range(20) if k not in (7, 8)]
-    path = saved(tmp_path, "r.csv", "\n".join(["t_s,y,z,u", *rows]) + "\n")
-    with pytest.warns(TableWarning, match=r"1 gap .* the first of 0.3 s after row 8; nothing is filled in"):
-        assert len(read_record(path, model).t) == 18
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        read_record(path, model, allow_missing=True)
 
 
 MATRICES = """

@@ -90,7 +90,7 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
     (record,) = read_waveforms([write(tmp_path / "base.npz", named)], {"tacho": "KEY"}).records
     assert [(s.name, s.factor) for s in record.sensors] == [
         ("B1X", 1e-6),
-        ("B2", 1e-6),
+        ("B2 (µm)", 1e-6),
         ("B2_mil", 25.4e-6),
     ]
 
@@ -226,7 +226,7 @@ def test_units_in_names_and_settings_agree(tmp_path):
     text = 'tacho = "KEY"\nrecords = ["a.npz"]\n[channels.A]\nunit = "mil"\n'
     assert "column A_um: expected the unit um of its name, not mil" in complaint([settings(tmp_path, text)])
     twice = write(tmp_path / "b.npz", {**channels, "A_mil": drawn()["B1Y"]})
-    assert "the channels are A_um and A_mil" in complaint([twice], {"tacho": "KEY", "sensors": ["A"]})
+    assert "the channels are KEY, A_um and A_mil" in complaint([twice], {"tacho": "KEY", "sensors": ["A"]})
     only = write(tmp_path / "c.npz", {"KEY": drawn()["KEY"]})
     assert "a channel besides that of the tacho" in complaint([only], {"tacho": "KEY"})
 

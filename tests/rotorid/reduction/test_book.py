@@ -53,5 +53,5 @@ def test_the_compliance_of_the_running_text_is_refused(tmp_path):
     assert "12,12,16.4e-8" in text
     path = tmp_path / "compliance.csv"
     path.write_text(text.replace("12,12,16.4e-8", "12,12,9.35e-8"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"positive definite.*Check those between nodes 7"):
+    with pytest.raises(InputError, match=r"positive definite"):
         read_compliance(path)

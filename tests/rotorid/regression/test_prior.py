@@ -294,7 +294,7 @@ estimate = { a = 0.0, b = 0.0 }
         ("b = [1.0, 0.0]", "a number of 1e-30 or more"),
         ("b = [1.0, 1e-320]", "a number of 1e-30 or more"),
         ("b = [1.0, inf]", "a finite number"),
-        ('b = [1.0, "2"]', "standard deviation above 0"),
+        ('b = [1.0, "two"]', "standard deviation above 0"),
         ("b = [true, 2]", "standard deviation above 0"),
         ("bb = [1.0, 0.5]", r"bb is none \(did you mean 'b'\?\)"),
     ],
