@@ -115,6 +115,8 @@ def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
     """The pieces of the answer, one of them not mounted, then the check run, as by Kelm."""
     folder, window = Path(shutil.copytree(sample_data() / "turbo_job", tmp_path / "job")), windows[0]
     job = folder / "holes.toml"
+    for name in ("check.csv", "check_weights.csv"):  # those of another job
+        (folder / name).unlink()
     turned = job.read_text(encoding="utf-8").replace("first_hole_deg = 0", "first_hole_deg = 7.5")
     job.write_text(turned, encoding="utf-8")
     window.open(serve(job).address)
