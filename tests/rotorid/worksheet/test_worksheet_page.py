@@ -132,6 +132,7 @@ def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
     assert [float(shown[f"mounting.holes.{k}.angle_deg"]) for k in range(len(holes))] == [
         row["angle_deg"] for row in holes
     ]
+    window.driver.execute_script("document.getElementById('new-name').focus()")
     window.push('[data-mounted="1"]', SPACE)
     window.push("#add-check")
     window.saved()
@@ -142,6 +143,7 @@ def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
     ]
     assert mounted == [(h["plane"], h["mass"], h["angle_deg"]) for k, h in enumerate(holes) if k != 1]
     window.type('[data-cell^="check|"]', "4.1")
+    window.leave()
     window.saved()
     assert rows(folder / "check.csv")[0]["amplitude_um_pp"] == "4.1"
 
