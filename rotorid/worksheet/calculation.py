@@ -77,11 +77,11 @@ def _balance(job: str, asked: dict[str, Any]) -> tuple[Balance, list[str]]:
         options = BalanceOptions(split=asked["split"], refine=asked["refine"])
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            found = balance(Path(job) if asked["checked"] else _without_check(Path(job)), options)
+            made = balance(Path(job) if asked["checked"] else _without_check(Path(job)), options)
         if len(_kept) > 1:
             _kept.clear()
         _kept[name] = (
-            found,
+            made,
             kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)),
         )
     return _kept[name]
@@ -106,7 +106,7 @@ def in_words(outcome: Outcome) -> dict[str, Any]:
     answer = outcome.answer
     return {
         "judgement": answer.judgement,
-        "found": answer.found,
+        "lines": answer.found,
         "warnings": list(answer.warnings),
         "notes": list(answer.notes),
         "document": outcome.document,

@@ -123,13 +123,13 @@ class JobFiles:
 
     def look(self, others: Mapping[str, int] = _NONE) -> list[str]:
         """Names of the files that another program has changed since the last look; of others by the time."""
-        for path, known in self._disk.items():
+        for path, held in self._disk.items():
             stamp = _stamp(path)
             if stamp != self._stamps.get(path):
                 data = None
                 with suppress(ValueError):
                     data = self._read(path)
-                if data != known:
+                if data != held:
                     self._reload()
                     break
                 self._stamps[path] = stamp
@@ -225,11 +225,11 @@ class JobFiles:
             if not isinstance(name, str) or not name.isprintable():
                 continue
             path = folder / name
-            known = path in self._disk
+            twice = path in self._disk
             try:
                 self._disk[path] = None  # while it cannot be read
                 data = self._disk[path] = self._read(path)
-                if known or path.suffix.lower() in (".toml", *SUFFIXES):
+                if twice or path.suffix.lower() in (".toml", *SUFFIXES):
                     raise ValueError(f"{name} is no table of its own: edit it where it comes from")
                 if key in KEYS and data:
                     tables[key] = read_table(path, key, data)
@@ -251,10 +251,10 @@ class JobFiles:
 
     def _reload(self) -> None:
         """Take what is on disk; what another program has changed is noticed, and ends undo."""
-        known = self._disk
+        before = self._disk
         self._now, self._done, self._undone = self._read_job(), [], []
-        both = [path for path in known if path in self._disk]
-        self._noticed += [path.name for path in both if self._disk[path] != known[path]]
+        both = [path for path in before if path in self._disk]
+        self._noticed += [path.name for path in both if self._disk[path] != before[path]]
 
     def _files(self, version: Version) -> dict[Path, bytes | None]:
         tables = version.tables.values()
@@ -327,8 +327,8 @@ class JobFiles:
         if line is None or line.cells is None:
             raise Conflict(f"a row of {table.path.name} is not there any more", None)
         if "delete" in edit:
-            known: dict[str, Any] = {"old": tuple(edit["old"])} if "old" in edit else {}
-            _is_done(line.cells, None, known, f"a row of {table.path.name}")
+            expected: dict[str, Any] = {"old": tuple(edit["old"])} if "old" in edit else {}
+            _is_done(line.cells, None, expected, f"a row of {table.path.name}")
             return version.with_table(edit["table"], table.without(line)), None
         column, new = edit["column"], clean(str(edit["new"]))
         old = {"old": clean(str(edit["old"]))} if "old" in edit else {}

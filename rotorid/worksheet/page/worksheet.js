@@ -9,7 +9,7 @@ const queue = []; // what is still to be sent, in order
 let state = null;
 let data = {}; // the tables of the state, read
 let online = true;
-let said = "all is saved";
+let savedWords = "all is saved";
 let focused = {}; // speed and sensor of the cell that was entered last
 
 /* Elements: `h` describes one, `patch` makes children so; focus and what is being typed stay. */
@@ -24,7 +24,7 @@ function patch(parent, nodes) {
     child.vKey = keys[i];
     if (parent.childNodes[i] !== child) parent.insertBefore(child, parent.childNodes[i] || null);
     if (!node.tag && child.data !== node) child.data = node;
-    if (node.tag && !node.props.own) patch(child, node.children); // others fill an `own` one
+    if (node.tag && !node.props.filled) patch(child, node.children); // others fill a `filled` one
     for (const [name, value] of Object.entries(node.props || {})) put(child, name, value);
   });
 }
@@ -48,16 +48,16 @@ async function ask(path, body) {
   const headers = { "X-Rotorid-Token": token, "Content-Type": "application/json" };
   const answer = await fetch(path, { headers, ...(body && { method: "POST", body: JSON.stringify(body) }) });
   if (answer.ok) return answer;
-  const told = await answer.json().catch(() => ({ error: `${answer.status} ${answer.statusText}` }));
-  throw Object.assign(new Error(told.error), { status: answer.status, now: told.now });
+  const refusal = await answer.json().catch(() => ({ error: `${answer.status} ${answer.statusText}` }));
+  throw Object.assign(new Error(refusal.error), { status: answer.status, now: refusal.now });
 }
 
 async function refresh(after) {
-  const found = await (await ask(`/state?after=${after}`)).json();
-  if (online && state && found.version < state.version) return; // the other request was faster
+  const news = await (await ask(`/state?after=${after}`)).json();
+  if (online && state && news.version < state.version) return; // the other request was faster
   const first = !state;
   online = true;
-  state = found;
+  state = news;
   if (first) restoreTrial();
   data = Object.fromEntries(Object.entries(state.tables).map(([name, one]) => [name, read(one)]));
   render();
@@ -82,7 +82,7 @@ async function drain() {
     const { path, body, done, failed } = queue[0];
     try {
       await ask(path, body);
-      said = `saved ${new Date().toTimeString().slice(0, 8)}`;
+      savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
       while (!(await refresh(-1).then(() => true, away)));
       done(queue.shift());
     } catch (problem) {
@@ -115,7 +115,6 @@ const inWords = (text) => Object.entries(WORDS).reduce((all, [key, word]) => all
 
 /* The tables of the job. */
 const number = (text) => Number(String(text).trim().replace(",", "."));
-const near = (a, b) => Math.abs(number(a) - number(b)) <= 0.005 * number(a);
 const each = (values) => [...new Set(values)].filter((value) => value);
 const partsOf = (text, by) => text.split(by).map((one) => one.trim()).filter((one) => one);
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
@@ -129,8 +128,8 @@ function read({ header, rows, read_only: closed }) {
     const time = (times[[row.run, row.speed, row.sensor]] ||= []).push(row);
     return { ...row, place: time > 1 ? `${row.speed} (${time})` : row.speed };
   };
-  const found = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
-  return { header, closed, names: named(header), rows: found };
+  const shown = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
+  return { header, closed, names: named(header), rows: shown };
 }
 const allRows = (...tables) => tables.flatMap((name) => data[name]?.rows || []);
 const rowsOf = (name, run) => allRows(name).filter((row) => row.run === run);
@@ -171,8 +170,8 @@ function jsonOf(path, text) {
 }
 
 function setting(top, begin, usualName, label) {
-  const known = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
-  const path = [...top, known || usualName];
+  const there = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
+  const path = [...top, there || usualName];
   const text = textOf(at(state.settings, path));
   return { key: path.join("."), path, text, label: `${label}, ${top.at(-1)}` };
 }
@@ -215,9 +214,9 @@ function cellTable(heads, lines) {
 
 function grid(name, run) {
   const { amplitude, speed } = data[name].names;
-  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
-  const lines = each(own.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
-    const row = own.find((one) => one.sensor === sensor && one.place === place);
+  const rows = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
+  const lines = each(rows.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
+    const row = rows.find((one) => one.sensor === sensor && one.place === place);
     const label = `${sensor}, ${place} ${unitOf(speed)}`;
     return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, label));
   })]);
@@ -226,29 +225,26 @@ function grid(name, run) {
 }
 
 function weights(name, run) {
-  const own = rowsOf(name, run);
-  const lines = own.map((row, i) => {
+  const rows = rowsOf(name, run);
+  const lines = rows.map((row, i) => {
     const label = `weight ${i + 1}`;
     const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
     return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
       button("Remove", () => edit(...remove(name, [row])), { "aria-label": `Remove ${label} of ${run}` })];
   });
   const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
-  const more = () => edit(add(name, { run }, own.at(-1)?.id));
+  const more = () => edit(add(name, { run }, rows.at(-1)?.id));
   return [cellTable([heads], lines), button("Add a weight", more, { "data-add": run })];
 }
 
 function card(name, run) {
   const mounted = name === "runs" ? "weights" : "check_weights";
   const free = run === baseline();
-  const lacking = usual().filter(({ speed, sensor }) =>
-    !rowsOf(name, run).some((row) => row.sensor === sensor && near(row.speed, speed)));
-  const type = () => edit(...addRows(name, run, lacking));
   const all = () => [name, mounted].flatMap((one) => remove(one, rowsOf(one, run)));
   const drop = () => confirm(`Remove ${run} with its readings and weights?`) && edit(...all());
   return h("article", { key: run, "data-run": run }, !free && h("h3", {}, run),
     !free && data[mounted] && weights(mounted, run),
-    grid(name, run), lacking.length > 0 && button("Type the missing readings", type, { "data-type": run }),
+    grid(name, run),
     !free && button("Remove this run", drop, { "data-remove": run }));
 }
 
@@ -281,7 +277,7 @@ function renderConventions() {
   show("conventions", four.map((name) => {
     const [way, side] = [name.split("-")[0], `${name.split("-")[1]} rotation`];
     const edits = [{ key: ["phase"], old: phase, new: way }, { key: ["angles"], old: angles, new: side }];
-    return button([h("b", {}, `Phase ${way}s, angles ${side}`), h("span", { id: `drawing-${name}`, own: true })],
+    return button([h("b", {}, `Phase ${way}s, angles ${side}`), h("span", { id: `drawing-${name}`, filled: true })],
       () => edit(...edits), { id: `convention-${name}`, "aria-pressed": phase === way && angles === side });
   }));
   four.forEach((name) => draw(`drawing-${name}`, `/convention/${name}`));
@@ -374,19 +370,19 @@ function renderAnswer() {
 function renderNow() {
   const { refused: why, answer } = state.results;
   const refused = [...typed.values()].filter((it) => it.why).map((it) => ({ ...it.cell, text: it.why }));
-  const missing = {}; // what is not typed yet, counted for each run
-  for (const one of problems(true)) {
-    const { run } = allRows(one.table).find(({ id }) => id === one.row) || {};
-    (missing[run ? `${whatOf(one.column || "reading")} of ${run}` : one.text] ||= []).push(one);
-  }
-  const left = Object.entries(missing).map(([text, those]) =>
+  const nameOf = ({ table: name, row, column }) =>
+    `${whatOf(column || "reading")} of ${allRows(name).find(({ id }) => id === row)?.run}`;
+  const wrong = [...problems(false).map((one) =>
+    (one.row ? { ...one, text: `${nameOf(one)}: ${inWords(one.text)}` } : { ...one, text: inWords(one.text) })), ...refused];
+  const counted = Object.groupBy(problems(true), (one) => (one.row ? nameOf(one) : one.text));
+  const left = Object.entries(counted).map(([text, those]) =>
     ({ ...those[0], text: those[0].row ? `${those.length} × ${text}` : text }));
   const go = (it) => document.querySelector(`[data-at^="${it.table} ${it.row} ${it.column || ""}"]`).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const empty = allRows("runs").filter(isEmpty);
   show("now", h("h2", {}, answer ? "Answer" : "So far"), answer && judged(answer.judgement),
-    h("div", { class: "why" }, list([...problems(false), ...refused]), why && `No answer: ${inWords(why)}`),
+    h("div", { class: "why" }, list(wrong), why && `No answer: ${inWords(why)}`),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
     empty.length > 0 && button("Not measured: remove the empty rows",
       () => edit(...remove("runs", empty)), { id: "drop-empty" }));
@@ -412,14 +408,14 @@ async function draw(id, address) {
   if (!address) return slot.replaceChildren(); // no old picture stands beside new numbers
   await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
   if (slot.address !== address) return;
-  const svg = await ask(address).then((found) => found.text(), () => "");
+  const svg = await ask(address).then((drawing) => drawing.text(), () => "");
   if (slot.address === address && svg) slot.innerHTML = svg;
   else if (slot.address === address) slot.address = ""; // the next state asks again
 }
 
 function renderHeader() {
   const lost = `not saved — the program is not running${queue.length ? `: ${queue.length} wait here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : said) : lost;
+  $("saved").textContent = online ? (queue.length ? "saving…" : savedWords) : lost;
   $("saved").className = online ? "" : "why";
 }
 
@@ -508,9 +504,9 @@ const submitted = {
     for (const { name, value: it, dataset } of $("trial").querySelectorAll("[name]")) {
       if (it && !options.with_job) options[name] = dataset.unit ? number(it) + dataset.unit : number(it) || it;
     }
-    const { judgement, found, warnings, notes, picture = "" } = await ask("/trial", { options })
+    const { judgement, lines, warnings, notes, picture = "" } = await ask("/trial", { options })
       .then((one) => one.json(), (no) => ({ notes: no.message }));
-    show("trial-answer", [judgement, found, warnings, notes].flat().map((one) => one && h("p", {}, one)));
+    show("trial-answer", [judgement, lines, warnings, notes].flat().map((one) => one && h("p", {}, one)));
     $("trial-picture").innerHTML = picture;
   },
 };
