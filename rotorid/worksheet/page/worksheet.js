@@ -226,15 +226,16 @@ function grid(name, run) {
 
 function weights(name, run) {
   const rows = rowsOf(name, run);
+  const columns = ["plane", "weight", "angle", ...(data[name].names.action ? ["action"] : [])];
   const lines = rows.map((row, i) => {
     const label = `weight ${i + 1}`;
-    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
+    const [plane, ...more] = columns.map((what) => cellOf(name, row, what, label));
     return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
       button("Remove", () => edit(...remove(name, [row])), { "aria-label": `Remove ${label} of ${run}` })];
   });
-  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
+  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ...columns.slice(3), ""];
   const more = () => edit(add(name, { run }, rows.at(-1)?.id));
-  return [cellTable([heads], lines), button("Add a weight", more, { "data-add": run })];
+  return [cellTable([heads.map((word) => [word])], lines), button("Add a weight", more, { "data-add": run })];
 }
 
 function card(name, run) {
@@ -298,19 +299,21 @@ function renderRuns() {
 function tickList() {
   const { mounting, corrections = [], conventions: { weight_unit: unit } = {} } = state.results.answer?.document || {};
   const rows = mounting ? mounting.holes : corrections.filter(({ mass }) => mass);
-  const ticks = rows.map(({ plane, action, hole, pieces, mass, angle_deg: at, remove_at_deg: removed }, i) => {
-    const place = action === "remove" ? removed ?? at : at;
-    const what = `${pieces ?? mass.toPrecision(4)} ${unitOf(unit)} ${hole ? `in hole ${hole}` : ""} at ${degrees(place)}°`;
-    return h("label", { class: "check", key: `${plane} ${hole}` },
-      h("input", { type: "checkbox", checked: "", "data-mounted": i }), `${plane}: ${what}`);
+  const placeOf = (row) => row.remove_at_deg ?? row.angle_deg; // where it is drilled or mounted
+  const ticks = rows.map((row, i) => {
+    const what = `${row.pieces ?? row.mass.toPrecision(4)} ${unitOf(unit)} ${row.hole ? `in hole ${row.hole} ` : ""}`;
+    return h("label", { class: "check", key: `${row.plane} ${row.hole}` },
+      h("input", { type: "checkbox", checked: "", "data-mounted": i }),
+      `${row.plane}: ${row.action === "remove" ? "remove " : ""}${what}at ${degrees(placeOf(row))}°`);
   });
   const begin = () => {
-    const { plane, weight, angle, action } = data.weights.names;
+    const { run, plane, weight, angle } = data.weights.names;
+    const action = rows.some((row) => row.action === "remove") && "action"; // without it all would be added
     const mounted = rows.filter((_, i) => document.querySelector(`[data-mounted="${i}"]`).checked);
-    edit(create("check", data.runs), ...addRows("check", "check", usual()), create("check_weights", data.weights),
-      ...mounted.map((row) => add("check_weights", { run: "check", [plane]: row.plane, [weight]: `${row.mass}`,
-        ...(action && { [action]: row.action }),
-        [angle]: `${action && row.action === "remove" ? row.remove_at_deg ?? row.angle_deg : row.angle_deg}` })));
+    edit(create("check", data.runs), ...addRows("check", "check", usual()),
+      create("check_weights", { header: [run, plane, weight, angle, action].filter((one) => one) }),
+      ...mounted.map((row) => add("check_weights", { [run]: "check", [plane]: row.plane, [weight]: `${row.mass}`,
+        [angle]: `${placeOf(row)}`, ...(action && { action: row.action }) })));
   };
   return rows.length > 0 && data.weights && h("div", { key: state.results.answer.judgement },
     h("p", {}, "Mount what the answer says, run, then say what was mounted:"), ticks,

@@ -111,13 +111,16 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
 
 
 @pytest.mark.full
-def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
+@pytest.mark.parametrize("removed", [False, True])
+def test_pieces_are_ticked_and_checked(tmp_path, serve, windows, removed):
     """The pieces of the answer, one of them not mounted, then the check run, as by Kelm."""
     folder, window = Path(shutil.copytree(sample_data() / "turbo_job", tmp_path / "job")), windows[0]
     job = folder / "holes.toml"
     for name in ("check.csv", "check_weights.csv"):  # those of another job
         (folder / name).unlink()
     turned = job.read_text(encoding="utf-8").replace("first_hole_deg = 0", "first_hole_deg = 7.5")
+    if removed:
+        turned = turned.replace("holes = 12", "remove = true\nholes = 12")
     job.write_text(turned, encoding="utf-8")
     window.open(serve(job).address)
     window.wait(lambda: "hole" in window.text("#check") and not window.text("#busy"), "the tick list")
@@ -125,7 +128,7 @@ def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
     ticks = window.texts("#check .check")
     assert len(ticks) == len(holes) > 2
     for line, row in zip(ticks, holes, strict=True):
-        assert line.startswith(f"{row['plane']}: ")
+        assert line.startswith(f"{row['plane']}: {'remove ' * removed}")
         assert line.endswith(f"in hole {row['hole']} at {row['angle_deg']:g}°")
         assert round(row["angle_deg"] % 1, 6) == 0.5
     shown = window.document()
@@ -137,11 +140,10 @@ def test_pieces_are_ticked_checked_and_trimmed(tmp_path, serve, windows):
     window.push("#add-check")
     window.saved()
     window.wait(lambda: window.texts('[data-cell^="check|"]'), "the check run")
-    mounted = [
-        (row["plane"], float(row["unbalance_g_mm"]), float(row["angle_deg"]))
-        for row in rows(folder / "check_weights.csv")
-    ]
+    written = rows(folder / "check_weights.csv")
+    mounted = [(row["plane"], float(row["unbalance_g_mm"]), float(row["angle_deg"])) for row in written]
     assert mounted == [(h["plane"], h["mass"], h["angle_deg"]) for k, h in enumerate(holes) if k != 1]
+    assert {row.get("action") for row in written} == {"remove" if removed else None}
     window.type('[data-cell^="check|"]', "4.1")
     window.leave()
     window.saved()
