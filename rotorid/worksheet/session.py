@@ -136,7 +136,10 @@ class Session:
             self._asked = final
             self._publish(answer=answer, busy="")
         except Refused as error:
-            self._publish(refused=str(error), busy="")
+            why = str(error) or "; ".join(one["text"] for one in error.problems)
+            what = "trim" if refine else "pieces"
+            answer["warnings"].append(f"no {what}: {why}")
+            self._publish(answer=answer, busy="")
 
     def _problem(self, problem: dict[str, Any]) -> dict[str, Any]:
         """A problem of a file, with the cell of the page."""
