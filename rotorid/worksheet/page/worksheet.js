@@ -307,13 +307,14 @@ function tickList() {
       `${row.plane}: ${row.action === "remove" ? "remove " : ""}${what}at ${degrees(placeOf(row))}°`);
   });
   const begin = () => {
-    const { run, plane, weight, angle } = data.weights.names;
+    const { run, plane, weight: column } = data.weights.names;
+    const weight = column?.endsWith(unit) ? column : `${unit.includes("_") ? "unbalance" : "mass"}_${unit}`;
     const action = rows.some((row) => row.action === "remove") && "action"; // without it all would be added
     const mounted = rows.filter((_, i) => document.querySelector(`[data-mounted="${i}"]`).checked);
     edit(create("check", data.runs), ...addRows("check", "check", usual()),
-      create("check_weights", { header: [run, plane, weight, angle, action].filter((one) => one) }),
+      create("check_weights", { header: [run, plane, weight, "angle_deg", action].filter((one) => one) }),
       ...mounted.map((row) => add("check_weights", { [run]: "check", [plane]: row.plane, [weight]: `${row.mass}`,
-        [angle]: `${placeOf(row)}`, ...(action && { action: row.action }) })));
+        angle_deg: `${placeOf(row)}`, ...(action && { action: row.action }) })));
   };
   return rows.length > 0 && data.weights && h("div", { key: state.results.answer.judgement },
     h("p", {}, "Mount what the answer says, run, then say what was mounted:"), ticks,
