@@ -9,7 +9,7 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import decimal_numbers, excel_workbook, grid, input_file, instruments, problems, toml_file
+from rotorid.files import cells, decimal_numbers, excel_workbook, input_file, instruments, problems, toml_file
 from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
@@ -27,7 +27,7 @@ MB = 10**6
         ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
         ("how much larger a workbook unpacks", f"{excel_workbook.MOST_PACKING} times, and 10 MB"),
         ("seconds that reading a workbook takes", f"{excel_workbook.MOST_SECONDS:.0f}"),
-        ("cells of a table", f"{grid.MOST_CELLS:,}"),
+        ("cells of a table", f"{cells.MOST_CELLS:,}"),
         ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
         ("names in a list or table of a model", f"{toml_file.MOST_NAMES:,}"),
         (
