@@ -36,6 +36,7 @@ install = $(1)/bin/uv pip install -q --compile-bytecode --python $(1)/bin/python
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
+	@echo 'The same job as a page to type into: $(BIN)/rotorid worksheet demo/turbo_job/job.toml'
 
 ON_TWO_CORES = -n 2 --dist loadfile --no-loadscope-reorder
 test: $(VENV)/.dev
@@ -170,7 +171,7 @@ $(VENV)/.pip: $(CONSTRAINTS)
 	touch $@
 
 $(VENV)/.user: $(VENV)/.pip pyproject.toml
-	$(call install,$(VENV)) -e .
+	$(call install,$(VENV)) -e '.[worksheet]'
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.user

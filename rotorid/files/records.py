@@ -74,10 +74,10 @@ def read_record(
     ]
     table = problems.need(read_table(Path(path), "record", columns, problems))
     clear = not len(problems)  # otherwise a misspelt column would be called missing
-    for name, field in table.fields.items():
-        for row, expected in field.doubts.items():
+    for name in table.fields if allow_missing else ():
+        for row in np.flatnonzero(np.isnan(table.numbers(name)) & ~table.is_blank(name)):
             if table.shown(name, row).strip().casefold() not in MISSING:
-                table.complain(row, name, expected)
+                table.complain(row, name, "a number")
     t, outputs = table.numbers("t"), {name: table.numbers(name) for name in model.outputs if name in table}
     for late in np.flatnonzero(np.diff(t) <= 0) + 1:
         before = f"{table.shown('t', late - 1)} of row {table.rows[late - 1]}"

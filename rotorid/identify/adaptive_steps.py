@@ -153,7 +153,7 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
     try:
         import heyoka as hy
     except ImportError as error:
-        raise ValueError("the integrator taylor needs the extra: pip install rotorid[fast]") from error
+        raise ValueError("the integrator taylor needs heyoka: pip install heyoka numba") from error
     n, k, nu = len(model.states), len(model.parameters), len(model.inputs)
     # parameters over their sizes and these, inputs as straight lines, sizes of the states
     theta, size, level, slope, of_x = np.split(

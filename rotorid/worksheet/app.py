@@ -16,7 +16,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -25,8 +25,11 @@ from rotorid.worksheet.session import Session
 from rotorid.worksheet.workers import Refused
 
 TOKEN = "X-Rotorid-Token"
-PAGE = {"/": "index.html", "/worksheet.js": "worksheet.js", "/worksheet.css": "worksheet.css"}
-_KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
+PAGE = {
+    "/": ("index.html", "text/html"),
+    "/worksheet.js": ("worksheet.js", "text/javascript"),
+    "/worksheet.css": ("worksheet.css", "text/css"),
+}
 _LARGEST = 30_000_000
 """Bytes of a request."""
 _TOO_LARGE = f"at most {_LARGEST // 10**6} MB"
@@ -40,19 +43,16 @@ HEADERS = {
 
 
 class Guard:
-    """Refuses requests of others, and puts the same headers on every answer."""
+    """Refuses requests of others, and what is too large."""
 
-    def __init__(self, app: ASGIApp, token: str, own: str) -> None:
+    def __init__(self, app: ASGIApp, token: str, address: str) -> None:
         self.app = app
         self.token = token.encode()
-        self.own = own
+        self.address = address
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse with 403 and a sentence, or go on."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        if why := self.refusal(Request(scope)):
+        if scope["type"] == "http" and (why := self.refusal(Request(scope))):
             await JSONResponse({"error": why}, 403, HEADERS)(scope, receive, send)
             return
         size = 0
@@ -69,84 +69,19 @@ class Guard:
 
     def refusal(self, request: Request) -> str:
         """Why a request is refused; empty where it is not."""
-        if request.headers.get("host") != self.own:
+        if request.headers.get("host") != self.address:
             return "this name of the computer is not that of the worksheet"
-        if request.headers.get("origin", f"http://{self.own}") != f"http://{self.own}":
+        if request.headers.get("origin", f"http://{self.address}") != f"http://{self.address}":
             return "another page may not use the worksheet"
         if int(request.headers.get("content-length", "0")) > _LARGEST:
             return _TOO_LARGE
-        given = request.headers.get(TOKEN, "").encode()
-        if request.scope["path"] not in PAGE and not hmac.compare_digest(given, self.token):
-            return "the address lacks the token of this worksheet: open the one that the program shows"
+        token = request.headers.get(TOKEN, "").encode()
+        if request.scope["path"] not in PAGE and not hmac.compare_digest(token, self.token):
+            return "the address lacks the key of this worksheet: open the one that the program shows"
         return ""
 
 
-class Routes:
-    """What the page asks of its session, one method a route."""
-
-    def __init__(self, session: Session) -> None:
-        self.session = session
-
-    async def state(self, request: Request) -> Response:
-        """All that a window shows, as soon as it is newer than what the window has."""
-        return _json(await self.session.after(int(request.query_params.get("after", "0"))))
-
-    async def edit(self, request: Request) -> Response:
-        """Cells, rows, settings: all of them, or none."""
-        rows = self.session.files.apply((await request.json())["edits"])
-        return _json({"version": self.session.changed(), "rows": rows})
-
-    async def undo(self, request: Request) -> Response:
-        """The last edit of any window."""
-        self.session.files.undo()
-        return _json({"version": self.session.changed()})
-
-    async def redo(self, request: Request) -> Response:
-        """The last edit that was undone."""
-        self.session.files.redo()
-        return _json({"version": self.session.changed()})
-
-    async def take(self, request: Request) -> Response:
-        """Rows of a file that a person chose."""
-        given = await request.json()
-        rows = await self.session.append(given["name"], given["data"], given.get("run", ""))
-        return _json({"version": self.session.changed(), "rows": rows})
-
-    async def trial(self, request: Request) -> Response:
-        """A first trial weight."""
-        options = (await request.json())["options"]
-        about = self.session.about()
-        if not options.pop("with_job", False):
-            about["job"] = None
-        return _json(await self.session.drawing.ask("trial", **about, options=options))
-
-    async def picture(self, request: Request) -> Response:
-        """The runs of one sensor and speed, the weights, the discs."""
-        name, asked = request.path_params["name"], request.query_params
-        if name == "runs":
-            place = {key: asked[key] for key in ("speed", "sensor")}
-            return _svg(await self.session.drawing.ask("channel", **self.session.about(), **place))
-        try:
-            return _svg(await self.session.picture(name))
-        except Refused:  # the job has changed since the page saw that picture
-            return Response(status_code=204, headers=HEADERS)
-
-    async def convention(self, request: Request) -> Response:
-        """One of the four drawings: lead-with, lead-against, lag-with, lag-against."""
-        phase, _, side = request.path_params["name"].partition("-")
-        return _svg(await self.session.drawing.ask("convention", phase=phase, angles=f"{side} rotation"))
-
-    async def sheet(self, request: Request) -> Response:
-        """The balancing sheet."""
-        found = await self.session.printed("sheet", self.session.best)
-        return Response(found, media_type="text/html", headers=HEADERS)
-
-    async def whole(self, request: Request) -> Response:
-        """All tables, as the command line prints them."""
-        return PlainTextResponse(await self.session.printed("whole", self.session.best), headers=HEADERS)
-
-
-def application(session: Session, token: str, own: str, ready: Callable[[], object]) -> Starlette:
+def application(session: Session, token: str, address: str, ready: Callable[[], object]) -> Starlette:
     """The page of one job.
 
     Parameters
@@ -155,7 +90,7 @@ def application(session: Session, token: str, own: str, ready: Callable[[], obje
         The job.
     token
         That a request must have.
-    own
+    address
         Address and port, as browsers send them.
     ready
         Is called when requests can be answered.
@@ -167,47 +102,76 @@ def application(session: Session, token: str, own: str, ready: Callable[[], obje
             ready()
             yield
 
-    do = Routes(session)
-    read = {"/state": do.state, "/sheet": do.sheet, "/whole": do.whole}
-    read |= {"/picture/{name}": do.picture, "/convention/{name}": do.convention}
-    write = {"/edit": do.edit, "/undo": do.undo, "/redo": do.redo, "/import": do.take, "/trial": do.trial}
+    async def state(request: Request) -> dict[str, Any]:
+        return await session.after(int(request.query_params.get("after", "0")))
+
+    async def edit(request: Request) -> dict[str, Any]:
+        rows = session.files.apply((await request.json())["edits"])
+        return {"version": session.changed(), "rows": rows}
+
+    async def undo(request: Request) -> dict[str, Any]:
+        session.files.undo()
+        return {"version": session.changed()}
+
+    async def redo(request: Request) -> dict[str, Any]:
+        session.files.redo()
+        return {"version": session.changed()}
+
+    async def trial(request: Request) -> dict[str, Any]:
+        options = (await request.json())["options"]
+        job = session.files.job.name if options.pop("with_job", False) else None
+        return dict(await session.drawing.ask("trial", job=job, options=options))
+
+    async def runs(request: Request) -> str:
+        place = {key: request.query_params[key] for key in ("speed", "sensor")}
+        return str(await session.drawing.ask("channel", job=session.files.job.name, **place))
+
+    async def picture(request: Request) -> str:
+        return await session.drawn("picture")
+
+    async def sheet(request: Request) -> str:
+        return await session.drawn("sheet")
+
+    async def convention(request: Request) -> str:
+        phase, _, side = request.path_params["name"].partition("-")
+        return str(await session.drawing.ask("convention", phase=phase, angles=f"{side} rotation"))
+
+    seen = {"/state": state, "/sheet": sheet, "/picture/runs": runs, "/picture/answer": picture}
     routes = [
         *(Route(path, _page) for path in PAGE),
-        *(Route(path, _told(route)) for path, route in read.items()),
-        *(Route(path, _told(route), methods=["POST"]) for path, route in write.items()),
+        *(Route(path, _answer(route)) for path, route in seen.items()),
+        Route("/convention/{name}", _answer(convention)),
+        *(Route(f"/{do.__name__}", _answer(do), methods=["POST"]) for do in (edit, undo, redo, trial)),
     ]
-    return Starlette(routes=routes, middleware=[Middleware(Guard, token=token, own=own)], lifespan=lifespan)
+    guard = Middleware(Guard, token=token, address=address)
+    return Starlette(routes=routes, middleware=[guard], lifespan=lifespan)
 
 
 async def _page(request: Request) -> Response:
-    name = PAGE[request.url.path]
+    name, kind = PAGE[request.url.path]
     content = (resources("rotorid.worksheet") / "page" / name).read_bytes()
-    return Response(content, media_type=_KINDS[name.rpartition(".")[2]], headers=HEADERS)
+    return Response(content, media_type=kind, headers=HEADERS)
 
 
-def _json(told: dict[str, Any]) -> Response:
-    return JSONResponse(told, headers=HEADERS)
-
-
-def _svg(text: str) -> Response:
-    return Response(text, media_type="image/svg+xml", headers=HEADERS)
-
-
-def _told(route: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
-    """The route, with everything that is wrong as one sentence."""
+def _answer(route: Callable[[Request], Awaitable[Any]]) -> Callable[..., Any]:
+    """The route as JSON, SVG or HTML, with everything that is wrong as one sentence."""
 
     async def answered(request: Request) -> Response:
+        error: dict[str, Any]
         try:
-            return await route(request)
-        except Conflict as error:
-            told: dict[str, Any] = {"error": str(error), "now": error.now}
-            return JSONResponse(told, 409, HEADERS)
-        except Refused as error:
-            words = "\n".join([str(error), *(one["text"] for one in error.problems)])
-            return JSONResponse({"error": words.strip()}, 400, HEADERS)
-        except (KeyError, TypeError, AttributeError, RecursionError) as error:
-            return JSONResponse({"error": f"the page asked for what there is not: {error}"}, 400, HEADERS)
-        except (ValueError, OSError, ClientDisconnect) as error:  # who has gone reads no answer
-            return JSONResponse({"error": str(error)}, 400, HEADERS)
+            answer = await route(request)
+            if isinstance(answer, dict):
+                return JSONResponse(answer, headers=HEADERS)
+            kind = "image/svg+xml" if answer.startswith("<svg") else "text/html"
+            return Response(answer, media_type=kind, headers=HEADERS)
+        except Conflict as conflict:
+            return JSONResponse({"error": str(conflict), "now": conflict.now}, 409, HEADERS)
+        except Refused as refused:
+            error = {"error": "\n".join([str(refused), *(one["text"] for one in refused.problems)]).strip()}
+        except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
+            error = {"error": f"the page asked for what there is not: {wrong}"}
+        except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
+            error = {"error": str(wrong)}
+        return JSONResponse(error, 400, HEADERS)
 
     return answered

@@ -9,7 +9,6 @@ line calls.
 
 from __future__ import annotations
 
-import base64
 import errno
 import json
 import math
@@ -28,12 +27,9 @@ if TYPE_CHECKING:
     from rotorid.report.outcome import Outcome
     from rotorid.tables import Job
 
-KINDS: Mapping[str, Mapping[str, Any]] = {"answer": {}, "pieces": {"split": True}, "trim": {"refine": True}}
-"""Balances of one job, by the options of `rotorid balance`."""
-UNCHECKED = " before the check run"
-"""Behind a kind: as if there were no check run, which somebody is typing."""
-_kept: dict[str, tuple[int, Balance, list[str]]] = {}
-"""The newest of each kind: version of the files, result (for pictures and sheets), what was warned of."""
+NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
+_kept: dict[str, tuple[Balance, list[str]]] = {}
+"""Newest balances by what was asked for: the result (for pictures and sheets), what was warned of."""
 _read: dict[str, int] = {}
 """Names of the files that were read, and when each was changed before that (ns)."""
 
@@ -71,19 +67,24 @@ def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]
         return {"refused": str(error)}
 
 
-def _balance(job: str, version: int, kind: str) -> Balance:
-    """The job as it is now, balanced; once for each version of its files."""
+def _balance(job: str, asked: dict[str, Any]) -> tuple[Balance, list[str]]:
+    """The job as it is now, balanced once for each version of its files, and what reading it warned of."""
     from rotorid.base.answer import kinds
     from rotorid.commands import BalanceOptions, balance
 
-    if kind not in _kept or _kept[kind][0] != version:
-        options = BalanceOptions(**KINDS[kind.removesuffix(UNCHECKED)])
+    name = json.dumps(asked)
+    if name not in _kept:
+        options = BalanceOptions(split=asked["split"], refine=asked["refine"])
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            found = balance(_without_check(Path(job)) if kind.endswith(UNCHECKED) else Path(job), options)
-        said = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
-        _kept[kind] = version, found, said
-    return _kept[kind][1]
+            made = balance(Path(job) if asked["checked"] else _without_check(Path(job)), options)
+        if len(_kept) > 1:
+            _kept.clear()
+        _kept[name] = (
+            made,
+            kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)),
+        )
+    return _kept[name]
 
 
 def _without_check(path: Path) -> Job:
@@ -100,44 +101,57 @@ def _without_check(path: Path) -> Job:
     return job_of(written, Overrides(), problems)
 
 
-def told(outcome: Outcome) -> dict[str, Any]:
+def in_words(outcome: Outcome) -> dict[str, Any]:
     """The document of `--json`, and what a person reads."""
     answer = outcome.answer
-    words = {"judgement": answer.judgement, "found": answer.found}
     return {
-        **words,
+        "judgement": answer.judgement,
+        "lines": answer.found,
         "warnings": list(answer.warnings),
         "notes": list(answer.notes),
         "document": outcome.document,
     }
 
 
-def balanced(job: str, version: int, kind: str) -> dict[str, Any]:
-    """Weights, pieces in holes, or a trim; what was warned of when the files were read stands first."""
-    found, said = told(_balance(job, version, kind)), _kept[kind][2]
-    if kind.endswith(UNCHECKED):
-        said = ["the check run is not finished: the answer is that of the runs before it", *said]
-    return {**found, "warnings": [*said, *found["warnings"]]}
+def balanced(job: str, asked: dict[str, Any]) -> dict[str, Any]:
+    """Weights, pieces in holes, a trim; `within` is what 95 % of such weights keep to, mass and degrees.
+
+    What was warned of when the files were read stands first among the warnings.
+    """
+    import numpy as np
+
+    made, warned = _balance(job, asked)
+    answer, (sizes, angles) = in_words(made), made.result.half_widths()
+    scale = made.job.trials.labels.weight_scale, 180 / math.pi
+    within = [
+        {
+            key: value if math.isfinite(value) else None
+            for key, value in zip(("mass", "angle_deg"), row, strict=True)
+        }
+        for row in (np.column_stack([sizes, angles]) * scale).tolist()
+    ]
+    first = [] if asked["checked"] else [NOT_FINISHED]
+    return {**answer, "warnings": [*first, *warned, *answer["warnings"]], "within": within}
 
 
-def so_far(job: str, version: int) -> dict[str, Any]:
+def so_far(job: str) -> dict[str, Any]:
     """What the finished rows of a job say."""
     from rotorid.worksheet.runs_so_far import runs_so_far
 
     return runs_so_far(Path(job)).to_dict()
 
 
-def channel(job: str, version: int, speed: str, sensor: str) -> str:
+def channel(job: str, speed: str, sensor: str) -> str:
     """Polar picture of the runs of one sensor at one speed."""
     from rotorid.worksheet.runs_so_far import runs_so_far
 
     return _svg(runs_so_far(Path(job)).figure(speed, sensor), f"Runs of {sensor} at {speed}")
 
 
-def picture(job: str, version: int, kind: str) -> str:
+def picture(job: str, asked: dict[str, Any]) -> str:
     """Weights and readings before and after, or discs with pieces in their holes."""
-    found = _balance(job, version, kind)
-    return _svg(found.figure(), found.answer.judgement)
+    made = _balance(job, asked)[0]
+    return _svg(made.figure(), made.answer.judgement)
 
 
 def _svg(figure: Figure, title: str) -> str:
@@ -146,23 +160,19 @@ def _svg(figure: Figure, title: str) -> str:
     return str(inline_svg(figure, title))
 
 
-def sheet(job: str, version: int, kind: str) -> str:
+def sheet(job: str, asked: dict[str, Any]) -> str:
     """The balancing sheet."""
-    return _balance(job, version, kind).sheet().decode()
+    return _balance(job, asked)[0].sheet().decode()
 
 
-def whole(job: str, version: int, kind: str) -> str:
-    """All tables."""
-    return _balance(job, version, kind).answer.whole()
-
-
-def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, Any]:
+def trial(job: str | None, options: dict[str, Any]) -> dict[str, Any]:
     """A first trial weight, with the job's coefficients or from the load alone."""
     from rotorid.commands import TrialWeightOptions, trial_weight
 
-    found = told(made := trial_weight(None if job is None else Path(job), TrialWeightOptions(**options)))
-    to_draw = all(one["angle_deg"] is not None for one in found["document"]["trial_weights"])
-    return {**found, "picture": _svg(made.figure(), found["judgement"]) if to_draw else ""}
+    made = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
+    answer = in_words(made)
+    to_draw = all(one["angle_deg"] is not None for one in answer["document"]["trial_weights"])
+    return {**answer, "picture": _svg(made.figure(), answer["judgement"]) if to_draw else ""}
 
 
 def convention(phase: str, angles: str) -> str:
@@ -178,36 +188,8 @@ def convention(phase: str, angles: str) -> str:
     return turning + _svg(phase_figure(labels), f"A reading over time: {title}")
 
 
-def rows(name: str, data: str, phase: str) -> dict[str, Any]:
-    """Header and rows of a runs table that is no file of the job, also as an instrument exports it.
-
-    A file that says that its phases are others than the job's, `phase`, is refused.
-    """
-    from balancing import Labels
-    from rotorid.files.cells import show
-    from rotorid.files.conventions import Conventions, as_phase
-    from rotorid.files.input_file import each_file_once
-    from rotorid.files.layout import read_runs_grid
-    from rotorid.files.problems import Problems
-
-    problems, path = Problems(), Path(name)
-    conventions = Conventions(Labels(phase=as_phase(phase)))
-    with each_file_once({path: base64.b64decode(data)}):
-        grid = problems.need(read_runs_grid(path, conventions, problems))
-    problems.stop()
-    return {"header": list(grid.header), "rows": [[show(cell) for cell in cells] for _, cells in grid.rows]}
-
-
 REQUESTS: Mapping[str, Callable[..., Any]] = {
-    "so_far": so_far,
-    "balanced": balanced,
-    "channel": channel,
-    "picture": picture,
-    "sheet": sheet,
-    "whole": whole,
-    "trial": trial,
-    "convention": convention,
-    "rows": rows,
+    one.__name__: one for one in (so_far, balanced, channel, picture, sheet, trial, convention)
 }
 
 if __name__ == "__main__":

@@ -1,34 +1,31 @@
-"""A job on disk: single cells changed in its files, undo and redo, changes from outside noticed."""
+"""A job in memory, whole files written at each change; undo, changes of other programs noticed."""
 
 from __future__ import annotations
 
 import itertools
 import os
 import re
-import time
-import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from rotorid.base.text import listing
-from rotorid.files.cells import clean
+from rotorid.files.cells import Grid, clean
 from rotorid.files.excel_workbook import SUFFIXES, is_workbook
 from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
+from rotorid.files.job_excel import open_job
 from rotorid.files.job_models import named_tables
-from rotorid.files.problems import InputError
+from rotorid.files.problems import InputError, Problems
 from rotorid.files.table_writing import write_files
-from rotorid.worksheet.settings_cells import changed, setting, settings_in
-from rotorid.worksheet.text_cells import KEYS, Cells, TextCells, kept_ids
-from rotorid.worksheet.workbook_cells import WorkbookVersion
+from rotorid.worksheet.job_settings import setting, settings_in, with_setting
+from rotorid.worksheet.text_table import Table, read_table, shown
 
+KEYS = ("runs", "weights", "check", "check_weights")
+"""Tables that are shown."""
 MOST_STEPS, MOST_TRIES = 200, 5
-FRESH = 2.0
-"""Seconds after a change in which another one may leave a file's time as it is."""
 _NONE: Mapping[str, int] = {}
-Contents = Mapping[Path, bytes | None]
-"""What files hold; None: there is no such file."""
 
 
 class Conflict(ValueError):
@@ -43,88 +40,37 @@ class _OutsideError(Exception):
     """A file was changed while it was about to be replaced."""
 
 
-class _Step(NamedTuple):
-    """What changed files hold before or after a step, and the ids of their rows."""
+@dataclass(frozen=True, eq=False)
+class Version:
+    """A job at one moment; an edit makes the next.
 
-    data: Contents
-    ids: Mapping[str, list[str]]
+    Attributes
+    ----------
+    text
+        The job file; None before there is one.
+    settings, tables
+        What it says, and its tables by `KEYS`.
+    read_only
+        Why nothing can be edited, else empty.
+    """
 
+    text: bytes | None = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    read_only: str = ""
 
-class FilesVersion:
-    """A job of files as `read` gives them; edits change this copy, not the files."""
+    def with_table(self, key: str, table: Table) -> Version:
+        """With another table."""
+        return replace(self, tables={**self.tables, key: table})
 
-    def __init__(self, job: Path, read: Callable[[Path], bytes | None]) -> None:
-        self.job, self._read = job, read
-        self.data: dict[Path, bytes | None] = {job: read(job)}
-        self.tables: dict[str, Cells] = {}
-        self.paths: dict[str, Path] = {}
-        self.settings: dict[str, Any] = {}
-        self.read_only, self._text = "", self.data[job] or b""
-        if self.data[job] is None:  # its first edit writes down the names of the tables that are there
-            self.data |= {path: read(path) for path in (job.parent / f"{key}.csv" for key in KEYS[:2])}
-            names = [path.stem for path, data in self.data.items() if data is not None]
-            self._text = "".join(f'{name} = "{name}.csv"\n' for name in names if "runs" in names).encode()
-        try:
-            self.settings = settings_in(self._text)
-        except ValueError as error:
-            self.read_only = f"{job.name} cannot be read, correct it there: {error}"
-        for key, name in (*named_tables(self.settings).items(), ("rotor", self.settings.get("rotor"))):
-            if isinstance(name, str) and name.isprintable():
-                self._open(key, job.parent / name)
-
-    def _open(self, key: str, path: Path) -> None:
-        others = [other for other in self.tables if self.paths.get(other) == path]
-        try:
-            self.data[path], self.paths[key] = None, path  # while it cannot be read
-            self.data[path] = self._read(path)
-            if others:
-                raise ValueError(f"{path.name} is the table of {others[0]}, too: edit it there")
-            if path.suffix.lower() in (".toml", *SUFFIXES):
-                raise ValueError(
-                    f"{path.name} is no text table: it is read as it is, edit it where it comes from"
-                )
-            if key in KEYS and (data := self.data[path]):
-                self.tables[key] = TextCells(path, data, key)
-        except ValueError as error:
-            if key in KEYS:
-                self.tables[key] = Cells(path.name, str(error))
-
-    def put_setting(self, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
-        """Change, add or (None) remove a setting."""
-        self._text = changed(self._text, key, new)
-        self.settings = settings_in(self._text)
-
-    def create(self, key: str, header: Sequence[str]) -> None:
-        """Begin a table in a file that the job names then."""
-        path = self.paths.get(key)
-        if path is None:
-            paths = (
-                self.job.with_name(f"{key}{end}.csv") for end in ("", *(f"_{n}" for n in range(2, 1000)))
-            )
-            path = next(path for path in paths if not path.exists())
-            self.put_setting([key], path.name)
-        separators = [table.separator for table in self.tables.values() if isinstance(table, TextCells)]
-        # with a mark, because Excel takes a file without it for its own 8-bit encoding
-        line = (separators or [","])[0].join(header)
-        self.tables[key] = TextCells(path, f"{line}\n".encode("utf-8-sig"), key)
-        self.paths[key] = path
-        self.data.setdefault(path, None)
-        if self.tables[key].read_only:
-            raise ValueError(self.tables[key].read_only)
-
-    def written(self) -> dict[Path, bytes]:
-        """The files that are not as they were."""
-        texts = {key: table for key, table in self.tables.items() if isinstance(table, TextCells)}
-        files = {self.paths[key]: table.data() for key, table in texts.items() if not table.read_only}
-        files[self.job] = self._text
-        return {path: data for path, data in files.items() if data != (self.data[path] or b"")}
-
-
-Version = FilesVersion | WorkbookVersion
+    def with_setting(self, key: Sequence[str], new: Any) -> Version:  # noqa: ANN401
+        """With another setting, None: without it."""
+        text = with_setting(self.text or b"", key, new)
+        return replace(self, text=text, settings=settings_in(text))
 
 
 class JobFiles:
-    """The job that a worksheet shows: its files are read and edited in place.
+    """The job that a worksheet shows.
 
     Parameters
     ----------
@@ -134,19 +80,15 @@ class JobFiles:
 
     def __init__(self, given: Path) -> None:
         self.job = _job_in(Path(given)).absolute()
-        self._others: dict[str, int] = {}
-        self._ids = itertools.count(1)
-        self._known: dict[str, Cells] = {}
+        self._ids = map(str, itertools.count(1))
+        self._disk: dict[Path, bytes | None] = {}
         self._stamps: dict[Path, object] = {}
+        self._others: dict[str, int] = {}
         self._noticed: list[str] = []
-        self._done: list[tuple[_Step, _Step]] = []
-        self._undone: list[tuple[_Step, _Step]] = []
-        self._now = self._version()
-        self._known = dict(self._now.tables)
-
-    def files(self) -> list[Path]:
-        """The job and its tables that exist."""
-        return [path for path, data in self._now.data.items() if data is not None]
+        self._tables: dict[str, Table] = {}
+        self._now = self._read_job()
+        self._done: list[Version] = []
+        self._undone: list[Version] = []
 
     def state(self) -> dict[str, Any]:
         """What the page shows, in types of JSON."""
@@ -154,41 +96,47 @@ class JobFiles:
         return {
             "job": self.job.name,
             "folder": self.job.parent.name,
-            "exists": now.data[self.job] is not None,
-            "kind": "workbook" if is_workbook(self.job) else "files",
+            "exists": now.text is not None,
             "read_only": now.read_only,
-            "tables": {key: _shown(now.tables[key], now.read_only) for key in KEYS if key in now.tables},
+            "tables": {
+                key: {
+                    "file": table.path.name,
+                    "header": list(table.header),
+                    "rows": [
+                        {"id": one.id, "row": n, "cells": list(one.cells or ())} for n, one in table.rows()
+                    ],
+                    "read_only": now.read_only or table.read_only,
+                }
+                for key, table in now.tables.items()
+            },
             "settings": now.settings,
             "undo": bool(self._done),
             "redo": bool(self._undone),
         }
 
-    def place(self, file: str, row: int) -> tuple[str, str] | None:
+    def place(self, file: str, row: int | None) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
         for key, table in self._now.tables.items():
-            pair = self._now.paths.get(key, self.job), self.job.parent / file
-            if Path(file).name == table.name and len({os.path.realpath(path.parent) for path in pair}) == 1:
-                return next(((key, table.ids[i]) for i, (n, _) in table.rows.items() if n == row), None)
+            if self.job.parent / file == table.path:
+                return next(((key, line.id) for n, line in table.rows() if n == row), None)
         return None
 
     def look(self, others: Mapping[str, int] = _NONE) -> list[str]:
         """Names of the files that another program has changed since the last look; of others by the time."""
-        for path, known in self._now.data.items():
+        for path, held in self._disk.items():
             stamp = _stamp(path)
-            if stamp is None or stamp != self._stamps.get(path):
-                with suppress(ValueError):  # another program is at the job
-                    try:
-                        data = self._read(path)
-                    except ValueError:
-                        data = known if path == self.job else None  # as a version has it
-                    if data != known:
-                        self._settle({}, {}, {})
-                        break
-                    self._stamps[path] = stamp
+            if stamp != self._stamps.get(path):
+                data = None
+                with suppress(ValueError):
+                    data = self._read(path)
+                if data != held:
+                    self._reload()
+                    break
+                self._stamps[path] = stamp
         for name, read in others.items():
             path = self.job.parent / name
             changed = path.stat().st_mtime_ns if path.exists() else 0
-            if path not in self._now.data and changed != self._others.get(name, read):
+            if path not in self._disk and changed != self._others.get(name, read):
                 self._noticed.append(path.name)
             self._others[name] = changed
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
@@ -205,46 +153,40 @@ class JobFiles:
             If an edit is impossible, or a file cannot be written.
         """
         for _ in range(MOST_TRIES):
-            version = self._version()
-            before = _Step(
-                dict(version.data), {key: list(table.ids) for key, table in version.tables.items()}
-            )
+            version, made = self._now, []
             try:
-                made = [self._edit(version, edit) for edit in edits]
+                for edit in edits:
+                    version, row_id = self._edited(version, edit)
+                    made.append(row_id)
             except (LookupError, TypeError, AttributeError) as error:
                 raise ValueError(f"an edit of an unknown form: {error}") from error
-            after = _Step(version.written(), {key: table.ids for key, table in version.tables.items()})
-            try:
-                self._write(after.data, before.data)
-            except _OutsideError:
-                continue
-            self._settle(before.data, after.data, after.ids)
-            if after.data:
-                before = before._replace(data={path: before.data.get(path) for path in after.data})
-                self._done, self._undone = [*self._done[1 - MOST_STEPS :], (before, after)], []
-            return made
+            before = self._now
+            with suppress(_OutsideError):
+                if self._write(version):
+                    self._done, self._undone = [*self._done[1 - MOST_STEPS :], before], []
+                return made
+            self._reload()
         raise ValueError("another program goes on changing the files of the job: try again in a moment")
 
     def undo(self) -> None:
-        """Take the last step back; ValueError where that is impossible."""
-        self._go(self._done, self._undone, "undo", 0)
+        """Go back to the version before the last step; ValueError where that is impossible."""
+        self._go(self._done, self._undone, "undo")
 
     def redo(self) -> None:
-        """Do the last step that was undone again; ValueError where that is impossible."""
-        self._go(self._undone, self._done, "redo", 1)
+        """Go forth to the version that was undone; ValueError where that is impossible."""
+        self._go(self._undone, self._done, "redo")
 
-    def _go(
-        self, steps: list[tuple[_Step, _Step]], others: list[tuple[_Step, _Step]], word: str, to: int
-    ) -> None:
-        if not steps:
+    def _go(self, versions: list[Version], others: list[Version], word: str) -> None:
+        if not versions:
             raise ValueError(f"there is nothing to {word}")
-        here, there = steps[-1][1 - to], steps[-1][to]
+        before = self._now
         try:
-            self._write(there.data, here.data)
+            self._write(versions[-1])
         except _OutsideError as error:
+            self._reload()
             raise ValueError(f"{error} was changed by another program after that step: no {word}") from None
-        self._settle(here.data, there.data, there.ids)
-        others.append(steps.pop())
+        versions.pop()
+        others.append(before)
 
     def _read(self, path: Path) -> bytes | None:
         if path != self.job and not _is_inside(path, self.job):
@@ -256,115 +198,169 @@ class JobFiles:
         except OSError as error:
             raise ValueError(f"{path.name} cannot be read ({error.strerror or error})") from error
 
-    def _version(self, files: Contents | None = None, ids: Mapping[str, list[str]] | None = None) -> Version:
-        """The job as it is on disk; `ids` of tables in `files`, which have just been written, are known."""
-        version = (WorkbookVersion if is_workbook(self.job) else FilesVersion)(self.job, self._read)
-        for key, table in version.tables.items():
-            known = (ids or {}).get(key, []) if version.paths.get(key) in (files or {}) else []
-            fits = len(known) == len(table.lines) and all(known)
-            table.ids = list(known) if fits else kept_ids(self._known.get(key), table.lines, self._ids)
-        return version
+    def _read_job(self) -> Version:
+        """The job as it is on disk."""
+        job, self._disk = self.job, {}
+        text = None
+        try:
+            text = self._disk[job] = self._read(job)
+            version = self._read_workbook() if is_workbook(job) else self._read_files(text)
+        except InputError as error:
+            version = Version(text, read_only=str(error))
+        except ValueError as error:
+            self._disk.setdefault(job, None)
+            version = Version(text or b"", read_only=f"{job.name} cannot be read, correct it there: {error}")
+        pairs = version.tables.items()
+        tables = {key: table.with_ids(self._tables.get(key), self._ids) for key, table in pairs}
+        self._tables |= {key: table for key, table in tables.items() if table.lines}
+        return replace(version, tables=tables)
 
-    def _settle(self, known: Contents, files: Contents, ids: Mapping[str, list[str]]) -> None:
-        """Take what is on disk, where `files` replaced `known`; notice what another program has changed."""
-        was = self._now.data
-        self._now = self._version(files, ids)
-        self._known |= {key: table for key, table in self._now.tables.items() if table.lines}
-        expected = {**self._now.data, **was, **known, **files}
-        outside = [path for path, data in known.items() if data != was.get(path, data)]
-        outside += [path for path, data in self._now.data.items() if data != expected[path]]
-        self._noticed += [path.name for path in outside]
+    def _read_files(self, text: bytes | None) -> Version:
+        folder, tables = self.job.parent, {}
+        settings = settings_in(text or b"")
+        if text is None:  # its first edit writes down the names of the tables that are there
+            settings = {key: f"{key}.csv" for key in KEYS[:2] if (folder / f"{key}.csv").exists()}
+            text = "".join(f'{key} = "{name}"\n' for key, name in settings.items()).encode() or None
+        for key, name in (*named_tables(settings).items(), ("rotor", settings.get("rotor"))):
+            if not isinstance(name, str) or not name.isprintable():
+                continue
+            path = folder / name
+            twice = path in self._disk
+            try:
+                self._disk[path] = None  # while it cannot be read
+                data = self._disk[path] = self._read(path)
+                if twice or path.suffix.lower() in (".toml", *SUFFIXES):
+                    raise ValueError(f"{name} is no table of its own: edit it where it comes from")
+                if key in KEYS and data:
+                    tables[key] = read_table(path, key, data)
+            except ValueError as error:
+                if key in KEYS:
+                    tables[key] = Table(path, read_only=str(error))
+        return Version(text, settings, tables)
 
-    def _write(self, files: Contents, known: Contents) -> None:
-        """Replace files, if they still hold what is known of them; None removes one."""
+    def _read_workbook(self) -> Version:
+        """A job in sheets, which are only shown."""
+        why, problems = f"edit {self.job.name} in Excel: what is saved there appears here", Problems()
+        written = open_job(self.job, problems)
+        tables = {
+            key: replace(shown(self.job.parent / grid.source, key, grid), read_only=why)
+            for key in KEYS
+            if isinstance(grid := written.tables.get(key), Grid)
+        }
+        return Version(self._disk[self.job], written.settings, tables, why)
+
+    def _reload(self) -> None:
+        """Take what is on disk; what another program has changed is noticed, and ends undo."""
+        before = self._disk
+        self._now, self._done, self._undone = self._read_job(), [], []
+        both = [path for path in before if path in self._disk]
+        self._noticed += [path.name for path in both if self._disk[path] != before[path]]
+
+    def _files(self, version: Version) -> dict[Path, bytes | None]:
+        tables = version.tables.values()
+        return {self.job: version.text, **{one.path: one.data() for one in tables if not one.read_only}}
+
+    def _write(self, version: Version) -> bool:
+        """Make the files those of a version; whether any was another."""
+        new, old = self._files(version), self._files(self._now)
+        files = {path: data for path, data in new.items() if path not in old or data != old[path]}
+        files |= dict.fromkeys(old.keys() - new.keys())
+        if not files:
+            return False
         for path in files:
             if not _is_inside(path, self.job):
                 raise ValueError(f"{path.name} is not in the folder of the job")
             for name, program in ((f"~${path.name}", "Excel"), (f".~lock.{path.name}#", "LibreOffice")):
                 if path.with_name(name).exists():
                     raise ValueError(_is_open(path, program, f" (if it is not, delete {name})"))
-
-        def last_look() -> None:
-            for path in files:
-                if self._read(path) != known.get(path):
-                    raise _OutsideError(path.name)
-
-        kept = {path: data for path, data in files.items() if data is not None}
         try:
-            last_look()
-            write_files(kept, last_look)
-            for path in files.keys() - kept.keys():
-                path.unlink(missing_ok=True)
+            self._replace(files)
         except (InputError, PermissionError) as error:
-            self._put_back(files, known)
+            with suppress(InputError, OSError, _OutsideError):
+                self._put_back(files)
             cause = error.__cause__ or error
             failed = Path(error.problems[0].file if isinstance(error, InputError) else error.filename)
             if isinstance(cause, PermissionError):
                 raise ValueError(_is_open(failed, "Excel", " or protected")) from error
             raise ValueError(f"{failed.name} is not written: {getattr(cause, 'strerror', cause)}") from error
+        self._disk |= files
+        self._now, self._tables = version, {**self._tables, **version.tables}
+        return True
 
-    def _put_back(self, files: Contents, known: Contents) -> None:
+    def _replace(self, files: Mapping[Path, bytes | None]) -> None:
+        def last_look() -> None:
+            for path in files:
+                if self._read(path) != self._disk.get(path):
+                    raise _OutsideError(path.name)
+
+        last_look()
+        write_files({path: data for path, data in files.items() if data is not None}, last_look)
+        for path, data in files.items():
+            if data is None:
+                path.unlink(missing_ok=True)
+
+    def _put_back(self, files: Mapping[Path, bytes | None]) -> None:
         """What a step had written or removed before it failed."""
-        done = [path for path, data in files.items() if data == self._read(path) != known.get(path)]
-        write_files({path: data for path in done if (data := known.get(path)) is not None})
+        done = [path for path, data in files.items() if data == self._read(path) != self._disk.get(path)]
+        write_files({path: data for path in done if (data := self._disk.get(path)) is not None})
         for path in done:
-            if known.get(path) is None:
+            if self._disk.get(path) is None:
                 path.unlink()
 
-    def _edit(self, version: Version, edit: Mapping[str, Any]) -> str | None:
+    def _edited(self, version: Version, edit: Mapping[str, Any]) -> tuple[Version, str | None]:
         if version.read_only:
             raise ValueError(version.read_only)
         if "key" in edit:
             key, new = [str(part) for part in edit["key"]], edit["new"]
-            if not _is_done(setting(version.settings, key), new, edit, ".".join(key)):
-                version.put_setting(key, new)
-            return None
+            done = _is_done(setting(version.settings, key), new, edit, ".".join(key))
+            return version if done else version.with_setting(key, new), None
         if "create" in edit:
-            known = edit["create"] in KEYS and edit["create"] not in version.tables
-            if not known or not all(re.fullmatch(r"\w+", name) for name in edit["header"]):
-                raise ValueError(
-                    f"a table {edit['create']!r} cannot be made: there is one, or none of this name"
-                )
-            version.create(edit["create"], edit["header"])
-            table = version.tables[edit["create"]]
-            table.ids = kept_ids(None, table.lines, self._ids)
-            return None
+            return self._with_new_table(version, edit["create"], edit["header"]), None
         table = version.tables[edit["table"]]
         if table.read_only:
             raise ValueError(table.read_only)
         if "cells" in edit:
-            row_id, after = str(next(self._ids)), table.index(edit.get("after"))
+            row_id = next(self._ids)
             cells = {name: str(text) for name, text in edit["cells"].items()}
-            table.insert(table.end if after is None else after, cells, row_id)
-            return row_id
-        index = table.index(edit.get("row") or edit["delete"])
-        if index is None:
-            raise Conflict(f"a row of {table.name} is not there any more", None)
-        now = table.cells(index)
+            return version.with_table(edit["table"], table.with_row(edit.get("after"), cells, row_id)), row_id
+        line = table.row(edit.get("row") or edit["delete"])
+        if line is None or line.cells is None:
+            raise Conflict(f"a row of {table.path.name} is not there any more", None)
         if "delete" in edit:
-            _is_done(now, None, edit, f"a row of {table.name}")
-            table.delete(index)
-            return None
-        place, column, new = table.column(edit["column"]), edit["column"], clean(str(edit["new"]))
-        said = {"old": clean(str(edit["old"]))} if "old" in edit else {}
-        if not _is_done(now[place], new, said, f"{column} in a row of {table.name}"):
-            table.put(index, column, new)
-        return None
+            expected: dict[str, Any] = {"old": tuple(edit["old"])} if "old" in edit else {}
+            _is_done(line.cells, None, expected, f"a row of {table.path.name}")
+            return version.with_table(edit["table"], table.without(line)), None
+        column, new = edit["column"], clean(str(edit["new"]))
+        old = {"old": clean(str(edit["old"]))} if "old" in edit else {}
+        now = line.cells[table.column(column)]
+        if not _is_done(now, new, old, f"{column} in a row of {table.path.name}"):
+            version = version.with_table(edit["table"], table.with_cells(line, {column: new}))
+        return version, None
+
+    def _with_new_table(self, version: Version, key: str, header: Sequence[str]) -> Version:
+        """Begin a table in a file that the job names then."""
+        if key not in KEYS or key in version.tables or not all(re.fullmatch(r"\w+", one) for one in header):
+            raise ValueError(f"a table {key!r} cannot be made: there is one, or none of this name")
+        name = named_tables(version.settings).get(key)
+        if name is None:
+            names = (f"{key}{end}.csv" for end in ("", *(f"_{n}" for n in range(2, 1000))))
+            name = next(name for name in names if not self.job.with_name(name).exists())
+            version = version.with_setting([key], name)
+        separators = [one.separator for one in version.tables.values() if one.lines]
+        line = (separators or [","])[0].join(header)
+        # with a mark, because Excel takes a file without it for its own 8-bit encoding
+        made = read_table(self.job.with_name(name), key, f"{line}\n".encode("utf-8-sig"))
+        if made.read_only:
+            raise ValueError(made.read_only)
+        return version.with_table(key, made.with_ids(None, self._ids))
 
 
 def _is_done(now: Any, new: Any, edit: Mapping[str, Any], what: str) -> bool:  # noqa: ANN401
     """Whether a value is the new one already; Conflict if it is not the old one either."""
     if now != new and now != edit.get("old", now):
-        raise Conflict(
-            f"{what} was changed meanwhile: {'nothing' if now is None else now!r} is there now", now
-        )
+        there = "nothing" if now is None else repr(now)
+        raise Conflict(f"{what} was changed meanwhile: {there} is there now", now)
     return bool(now == new)
-
-
-def _shown(table: Cells, read_only: str) -> dict[str, Any]:
-    rows = [{"id": table.ids[i], "row": number, "cells": cells} for i, (number, cells) in table.rows.items()]
-    why = read_only or table.read_only
-    return {"file": table.name, "header": list(table.header), "rows": rows, "read_only": why}
 
 
 def _is_open(path: Path, program: str, hint: str) -> str:
@@ -375,14 +371,13 @@ def _is_inside(path: Path, job: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(job.parent))
 
 
-def _stamp(path: Path) -> object:
-    """What tells that a file is as it was; None where nothing does."""
+def _stamp(path: Path) -> tuple[int, ...]:
+    """What tells that a file is as it was."""
     try:
-        found = path.stat()
+        at = path.stat()
     except OSError:
         return ()
-    old = time.time() - found.st_mtime > FRESH
-    return (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino) if old else None
+    return at.st_mtime_ns, at.st_ctime_ns, at.st_size, at.st_ino
 
 
 def _job_in(given: Path) -> Path:
@@ -394,19 +389,16 @@ def _job_in(given: Path) -> Path:
         if given.suffix.lower() not in (".toml", *SUFFIXES) or not there:
             raise ValueError(f"{given}: expected a folder, or a job (.toml or .xlsx) that exists")
         return given
-    found = [path for path in sorted(given.iterdir()) if path.name[0] not in "~." and _is_job(path)]
-    if len(found) > 1:
+    jobs = [path for path in sorted(given.glob("*.toml")) if path.name[0] != "." and _is_job(path)]
+    if len(jobs) > 1:
         raise ValueError(
-            f"{given} holds {listing([path.name for path in found], 'and')}: name the one to open"
+            f"{given} holds {listing([path.name for path in jobs], 'and')}: name the one to open"
         )
-    return found[0] if found else given / "job.toml"
+    return jobs[0] if jobs else given / "job.toml"
 
 
 def _is_job(path: Path) -> bool:
     try:
-        if path.suffix.lower() == ".toml":
-            return isinstance(settings_in(file_content(path)).get("runs"), str)
-        with zipfile.ZipFile(path) as archive:
-            return bool(re.search(rb'(?i)<sheet [^>]*name="runs"', archive.read("xl/workbook.xml")))
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        return isinstance(settings_in(file_content(path)).get("runs"), str)
+    except (OSError, ValueError):
         return False

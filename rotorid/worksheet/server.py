@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import logging
+import os
 import secrets
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
 HOST = "127.0.0.1"
+FIRST_PORT, PORTS = 49152, 16384
+"""Ports that nobody else has claimed: each job has one of its own, where it is free."""
 
 
-def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
+def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
     """Serve the page of a job until it is interrupted.
 
     Parameters
@@ -20,8 +26,8 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
     job
         A job, or a folder for one.
     port
-        Of 127.0.0.1; 0: any that is free.
-    told
+        Of 127.0.0.1; 0: that of the job, or any that is free.
+    show
         Gets the address as soon as it can be opened.
 
     Raises
@@ -40,7 +46,10 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
     from rotorid.worksheet.job_files import JobFiles
     from rotorid.worksheet.session import Session
 
-    session, token = Session(JobFiles(job)), secrets.token_urlsafe(24)
+    session = Session(JobFiles(job))
+    digest = hmac.new(_secret(), str(session.files.job).encode(), hashlib.sha256)
+    token = digest.hexdigest()[:32]
+    usual = FIRST_PORT + int.from_bytes(digest.digest()[16:20]) % PORTS
 
     class Server(uvicorn.Server):
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
@@ -48,15 +57,35 @@ def serve(job: Path, port: int, told: Callable[[str], object]) -> None:
             super().handle_exit(sig, frame)
 
     with socket.socket() as listening:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if os.name == "posix":  # elsewhere it would let two programs have one port
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((HOST, port))
+            listening.bind((HOST, port or usual))
         except OSError as error:
-            raise ValueError(f"port {port} of {HOST} cannot be used: {error.strerror}") from error
+            if port:
+                raise ValueError(f"port {port} of {HOST} cannot be used: {error.strerror}") from error
+            listening.bind((HOST, 0))
         listening.listen()
-        own = f"{HOST}:{listening.getsockname()[1]}"
-        app = application(session, token, own, lambda: told(f"http://{own}/#{token}"))
+        address = f"{HOST}:{listening.getsockname()[1]}"
+        app = application(session, token, address, lambda: show(f"http://{address}/#{token}"))
         # a worker that Ctrl+C finds half started may be reaped by two; the program ends it anyway
         logging.getLogger("asyncio").setLevel(logging.ERROR)
         config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=1)
         Server(config).run(sockets=[listening])
+
+
+def _secret() -> bytes:
+    """What the keys of addresses are made of: drawn once for each user, so that they survive a restart."""
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    path, new = Path(state) / "rotorid" / "worksheet_key", secrets.token_bytes(32)
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with (
+            suppress(FileExistsError),
+            open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as f,
+        ):
+            f.write(new)
+        kept = path.read_bytes()
+        if len(kept) == len(new):
+            return kept
+    return new

@@ -9,7 +9,8 @@ const queue = []; // what is still to be sent, in order
 let state = null;
 let data = {}; // the tables of the state, read
 let online = true;
-let said = "all is saved";
+let savedWords = "all is saved";
+let focused = {}; // speed and sensor of the cell that was entered last
 
 /* Elements: `h` describes one, `patch` makes children so; focus and what is being typed stay. */
 const h = (tag, props, ...children) => ({ tag, props, children: children.flat(4).filter((one) => one) });
@@ -23,7 +24,7 @@ function patch(parent, nodes) {
     child.vKey = keys[i];
     if (parent.childNodes[i] !== child) parent.insertBefore(child, parent.childNodes[i] || null);
     if (!node.tag && child.data !== node) child.data = node;
-    if (node.tag && !node.props.own) patch(child, node.children); // others fill an `own` one
+    if (node.tag && !node.props.filled) patch(child, node.children); // others fill a `filled` one
     for (const [name, value] of Object.entries(node.props || {})) put(child, name, value);
   });
 }
@@ -47,15 +48,17 @@ async function ask(path, body) {
   const headers = { "X-Rotorid-Token": token, "Content-Type": "application/json" };
   const answer = await fetch(path, { headers, ...(body && { method: "POST", body: JSON.stringify(body) }) });
   if (answer.ok) return answer;
-  const told = await answer.json().catch(() => ({ error: `${answer.status} ${answer.statusText}` }));
-  throw Object.assign(new Error(told.error), { status: answer.status, now: told.now });
+  const refusal = await answer.json().catch(() => ({ error: `${answer.status} ${answer.statusText}` }));
+  throw Object.assign(new Error(refusal.error), { status: answer.status, now: refusal.now });
 }
 
 async function refresh(after) {
-  const found = await (await ask(`/state?after=${after}`)).json();
-  if (online && state && found.version < state.version) return; // the other request was faster
+  const news = await (await ask(`/state?after=${after}`)).json();
+  if (online && state && news.version < state.version) return; // the other request was faster
+  const first = !state;
   online = true;
-  state = found;
+  state = news;
+  if (first) restoreTrial();
   data = Object.fromEntries(Object.entries(state.tables).map(([name, one]) => [name, read(one)]));
   render();
 }
@@ -79,7 +82,7 @@ async function drain() {
     const { path, body, done, failed } = queue[0];
     try {
       await ask(path, body);
-      said = `saved ${new Date().toTimeString().slice(0, 8)}`;
+      savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
       while (!(await refresh(-1).then(() => true, away)));
       done(queue.shift());
     } catch (problem) {
@@ -104,9 +107,14 @@ function save(changes) {
   send("/edit", { edits }).then(drop, refuse).then(render);
 }
 
+/* Words of the page for the keys of files. */
+const ERRORS = { amplitude_percent: "reading, %", phase_deg: "phase, °", run_percent: "run to run, %",
+  placement_deg: "place of a weight, °", placement_percent: "weight, %" };
+const WORDS = { ...ERRORS, "[errors]": "errors", check_weights: "weights of the check run", max_weight: "largest" };
+const inWords = (text) => Object.entries(WORDS).reduce((all, [key, word]) => all.replaceAll(key, `“${word}”`), text);
+
 /* The tables of the job. */
 const number = (text) => Number(String(text).trim().replace(",", "."));
-const near = (a, b) => Math.abs(number(a) - number(b)) <= 0.005 * number(a);
 const each = (values) => [...new Set(values)].filter((value) => value);
 const partsOf = (text, by) => text.split(by).map((one) => one.trim()).filter((one) => one);
 const whatOf = (name) => name.replace(/^(mass|unbalance).*/, "weight").replace(/[_ ].*/, "");
@@ -120,8 +128,8 @@ function read({ header, rows, read_only: closed }) {
     const time = (times[[row.run, row.speed, row.sensor]] ||= []).push(row);
     return { ...row, place: time > 1 ? `${row.speed} (${time})` : row.speed };
   };
-  const found = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
-  return { header, closed, names: named(header), rows: found };
+  const shown = rows.map(({ id, cells }) => placed({ ...named(cells), id, cells }));
+  return { header, closed, names: named(header), rows: shown };
 }
 const allRows = (...tables) => tables.flatMap((name) => data[name]?.rows || []);
 const rowsOf = (name, run) => allRows(name).filter((row) => row.run === run);
@@ -162,8 +170,8 @@ function jsonOf(path, text) {
 }
 
 function setting(top, begin, usualName, label) {
-  const known = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
-  const path = [...top, known || usualName];
+  const there = Object.keys(at(state.settings, top) || {}).find((key) => key.startsWith(begin));
+  const path = [...top, there || usualName];
   const text = textOf(at(state.settings, path));
   return { key: path.join("."), path, text, label: `${label}, ${top.at(-1)}` };
 }
@@ -206,9 +214,9 @@ function cellTable(heads, lines) {
 
 function grid(name, run) {
   const { amplitude, speed } = data[name].names;
-  const own = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
-  const lines = each(own.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
-    const row = own.find((one) => one.sensor === sensor && one.place === place);
+  const rows = rowsOf(name, run).sort((a, b) => number(a.speed) - number(b.speed));
+  const lines = each(rows.map((row) => row.place)).map((place) => [place, sensors().flatMap((sensor) => {
+    const row = rows.find((one) => one.sensor === sensor && one.place === place);
     const label = `${sensor}, ${place} ${unitOf(speed)}`;
     return ["amplitude", "phase"].map((what) => row && cellOf(name, row, what, label));
   })]);
@@ -217,31 +225,27 @@ function grid(name, run) {
 }
 
 function weights(name, run) {
-  const own = rowsOf(name, run);
-  const lines = own.map((row, i) => {
+  const rows = rowsOf(name, run);
+  const columns = ["plane", "weight", "angle", ...(data[name].names.action ? ["action"] : [])];
+  const lines = rows.map((row, i) => {
     const label = `weight ${i + 1}`;
-    const [plane, ...more] = ["plane", "weight", "angle"].map((what) => cellOf(name, row, what, label));
+    const [plane, ...more] = columns.map((what) => cellOf(name, row, what, label));
     return [`${i + 1}`, [{ ...plane, list: "planes" }, ...more],
       button("Remove", () => edit(...remove(name, [row])), { "aria-label": `Remove ${label} of ${run}` })];
   });
-  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ""].map((word) => [word]);
-  const more = () => edit(add(name, { run }, own.at(-1)?.id));
-  return [cellTable([heads], lines), button("Add a weight", more, { "data-add": run })];
+  const heads = ["mounted", "plane", unitOf(data[name].names.weight), "at °", ...columns.slice(3), ""];
+  const more = () => edit(add(name, { run }, rows.at(-1)?.id));
+  return [cellTable([heads.map((word) => [word])], lines), button("Add a weight", more, { "data-add": run })];
 }
 
 function card(name, run) {
   const mounted = name === "runs" ? "weights" : "check_weights";
   const free = run === baseline();
-  const lacking = usual().filter(({ speed, sensor }) =>
-    !rowsOf(name, run).some((row) => row.sensor === sensor && near(row.speed, speed)));
-  const type = () => edit(...addRows(name, run, lacking));
   const all = () => [name, mounted].flatMap((one) => remove(one, rowsOf(one, run)));
   const drop = () => confirm(`Remove ${run} with its readings and weights?`) && edit(...all());
   return h("article", { key: run, "data-run": run }, !free && h("h3", {}, run),
     !free && data[mounted] && weights(mounted, run),
-    grid(name, run), lacking.length > 0 && button("Type the missing readings", type, { "data-type": run }),
-    name === "runs" && h("label", { class: "button" }, "Take from a file…",
-      h("input", { type: "file", class: "unseen", "data-import": run, "aria-label": `file of ${run}` })),
+    grid(name, run),
     !free && button("Remove this run", drop, { "data-remove": run }));
 }
 
@@ -254,8 +258,7 @@ function renderMachine() {
     ["available", pieces, `pieces, ${unit}`], ["per_", "per_hole", "per hole"], ["stock", "stock", "stock"]];
   const lines = planes().map((plane) => [plane, keys.map((key) => setting(["planes", plane], ...key))]);
   const limits = sensors().map((sensor) => setting(["sensors", sensor], "limit", "limit", "largest"));
-  const kinds = { amplitude_percent: "reading, %", phase_deg: "phase, °", run_percent: "run to run, %" };
-  const errors = Object.entries(kinds).map(([key, label]) => setting(["errors"], key, key, label));
+  const errors = Object.entries(ERRORS).map(([key, label]) => setting(["errors"], key, key, label));
   const closed = each([state.read_only, ...Object.values(data).map((one) => one.closed)]);
   if (!data.runs && !queue.length) $("setup").open = true;
   $("new-unit").hidden = Boolean(data.weights);
@@ -263,7 +266,7 @@ function renderMachine() {
   show("machine", closed.map((text) => h("p", { class: "why" }, text)),
     cellTable([[["planes"], ...keys.map((key) => [key[2]])]], lines),
     limits.length > 0 && cellTable([[["sensors"], ...sensors().map((one) => [one])]], [["largest", limits]]),
-    cellTable([[["errors"], ...Object.values(kinds).map((word) => [word])]], [["standard", errors]]));
+    cellTable([[["errors"], ...Object.values(ERRORS).map((word) => [word])]], [["standard", errors]]));
 }
 
 function renderConventions() {
@@ -275,7 +278,7 @@ function renderConventions() {
   show("conventions", four.map((name) => {
     const [way, side] = [name.split("-")[0], `${name.split("-")[1]} rotation`];
     const edits = [{ key: ["phase"], old: phase, new: way }, { key: ["angles"], old: angles, new: side }];
-    return button([h("b", {}, `Phase ${way}s, angles ${side}`), h("span", { id: `drawing-${name}`, own: true })],
+    return button([h("b", {}, `Phase ${way}s, angles ${side}`), h("span", { id: `drawing-${name}`, filled: true })],
       () => edit(...edits), { id: `convention-${name}`, "aria-pressed": phase === way && angles === side });
   }));
   four.forEach((name) => draw(`drawing-${name}`, `/convention/${name}`));
@@ -285,106 +288,120 @@ function renderRuns() {
   const trials = runs().filter((run) => run !== baseline());
   const free = ["", ...trials].map((_, i) => `trial ${i + 1}`).find((name) => !trials.includes(name));
   const checks = valuesOf("run", "check");
-  const { weight, angle } = data.weights?.names || {};
-  const pieces = state.results.pieces?.document.mounting.planes; // these are mounted, not the weights
-  const rows = (pieces || planes().map((plane) => ({ plane }))).map(({ plane, mass, angle_deg: at }) => add(
-    "check_weights", { run: checks[0] || "check", plane, [weight]: mass?.toPrecision(5), [angle]: at?.toFixed(1) }));
-  const others = () => [create("check_weights", data.weights), ...rows];
-  const begin = () => edit(create("check", data.runs), ...addRows("check", "check", usual()),
-    ...(pieces ? others() : []));
   $("new-run").hidden = !data.runs;
   put($("new-name"), "value", free);
   show("baseline", data.runs ? card("runs", baseline()) : "First make the table, in step 1.");
   show("runs", trials.map((run) => card("runs", run)));
-  show("check", checks.map((run) => card("check", run)),
-    data.runs && !data.check && button("Add a check run", begin, { id: "add-check" }),
-    data.check && data.weights && !data.check_weights && h("p", {}, "Mounted as proposed? ",
-      button("No, other weights were mounted", () => edit(...others()), { id: "check-others" })));
+  show("check", checks.map((run) => card("check", run)), data.runs && !data.check && tickList());
+}
+
+/* What was mounted for the check run: the proposed pieces or weights, ticked; where they were, exactly. */
+function tickList() {
+  const { mounting, corrections = [], conventions: { weight_unit: unit } = {} } = state.results.answer?.document || {};
+  const rows = mounting ? mounting.holes : corrections.filter(({ mass }) => mass);
+  const placeOf = (row) => row.remove_at_deg ?? row.angle_deg; // where it is drilled or mounted
+  const ticks = rows.map((row, i) => {
+    const what = `${row.pieces ?? row.mass.toPrecision(4)} ${unitOf(unit)} ${row.hole ? `in hole ${row.hole} ` : ""}`;
+    return h("label", { class: "check", key: `${row.plane} ${row.hole}` },
+      h("input", { type: "checkbox", checked: "", "data-mounted": i }),
+      `${row.plane}: ${row.action === "remove" ? "remove " : ""}${what}at ${degrees(placeOf(row))}°`);
+  });
+  const begin = () => {
+    const { run, plane, weight: column } = data.weights.names;
+    const weight = column?.endsWith(unit) ? column : `${unit.includes("_") ? "unbalance" : "mass"}_${unit}`;
+    const action = rows.some((row) => row.action === "remove") && "action"; // without it all would be added
+    const mounted = rows.filter((_, i) => document.querySelector(`[data-mounted="${i}"]`).checked);
+    edit(create("check", data.runs), ...addRows("check", "check", usual()),
+      create("check_weights", { header: [run, plane, weight, "angle_deg", action].filter((one) => one) }),
+      ...mounted.map((row) => add("check_weights", { [run]: "check", [plane]: row.plane, [weight]: `${row.mass}`,
+        angle_deg: `${placeOf(row)}`, ...(action && { action: row.action }) })));
+  };
+  return rows.length > 0 && data.weights && h("div", { key: state.results.answer.judgement },
+    h("p", {}, "Mount what the answer says, run, then say what was mounted:"), ticks,
+    button("Type the check run", begin, { id: "add-check" }));
 }
 
 /* The answer: every number of a document stands with its path. */
-function value(doc, path, std) {
+function value(doc, path, digits) {
   const raw = at(doc, path.split("."));
-  const places = (std ? 1 : 2) - Math.floor(Math.log10(Math.abs(std || raw) || 1));
+  const places = digits ?? 2 - Math.floor(Math.log10(Math.abs(raw) || 1));
   const text = typeof raw === "number" ? Number(raw.toFixed(Math.min(Math.max(places, 0), 6))) : raw ?? "";
   return h("span", { class: "value", "data-key": path, "data-value": raw, title: raw }, `${text}`);
 }
+const degrees = (angle) => Number(angle.toFixed(4));
 
-/* Rows of a list in a document, largest `size` first; a column is [key, heading, key of its ±]. */
-function listing(doc, path, columns, size = () => 0, count = Infinity) {
+/* Rows of a list in a document, largest `size` first; a column is [key, heading]; `within`: 95 % of the rows. */
+function listing(doc, path, columns, { size = () => 0, count = Infinity, within } = {}) {
   const rows = at(doc, path.split("."));
   const heads = columns.filter(([key]) => rows.some((row) => key in row));
   const order = Object.keys(rows).sort((a, b) => size(rows[b]) - size(rows[a])).slice(0, count);
-  return table([heads.map(([key, name = key]) => [name])], order.map((i) => h("tr", {}, heads.map((head) => {
-    const [own, , std] = head;
-    const key = own === "angle_deg" && Number.isFinite(rows[i].remove_at_deg) ? "remove_at_deg" : own;
-    const more = rows[i][std] && [" ± ", value(doc, `${path}.${i}.${std}`, rows[i][std])];
-    return h("td", {}, value(doc, `${path}.${i}.${key}`, rows[i][std]), more);
+  return table([heads.map(([key, name = key]) => [name])], order.map((i) => h("tr", {}, heads.map(([key]) => {
+    const place = key === "angle_deg" && Number.isFinite(rows[i].remove_at_deg) ? "remove_at_deg" : key;
+    const digits = key !== "angle_deg" ? undefined : rows[i].hole ? 4 : 1; // holes are where they are
+    const more = Number.isFinite(within?.[i]?.[key]) && ` ± ${Number(within[i][key].toPrecision(2))}`;
+    return h("td", {}, value(doc, `${path}.${i}.${place}`, digits), more);
   }))));
 }
 
 const judged = (text) => h("p", { class: /^(do not|measure|fail|not as)|Take off what|Add nothing yet/im.test(text) ? "why" : "judgement" }, text);
 
-function answer(name, title, { document: doc, judgement, warnings, notes }) {
-  const { conventions: said, left_to_do: left, mounted_in_last_run: last } = doc;
+function renderAnswer() {
+  const { answer } = state.results;
+  if (!answer) return show("answer");
+  const { document: doc, within, warnings, notes } = answer;
+  const { conventions, left_to_do: left, mounted_in_last_run: last } = doc;
   const pieces = left ? null : doc.mounting; // after a check run these are not what is to be done
-  const [weight, unit] = [said.weight_unit, said.vibration_unit].map(unitOf);
-  const columns = [["if"], ["plane"], ["action", ""], ["hole"], ["pieces"], ["mass", weight, "mass_std"],
-    ["angle_deg", "at °", "angle_std_deg"]];
+  const [weight, unit] = [conventions.weight_unit, conventions.vibration_unit].map(unitOf);
+  const columns = [["plane"], ["action", ""], ["hole"], ["pieces"], ["mass", weight], ["angle_deg", "at °"]];
   const place = [["sensor", "largest"], ["speed_rpm", "rpm"], ["before"], ["after", `after, ${unit}`]];
   const limits = [["name", "limit of"], ["speed_rpm", "rpm"], ["size"], ["limit"], ["verdict", ""]];
-  return h("section", { key: name, "data-doc": name }, h("h3", {}, title), judged(judgement),
-    left ? [h("b", {}, `Mounted in ${left.run}:`), listing(doc, "left_to_do.mounted", columns),
-      left.word === "trim" && [h("b", {}, "To add:"), listing(doc, "left_to_do.add", columns)]]
-      : listing(doc, pieces ? "mounting.holes" : "corrections", columns),
-    h("p", {}, left ? "" : `For ${doc.corrections_refer_to}. `,
-      `Angles count ${said.angles}, phase ${said.phase}. ± is one standard deviation.`),
+  show("answer", h("section", { "data-doc": "answer" },
+    left ? [left.word === "trim" && [h("b", {}, "To add:"),
+      listing(doc, left.holes?.length ? "left_to_do.holes" : "left_to_do.add", columns)],
+    h("b", {}, `Mounted in ${left.run}:`), listing(doc, "left_to_do.mounted", columns)]
+      : pieces ? listing(doc, "mounting.holes", columns) : listing(doc, "corrections", columns, { within }),
+    h("p", {}, left ? "" : `For ${doc.corrections_refer_to}. `, `Angles count ${conventions.angles}, phase `,
+      `${conventions.phase}. `, !left && !pieces && "95 of 100 such weights lie within ±."),
     !left && !pieces && last?.weights.some(({ mass }) => mass) && [
       h("b", {}, `If the weights of ${last.run} stay, instead:`), listing(doc, "add_to_mounted", columns)],
-    !pieces && doc.other_readings.length > 0 && listing(doc, "other_readings", columns),
-    doc.verdict && listing(doc, "verdict.rows", limits, (row) => row.size / row.limit, 5),
-    listing(doc, pieces ? "mounting.residuals" : "residuals", place, (row) => row.after, 5),
-    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), one)),
-    notes.map((one) => h("p", {}, `Note: ${one}`)));
+    !pieces && doc.other_readings.length > 0 && listing(doc, "other_readings", [["if"], ...columns]),
+    doc.verdict && listing(doc, "verdict.rows", limits, { size: (row) => row.size / row.limit, count: 5 }),
+    listing(doc, pieces ? "mounting.residuals" : "residuals", place, { size: (row) => row.after, count: 5 }),
+    warnings.map((one) => h("p", {}, h("b", {}, "Warning: "), inWords(one))),
+    notes.map((one) => h("p", {}, `Note: ${inWords(one)}`))));
 }
 
 function renderNow() {
-  const { refused: why, pieces, trim, answer: first } = state.results;
-  const best = trim || pieces || first;
+  const { refused: why, answer } = state.results;
   const refused = [...typed.values()].filter((it) => it.why).map((it) => ({ ...it.cell, text: it.why }));
-  const missing = {}; // what is not typed yet, counted for each run
-  for (const one of problems(true)) {
-    const { run } = allRows(one.table).find(({ id }) => id === one.row) || {};
-    (missing[run ? `${whatOf(one.column || "reading")} of ${run}` : one.text] ||= []).push(one);
-  }
-  const left = Object.entries(missing).map(([text, those]) =>
+  const nameOf = ({ table: name, row, column }) =>
+    `${whatOf(column || "reading")} of ${allRows(name).find(({ id }) => id === row)?.run}`;
+  const wrong = [...problems(false).map((one) =>
+    (one.row ? { ...one, text: `${nameOf(one)}: ${inWords(one.text)}` } : { ...one, text: inWords(one.text) })), ...refused];
+  const counted = Object.groupBy(problems(true), (one) => (one.row ? nameOf(one) : one.text));
+  const left = Object.entries(counted).map(([text, those]) =>
     ({ ...those[0], text: those[0].row ? `${those.length} × ${text}` : text }));
   const go = (it) => document.querySelector(`[data-at^="${it.table} ${it.row} ${it.column || ""}"]`).focus();
   const list = (those) => h("ul", {}, those.map((one) =>
     h("li", {}, one.row ? button(one.text, () => go(one), { class: "link" }) : one.text)));
   const empty = allRows("runs").filter(isEmpty);
-  show("now", h("h2", {}, best ? "Answer" : "So far"), best && judged(best.judgement),
-    h("div", { class: "why" }, list([...problems(false), ...refused]), why && `No answer: ${why}`),
+  show("now", h("h2", {}, answer ? "Answer" : "So far"), answer && judged(answer.judgement),
+    h("div", { class: "why" }, list(wrong), why && `No answer: ${inWords(why)}`),
     left.length > 0 && h("div", { id: "missing", key: "missing" }, "Still missing:", list(left)),
     empty.length > 0 && button("Not measured: remove the empty rows",
       () => edit(...remove("runs", empty)), { id: "drop-empty" }));
 }
 
-function renderAnswer() {
-  const { runs: found, pictures, ...documents } = state.results;
-  const titles = { trim: "Trim, with the check run", pieces: "Pieces in the holes", answer: "Weights" };
-  for (const key of ["speed", "sensor"]) {
-    const values = each((found?.channels || []).map((one) => one[key]));
-    show(`channel-${key}`, values.map((one) => h("option", { key: one }, one)));
-  }
-  const [speed, sensor] = ["channel-speed", "channel-sensor"].map((id) => encodeURIComponent($(id).value));
-  $("live").hidden = !sensor;
-  draw("polar", sensor && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
-  show("gauges", (found?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
+function renderPictures() {
+  const { runs: soFar, answer } = state.results;
+  const [shownAt = soFar?.channels[0]] = (soFar?.channels || []).filter(
+    ({ speed, sensor }) => speed === focused.speed && sensor === focused.sensor);
+  const [speed, sensor] = [shownAt?.speed, shownAt?.sensor].map(encodeURIComponent);
+  draw("polar", shownAt && `/picture/runs?speed=${speed}&sensor=${sensor}&v=${state.version}`);
+  show("gauges", (soFar?.runs || []).map(({ run, level, words, share_percent: share }) => h("div",
     { key: run, class: level, "data-run": run }, h("p", {}, h("b", {}, `${run}: ${level}. `), words),
     h("meter", { "aria-label": `effect of ${run}, percent`, max: 100, value: Math.min(share, 100) }))));
-  show("answer", Object.keys(titles).map((id) => documents[id] && answer(id, titles[id], documents[id])));
-  for (const id of ["discs", "overview"]) draw(id, pictures[id] && `/picture/${id}?v=${pictures[id]}`);
+  draw("overview", answer && `/picture/answer?v=${state.version}`);
 }
 
 async function draw(id, address) {
@@ -395,14 +412,14 @@ async function draw(id, address) {
   if (!address) return slot.replaceChildren(); // no old picture stands beside new numbers
   await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
   if (slot.address !== address) return;
-  const svg = await ask(address).then((found) => found.text(), () => "");
+  const svg = await ask(address).then((drawing) => drawing.text(), () => "");
   if (slot.address === address && svg) slot.innerHTML = svg;
   else if (slot.address === address) slot.address = ""; // the next state asks again
 }
 
 function renderHeader() {
   const lost = `not saved — the program is not running${queue.length ? `: ${queue.length} wait here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : said) : lost;
+  $("saved").textContent = online ? (queue.length ? "saving…" : savedWords) : lost;
   $("saved").className = online ? "" : "why";
 }
 
@@ -412,13 +429,12 @@ function render() {
   $("answer").className = ($("busy").textContent = state.results.busy) === "computing" ? "old" : "";
   show("notice", state.notice && h("p", {}, state.notice));
   for (const id of ["undo", "redo"]) $(id).disabled = !state[id];
-  for (const part of [renderMachine, renderConventions, renderRuns, renderNow, renderAnswer]) part();
+  for (const part of [renderMachine, renderConventions, renderRuns, renderNow, renderAnswer, renderPictures]) part();
 }
 
 /* What a person does. */
 document.addEventListener("change", ({ target }) => {
-  if (target.files) take(target).catch(tell).then(() => (target.value = ""));
-  if (target.id.startsWith("channel")) renderAnswer();
+  if (target.form?.id === "trial") localStorage.setItem(trialKey(), JSON.stringify(trialFields().map(fieldValue)));
   if (!target.cell || target.value === target.saved) return;
   save([{ cell: target.cell, old: target.saved, text: target.value.trim() }]);
   target.saved = target.value;
@@ -438,11 +454,10 @@ document.addEventListener("keydown", (event) => {
   }
 });
 document.addEventListener("focusin", ({ target }) => {
-  if ($("live").hidden || !/^(runs|check)\|/.test(target.dataset.cell)) return;
+  if (!/^(runs|check)\|/.test(target.dataset.cell)) return;
   const [, , place, sensor] = target.dataset.cell.split("|");
-  $("channel-speed").value = place.replace(/ .*/, "");
-  $("channel-sensor").value = sensor;
-  renderAnswer();
+  focused = { speed: place.replace(/ .*/, ""), sensor };
+  renderPictures();
 });
 document.addEventListener("paste", (event) => {
   const { target } = event;
@@ -460,11 +475,15 @@ document.addEventListener("paste", (event) => {
   if (words.some(([word, input]) => word && !input)) tell("Not written: the values outside of the table.");
 });
 
-async function take({ files: [file], dataset: { import: run } }) {
-  const bytes = Array.from(new Uint8Array(await file.arrayBuffer()), (byte) => String.fromCharCode(byte));
-  const empty = rowsOf("runs", run).filter(isEmpty);
-  await send("/import", { table: "runs", run, name: file.name, data: btoa(bytes.join("")) });
-  if (empty.length) edit(...remove("runs", empty));
+/* The fields of a trial weight stay in this browser. */
+const trialFields = () => [...$("trial").querySelectorAll("input, select")];
+const fieldValue = (field) => (field.type === "checkbox" ? field.checked : field.value);
+const trialKey = () => `trial weight of ${state.folder} / ${state.job}`;
+function restoreTrial() {
+  JSON.parse(localStorage.getItem(trialKey()) || "[]").forEach((value, i) => {
+    const field = trialFields()[i];
+    if (field) field[field.type === "checkbox" ? "checked" : "value"] = value;
+  });
 }
 
 const submitted = {
@@ -489,23 +508,21 @@ const submitted = {
     for (const { name, value: it, dataset } of $("trial").querySelectorAll("[name]")) {
       if (it && !options.with_job) options[name] = dataset.unit ? number(it) + dataset.unit : number(it) || it;
     }
-    const { judgement, found, warnings, notes, picture = "" } = await ask("/trial", { options })
+    const { judgement, lines, warnings, notes, picture = "" } = await ask("/trial", { options })
       .then((one) => one.json(), (no) => ({ notes: no.message }));
-    show("trial-answer", [judgement, found, warnings, notes].flat().map((one) => one && h("p", {}, one)));
+    show("trial-answer", [judgement, lines, warnings, notes].flat().map((one) => one && h("p", {}, one)));
     $("trial-picture").innerHTML = picture;
   },
 };
 for (const id of Object.keys(submitted)) $(id).onsubmit = (event) => submitted[id](event.preventDefault());
 
-async function open({ target }) {
+$("print").onclick = async () => {
   const opened = window.open("", "_blank");
-  const found = await ask(target.dataset.opens).then((one) => one.blob(), tell);
-  if (found) opened.location = URL.createObjectURL(found);
+  const sheet = await ask("/sheet").then((one) => one.blob(), tell);
+  if (sheet) opened.location = URL.createObjectURL(sheet);
   else opened.close();
-}
-
+};
 for (const id of ["undo", "redo"]) $(id).onclick = () => send(`/${id}`, {}).catch(tell);
-for (const id of ["print", "whole"]) $(id).onclick = open;
 window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));
 window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
 for (;;) await refresh(online && state ? state.version : -1).catch(away);

@@ -76,7 +76,7 @@ def test_fits_are_the_same_with_and_without(monkeypatch):
     monkeypatch.setattr("rotorid.identify.adaptive_steps.find_spec", lambda name: None)
     without = fit(model_of(RATES), record)
     np.testing.assert_array_equal(without.values, slow.values)
-    with pytest.raises(ValueError, match=r"needs the extra: pip install rotorid\[fast\]"):
+    with pytest.raises(ValueError, match="needs heyoka: pip install heyoka"):
         fit(model_of(RATES), record, integrator="taylor")
 
 

@@ -12,7 +12,7 @@ from repetitions import FULL
 from worksheet.served import command
 from worksheet.stranger import stranger
 from worksheet.typed_job import rows, type_job
-from worksheet.window import CONTROL, Window
+from worksheet.window import CONTROL, SPACE, Window
 
 from rotorid.samples import sample_data
 
@@ -111,6 +111,74 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
 
 
 @pytest.mark.full
+@pytest.mark.parametrize("removed", [False, True])
+def test_pieces_are_ticked_and_checked(tmp_path, serve, windows, removed):
+    """The pieces of the answer, one of them not mounted, then the check run, as by Kelm."""
+    folder, window = Path(shutil.copytree(sample_data() / "turbo_job", tmp_path / "job")), windows[0]
+    job = folder / "holes.toml"
+    for name in ("check.csv", "check_weights.csv"):  # those of another job
+        (folder / name).unlink()
+    turned = job.read_text(encoding="utf-8").replace("first_hole_deg = 0", "first_hole_deg = 7.5")
+    if removed:
+        turned = turned.replace("holes = 12", "remove = true\nholes = 12")
+    job.write_text(turned, encoding="utf-8")
+    window.open(serve(job).address)
+    window.wait(lambda: "hole" in window.text("#check") and not window.text("#busy"), "the tick list")
+    holes = command(job, "--split")["mounting"]["holes"]
+    ticks = window.texts("#check .check")
+    assert len(ticks) == len(holes) > 2
+    for line, row in zip(ticks, holes, strict=True):
+        assert line.startswith(f"{row['plane']}: {'remove ' * removed}")
+        assert line.endswith(f"in hole {row['hole']} at {row['angle_deg']:g}°")
+        assert round(row["angle_deg"] % 1, 6) == 0.5
+    shown = window.document()
+    assert [float(shown[f"mounting.holes.{k}.angle_deg"]) for k in range(len(holes))] == [
+        row["angle_deg"] for row in holes
+    ]
+    window.driver.execute_script("document.getElementById('new-name').focus()")
+    window.push('[data-mounted="1"]', SPACE)
+    window.push("#add-check")
+    window.saved()
+    window.wait(lambda: window.texts('[data-cell^="check|"]'), "the check run")
+    written = rows(folder / "check_weights.csv")
+    mounted = [(row["plane"], float(row["unbalance_g_mm"]), float(row["angle_deg"])) for row in written]
+    assert mounted == [(h["plane"], h["mass"], h["angle_deg"]) for k, h in enumerate(holes) if k != 1]
+    assert {row.get("action") for row in written} == {"remove" if removed else None}
+    window.type('[data-cell^="check|"]', "4.1")
+    window.leave()
+    window.saved()
+    assert rows(folder / "check.csv")[0]["amplitude_um_pp"] == "4.1"
+
+
+@pytest.mark.full
+def test_fields_of_a_trial_weight_are_kept(shared, windows):
+    window, served = windows[0], shared()
+    window.open(served.address)
+    window.type('[name="rotor_mass"]', "50")
+    window.leave()
+    window.open(served.address)
+    assert window.text('[name="rotor_mass"]') == "50"
+
+
+@pytest.mark.full
+def test_two_windows_and_one_cell(shared, windows):
+    served = shared()
+    for window in windows:
+        window.open(served.address)
+    windows[1].driver.execute_script("document.querySelector(arguments[0]).focus()", FIRST)
+    windows[1].hold(CONTROL, "a")
+    windows[1].press(*"77")
+    windows[0].type(FIRST, "66")
+    windows[0].leave()
+    windows[0].saved()
+    windows[1].leave()
+    windows[1].wait(lambda: windows[1].texts("[data-write]"), "which of the two")
+    assert "wrote “66” here; you typed “77”" in windows[1].text("#steps")
+    windows[1].push("[data-write]")
+    windows[0].wait(lambda: windows[0].text(FIRST) == "77", "the other window shows it")
+
+
+@pytest.mark.full
 def test_a_wrong_token_another_origin_another_host(shared, windows):
     window = windows[0]
     served = shared()
@@ -174,8 +242,9 @@ def test_nothing_sticks_out_and_axe_finds_nothing_serious(tmp_path, serve, share
     served = serve(tmp_path / "new") if job == "new" else shared(job)
     window.open(served.address)
     if job != "new":
-        kind = {"holes.toml": "pieces", "checked.toml": "trim"}[job]
-        window.wait(lambda: window.texts(f'[data-doc="{kind}"]') and not window.text("#busy"), kind)
+        window.wait(
+            lambda: window.texts('[data-doc="answer"]') and not window.text("#busy"), "all is computed"
+        )
         window.wait(lambda: window.texts("#polar svg") and window.texts("#overview svg"), "the pictures")
     window.driver.execute_script(axe.read_text(encoding="utf-8"))
     for width, height in SIZES.items():
