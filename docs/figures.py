@@ -203,7 +203,7 @@ GALLERY = (
     Picture(
         "places",
         "reduction",
-        "reduce sample_data/rotor23.csv --rank",
+        "reduce sample_data/rotor23.csv --place compromise",
         "Few of the 2024 choices of three nodes have both good frequencies and good shapes: the line "
         "joins those that no other beats in both.",
     ),

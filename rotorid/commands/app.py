@@ -84,8 +84,7 @@ class Destination:
         work
             Gives the outcome.
         options
-            Of a class that may have `outputs`, how the name of the table may end, and `writes`: fields that
-            take a further file, and how its name may end.
+            Of a class that may have `outputs`: how the name of --output may end.
 
         Raises
         ------
@@ -95,14 +94,11 @@ class Destination:
         from rotorid.files.problems import printable
         from rotorid.files.table_writing import write_files
 
-        further: Mapping[str, Sequence[str]] = getattr(options, "writes", {})
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
             (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),
             (self.output, getattr(options, "outputs", TABLES), lambda made, path: made.written(path)),
             (self.report, (".html",), lambda made, path: made.sheet()),
         ]
-        for name, endings in further.items():
-            asked.append((getattr(options, name), endings, _further(name)))
         check_targets([(path, endings) for path, endings, _ in asked])
         with busy(what):
             made = work()
@@ -130,10 +126,6 @@ class Destination:
             else answer.brief((2 * LINES if equations else made.lines) - len(written))
         )
         typer.echo("\n".join([text, *written]))
-
-
-def _further(option: str) -> Callable[[Outcome, Path], Written]:
-    return lambda made, path: made.written(path, option)
 
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:

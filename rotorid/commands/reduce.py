@@ -47,6 +47,7 @@ Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
+STATE_SPACE = (".json", ".npz", ".mat")
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
@@ -59,12 +60,10 @@ class ReduceOptions:
     nodes : LIST
         Where the masses stand: nodes or stations, 7,12,18.
     place
-        Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
-        (extrema of the first two modes).
-    rank
-        Rank all places of the masses; without --nodes or --place they are those of the best compromise.
+        Instead of nodes: all places are ranked, and the best by frequency, the best by MAC or a compromise
+        taken; or those of the book's rule (extrema of the first two modes).
     masses : N from 1
-        How many masses are placed or ranked; default: 3.
+        How many masses are placed; default: 3.
     candidates : LIST
         Nodes that places are chosen from.
     modes : N from 1
@@ -96,20 +95,14 @@ class ReduceOptions:
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
     force : LIST
-        Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
+        Nodes of measured forces, inputs f_x12 of the small model that --output writes, 12 or 7,12.
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
-    model : FILE.toml
-        Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, `identify` and
-        `simulate`, a damper to be estimated at each mass.
-    state_space : FILE
-        Write A, B, C, D in both planes: .json, .npz or .mat.
     """
 
     nodes: Nodes | None = None
     place: Place | None = None
-    rank: bool = False
     masses: int | None = None
     candidates: Nodes | None = None
     modes: int | None = None
@@ -127,19 +120,14 @@ class ReduceOptions:
     stability: Band | None = None
     force: Nodes | None = None
     keep_supports: bool = False
-    model: Path | None = None
-    state_space: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank place masses candidates methods errors",
-        "Small model": "response stability model state_space damping force keep_supports",
+        "Method": "place masses candidates methods errors",
+        "Small model": "response stability damping force keep_supports",
         "Expert": "rows nonnegative supports_apart",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    writes: ClassVar[Mapping[str, Sequence[str]]] = {
-        "model": (".toml",),
-        "state_space": (".json", ".npz", ".mat"),
-    }
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml", *STATE_SPACE)
 
 
 @command
@@ -147,12 +135,13 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
-    small model (--response, --stability, --model, --state-space). With --keep-supports bearings, films and
-    other forces stay apart from the masses, for motion.
+    small model: --output FILE.toml writes it for motion, periodic, bearings, and for fit, identify and
+    simulate, with a damper to be estimated at each mass; .json, .npz or .mat A, B, C, D in both planes. With
+    --keep-supports bearings, films and other forces stay apart from the masses, for motion.
 
     Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
 
-    Example: rotorid reduce sample_data/rotor23.csv --rank --plot map.png
+    Example: rotorid reduce sample_data/rotor23.csv --place compromise --plot map.png
 
     Parameters
     ----------
@@ -199,6 +188,8 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     def state_space(path: Path) -> Written:
         from rotorid.commands.reduce_result import small_of, state_space_bytes
 
+        if options.keep_supports:
+            raise ValueError(f"{path}: with --keep-supports the small model is for motion: FILE.toml")
         return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
 
     def solved() -> Equations:
@@ -213,7 +204,7 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
         answer=together([*first, *rest]),
         keys={**keys.pop(""), **keys},
         file=lambda: table_of((placement or result).to_frame()),
-        files={"model": model, "state_space": state_space},
+        files={".toml": model, **dict.fromkeys(STATE_SPACE, state_space)},
         pictures={
             caption: partial(_picture, key, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
         },
@@ -253,22 +244,18 @@ def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
-    computed = ("rank", "place", "methods", "response", "stability")
+    computed = ("place", "methods", "response", "stability")
     if has_rotor:
         refuse(options, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both")
     else:
         others = ("candidates", "speed", "supports_apart", "damping", "keep_supports")
         refuse(options, (*computed, *others), "needs a rotor: give ROTOR instead of --compliance")
-    if not options.rank and options.place is None:
-        refuse(options, ("masses", "candidates"), "does nothing without --rank or --place")
-    if options.model is None:
-        refuse(options, ("force",), "does nothing without --model")
+    if options.place is None:
+        refuse(options, ("masses", "candidates"), "does nothing without --place")
     if options.keep_supports:
         on_supports = ("measured", "supports_apart", "speed", "response", "stability", "force")
         rigid = "asks for the rotor on its supports; with --keep-supports the masses are found on rigid ones"
         refuse(options, on_supports, rigid)
-        if options.state_space:
-            raise ValueError(f"--state-space {rigid}")
     if options.measured is not None:
         refuse(options, computed, "compares with the computed rotor, not with the measured modes")
 
@@ -317,7 +304,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         errors=input_errors(options.errors, data, used),
     )
     parts: dict[str, Any] = {"": result}
-    if placement is not None and options.rank:
+    if placement is not None:
         parts["placement"] = placement
     if options.methods:
         parts["methods"] = compare_methods(result)
@@ -325,7 +312,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     small, ratios = None, _damping_ratios(options.damping)
     if options.keep_supports:
         small = keep_supports(whole, places, result.masses.solution, modal_damping=ratios)
-    elif options.response is not None or stable is not None or options.model or options.state_space or ratios:
+    elif options.response is not None or stable is not None or ratios:
         small = small_of(result, ratios)
     if options.response is not None and small is not None:
         automatic = str(options.response) == "auto"
@@ -349,7 +336,7 @@ def _places(
     if options.nodes is not None and options.place is not None:
         raise ValueError("--nodes and --place are two ways to the same end: choose one")
     masses, placement = 3 if options.masses is None else options.masses, None
-    if options.rank or options.place not in (None, "book"):
+    if options.place not in (None, "book"):
         candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]
         placement = rank_nodes(
             rotor,
@@ -376,9 +363,7 @@ def _places(
         return placement, placement.nodes[which].tolist()
     if data is not None:
         return None, [rotor.node(node) for node in data.nodes]
-    raise ValueError(
-        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
-    )
+    raise ValueError("say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book")
 
 
 def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:

@@ -45,10 +45,8 @@ def checked(given: object, kind: type[_T]) -> _T:
 
 
 def changed(options: DataclassInstance) -> dict[str, object]:
-    """Options that differ from their defaults, without the files that a terminal's command writes."""
-    writes = getattr(options, "writes", ())
-    fields = [field for field in dataclasses.fields(options) if field.name not in writes]
-    given = {field: getattr(options, field.name) for field in fields}
+    """Options that differ from their defaults."""
+    given = {field: getattr(options, field.name) for field in dataclasses.fields(options)}
     return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
 
 

@@ -54,7 +54,7 @@ class Outcome(Answered):
     lacking
         Why there is no such file and no picture; empty: there are.
     files
-        What makes other files: by the ending of their name where it is that of `--output`, else by option.
+        What makes other files of `--output`, by the ending of their name.
     keys
         The JSON document without its version and provenance.
     pictures
@@ -127,9 +127,9 @@ class Outcome(Answered):
         """The main table."""
         return frame(self.table())
 
-    def written(self, path: Path, option: str = "") -> Written:
-        """What `--output`, or another option, writes to a file of this name."""
-        build = self.files.get(option or path.suffix.lower())
+    def written(self, path: Path) -> Written:
+        """What `--output` writes to a file of this name."""
+        build = self.files.get(path.suffix.lower())
         return file_bytes(path, self.table()) if build is None else build(path)
 
     def figure(self) -> Figure:

@@ -112,7 +112,7 @@ calibrate-unexplained       {SUPPORTS} bearing.kxx.scale --prior bearing.kxx.sca
 calibrate-no-bearing        {SUPPORTS} "bearing[3].kxx.scale"
 calibrate-says-nothing      calibrate {COMPRESSOR} sample_data/calibration/later.toml --estimate bearing.kxx.scale
 critical-calibrated         critical sample_data/calibration/calibrated.toml -n 2
-reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
+reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --output motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120
 study                       study sample_data/study/study.toml --samples 50 --plot study.png
@@ -210,19 +210,19 @@ balance-equations           balance {TURBO}/job.toml --method least-squares --sh
 
 MODEL_COMMANDS = f"""
 reduce-book                 reduce {ROTOR23} --nodes 7,12,18 --modes 2 --plot reduction.png
-reduce-rank                 reduce {ROTOR23} --rank --plot map.png
+reduce-rank                 reduce {ROTOR23} --place compromise --plot map.png
 reduce-everything           reduce {ROTOR23} --nodes 7,12,18 --methods --response auto --plot response.png
 reduce-errors               reduce {ROTOR23} --nodes 7,12,18 --errors compliance=1,shapes=1
-reduce-compressor           reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --stability 1000:14000rpm --model small.toml --state-space small.mat
-reduce-compressor-json      reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --speed 6000rpm --model m.toml --state-space small.json
+reduce-compressor           reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --stability 1000:14000rpm --output small.mat
+reduce-compressor-json      reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --speed 6000rpm --output small.json
 reduce-compressor-response  reduce {COMPRESSOR} --nodes "impeller 1,impeller 3,impeller 5" --modes 2 --response 2000:14000:2000rpm
 reduce-printed              {PRINTED} --modes 1
 reduce-printed-2            {PRINTED} --modes 2
 reduce-given                {GIVEN} --modes 3 --output masses.csv
 reduce-given-relative       {GIVEN} --modes 2 --rows relative --nonnegative
 reduce-seals                {GIVEN} --modes 2 --seals 12=2e6
-reduce-model                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --model three_masses.toml
-reduce-force                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --damping 1,0.5 --force 12 --model m.toml --state-space m.npz
+reduce-model                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --output three_masses.toml
+reduce-force                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --damping 1,0.5 --force 12 --output m.toml
 reduce-report               reduce {ROTOR23} --nodes 7,12,18 --methods --report reduction.html
 reduce-output               reduce {ROTOR23} --nodes 7,12,18 --modes 3 --output masses.xlsx
 reduce-place-book           reduce {ROTOR23} --place book

@@ -29,7 +29,7 @@ COMMANDS = {
     "critical": "critical compressor/rotor.toml -n 4 --map --operating 4000:6500rpm",
     "critical table": "critical rotor23.csv -n 5",
     "response": COMPRESSOR + " --sensors probe_DE:45,probe_NDE:45",
-    "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --rank --response auto "
+    "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --response auto "
     "--stability 0:9000rpm --errors compliance=1,shapes=1",
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",

@@ -172,7 +172,7 @@ def test_texts_and_what_they_stand_for_are_the_same(work, text, values):
         (lambda: response(ROTOR, None, ResponseOptions([100.0])), "unbalance"),
         (lambda: response(ROTOR, {7: 1e-5}, ResponseOptions([100.0], sensors=[])), "--sensors"),
         (lambda: unbalance(SAMPLES / "model_job" / "job.toml", UnbalanceOptions([])), "--stations"),
-        (lambda: reduce(ROTOR, ReduceOptions(rank=True, masses=0)), "the number of masses is 0"),
+        (lambda: reduce(ROTOR, ReduceOptions(place="mac", masses=0)), "the number of masses is 0"),
         (lambda: trial_weight(5), "a job or its path"),
         (lambda: trial_weight(JOB, TrialWeightOptions(plane=[])), "names .* are needed"),
         (lambda: split(None, SplitOptions(holes=12)), "VECTOR"),
