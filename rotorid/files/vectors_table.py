@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing import Labels, Trials
+from balancing import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column as Told
 from rotorid.base.words import Phase
@@ -18,7 +18,6 @@ from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
 from rotorid.files.layout import read_runs_grid
 from rotorid.files.problems import Problems
-from rotorid.files.slow_roll import make_slow_roll
 from rotorid.files.units import one_of
 from rotorid.identify.modes_result import Readings
 
@@ -129,21 +128,3 @@ def runs_columns(
         Told(f"amplitude_std{unit}", along * labels.vibration_scale),
         Told("phase_std_deg", np.degrees(across / size)),
     )
-
-
-def read_slow_roll(path: Path, sweep: Readings) -> tuple[ComplexArray, tuple[str, ...]]:
-    """Slow-roll vectors (C,) of the sensors of a sweep, of a runs table at one speed, and warnings.
-
-    Raises
-    ------
-    InputError
-        With all problems of the file.
-    """
-    problems, conventions = Problems(), Conventions(sweep.labels)
-    vectors = np.nan_to_num(sweep.vectors[:1])[None]
-    start = sweep.speeds.max(keepdims=True)
-    trials = Trials(
-        (sweep.run,), start, sweep.sensors, (), vectors, np.zeros((1, 0), dtype=complex), labels=sweep.labels
-    )
-    roll = problems.need(make_slow_roll(path, trials, conventions, problems))
-    return roll.at(start, sweep.sensors)[0], roll.warnings

@@ -218,31 +218,6 @@ def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     return vectors[0], covariances[0]
 
 
-def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArray]:
-    """Mean of the vectors at or below a speed, rad/s: (C,), and covariances of their parts, NaN of one alone.
-
-    Raises
-    ------
-    ValueError
-        For a sensor without a vector there.
-    """
-    slow = sweep.take(np.flatnonzero(sweep.speeds <= speed))
-    read, words = ~np.isnan(slow.vectors), sweep.labels.speed_words
-    count = read.sum(axis=0)
-    if not count.all():
-        raise ValueError(
-            f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
-            f"{words(speed)}; the lowest speed is {words(float(sweep.speeds.min()))}"
-        )
-    mean, variances = np.nanmean(slow.vectors, axis=0), slow.covariances
-    if variances is None:  # as the vectors scatter
-        off = slow.vectors - mean
-        parts = np.stack((off.real, off.imag), axis=-1)
-        free = np.where(count > 1, 1 - 1 / count, np.nan)[:, None, None]
-        variances = parts[..., None] * parts[..., None, :] / free
-    return mean, np.where(read[..., None, None], variances, 0.0).sum(axis=0) / count[:, None, None] ** 2
-
-
 def vectors_when_passing(
     sweep: Readings, speeds: FloatArray, modes: FittedModes | None = None
 ) -> tuple[ComplexArray, FloatArray]:

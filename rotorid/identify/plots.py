@@ -147,16 +147,19 @@ def figure_modes(modes: FittedModes) -> Figure:
     return figure
 
 
-def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes | None) -> Figure:
-    """Amplitude and phase over speed less the slow roll (C,), and the fit of the first sweep."""
-    figure, labels = new_figure(6.6), sweeps[0].labels
+def bode_plot(sweep: Readings, roll: ComplexArray, fit: FittedModes | None) -> Figure:
+    """Amplitude and phase over speed less the slow roll (C,), and the fit."""
+    figure, labels = new_figure(6.6), sweep.labels
     above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     dots: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1))}
-    for k, (sweep, c, name, omega, read) in enumerate(_curves(sweeps)):
-        vectors, lines = read - roll[c], [(read - roll[c], {"lw": 1.6, "label": name, **look(k)})]
+    order = np.argsort(sweep.speeds, kind="stable")
+    for c, name in enumerate(sweep.sensors[:CURVES]):
+        there = order[~np.isnan(sweep.vectors[order, c])]
+        omega, vectors = sweep.speeds[there], sweep.vectors[there, c] - roll[c]
+        lines = [(vectors, {"lw": 1.6, "label": name, **look(c)})]
         seen = np.abs(vectors) > HIDDEN * np.nanmedian(sweep.noise[:, c])
         phase = np.unwrap(np.angle(vectors[seen]))
-        if fit is not None and sweep is sweeps[0]:
+        if fit is not None:
             lines.append((fit.curve(omega)[:, c] - roll[c], {"label": f"fit, run {sweep.run}", **dots}))
         for z, style in lines:  # phases of the fit beside those of the readings
             beside = labels.phase_sign * np.degrees(phase + np.angle(z * vectors.conj())[seen])
@@ -165,7 +168,7 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
             )
             above.plot(RPM * omega, labels.vibration_scale * np.abs(z), **style)
             below.plot(RPM * omega[seen], beside, **style)
-    above.set(ylabel=f"amplitude, {_unit(sweeps[0])}", ylim=(0.0, None))
+    above.set(ylabel=f"amplitude, {_unit(sweep)}", ylim=(0.0, None))
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees")
     below.yaxis.set_major_locator(right_angles(below))
     if labels.phase == "lag":
@@ -185,15 +188,3 @@ def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes |
 
 def _unit(readings: Readings) -> str:
     return readings.labels.vibration_in or "no unit"
-
-
-def _curves(sweeps: Sequence[Readings]) -> list[tuple[Readings, int, str, FloatArray, ComplexArray]]:
-    """Sweeps and sensors to draw, with names, rising speeds, and vectors."""
-    curves = []
-    for sweep in sweeps:
-        for c, name in enumerate(sweep.sensors):
-            order = np.argsort(sweep.speeds, kind="stable")
-            seen = order[~np.isnan(sweep.vectors[order, c])]
-            words = f"{name}, run {sweep.run}" if len(sweeps) > 1 else name
-            curves.append((sweep, c, words, sweep.speeds[seen], sweep.vectors[seen, c]))
-    return curves[:CURVES]
