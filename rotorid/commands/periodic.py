@@ -20,7 +20,7 @@ from rotorid.commands.moving import (
     reduction,
     reduction_notes,
 )
-from rotorid.commands.quantities import Band, Sensor, degrees, sensors, two_speeds
+from rotorid.commands.quantities import Band, Sensor, sensors, two_speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -48,10 +48,6 @@ class PeriodicOptions:
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
-    bow : FILE
-        Table of the shaft's bow at rest; in place of a small model's own.
-    gravity_direction : DEGREES
-        Where gravity points, from x with the rotation; default: -90, to -y.
     max_seconds : S from 0.01
         Limit of the search; what is known by then is given, with a warning. Default: none.
     """
@@ -60,8 +56,6 @@ class PeriodicOptions:
     sensors: str | Sequence[Sensor] | None = None
     limit_cycle: bool = False
     unbalance: Path | str | Mapping[int, complex] | None = None
-    bow: Path | str | Mapping[int, complex] | None = None
-    gravity_direction: float = -90.0
     max_seconds: float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Motion": "limit_cycle",
@@ -236,8 +230,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     from rotorid.motion.system import reduced_system
 
     low, high = _range(options.speeds)
-    direction = degrees(options.gravity_direction, "--gravity-direction")
-    what = moving(model, options.unbalance, options.bow, direction)
+    what = moving(model, options.unbalance)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
     kept = [node for node, _ in sensed] + mounted_nodes(full)
