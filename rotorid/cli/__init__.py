@@ -43,10 +43,6 @@ def worksheet(
     job: Annotated[
         Path, typer.Argument(metavar="JOB | FOLDER", help="Job (.toml, .xlsx), or a folder for one.")
     ] = Path(),
-    port: Annotated[
-        int,
-        typer.Option(metavar="N", min=0, max=65535, help="Default: any free one.", rich_help_panel="Input"),
-    ] = 0,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Only print the address.", rich_help_panel="Output")
     ] = False,
@@ -68,7 +64,7 @@ def worksheet(
 
             webbrowser.open(address)
 
-    serve(job, port, opened)
+    serve(job, 0, opened)
 
 
 def schema(

@@ -35,8 +35,6 @@ class FitOptions:
         How the parameters are searched.
     integrator : NAME
         How the equations are solved.
-    loss : LOSS
-        What a residual counts.
     start : LIST
         Starting values instead of the model's: k=2,d=0.1; the others stay.
     starts : N from 1
@@ -56,7 +54,6 @@ class FitOptions:
 
     method: str = "levenberg-marquardt"
     integrator: str = "auto"
-    loss: str = "linear"
     start: Values | None = None
     starts: int | None = None
     tolerance: float | None = None
@@ -65,7 +62,7 @@ class FitOptions:
     sigma: Values | float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "sigma start allow_missing",
-        "Method": "method loss starts ridge integrator tolerance",
+        "Method": "method starts ridge integrator tolerance",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
 
@@ -74,9 +71,8 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
     """What the options of these names choose from."""
     from rotorid.identify.fit_records import METHODS
     from rotorid.identify.simulation import INTEGRATORS
-    from rotorid.regression.robust import LOSSES
 
-    return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
+    return {"method": METHODS, "integrator": INTEGRATORS}
 
 
 @command
@@ -140,7 +136,6 @@ def fit(
         data,
         method=options.method,
         integrator=options.integrator,
-        loss=options.loss,
         start=begin,
         starts=options.starts,
         tolerance=options.tolerance,

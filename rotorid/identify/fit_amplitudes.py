@@ -110,8 +110,8 @@ def _check(
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     if prior and not experiments.stated:
         raise ValueError(
-            "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
-            "--phase-error, or [errors] in the model file)"
+            "[prior] is weighed against the errors of the amplitudes: state them (--errors, or "
+            "[errors] in the model file)"
         )
     if (prior or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
         raise ValueError(

@@ -232,22 +232,21 @@ reduce-place-compromise     reduce {ROTOR23} --place compromise --candidates 5,8
 reduce-model-job            reduce sample_data/model_job/rotor.csv --nodes 6,12,19 --modes 2 --stability 0:9000rpm
 reduce-without-nodes        reduce {ROTOR23}
 reduce-order                reduce {ROTOR23} --nodes 12,7
-identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
-identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png
-identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --loss soft_l1
-identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --amplitude-error 2 --phase-error 1
+identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --errors 2,1
+identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --errors 2,1 --output i.csv --plot i.png
+identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --errors 2,1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
 simulate-lesson-5           simulate {IDENTIFY}/task_5_1/model.toml --with c=1000,alpha=10 --frequencies 10,20,30 --inputs F=10 --digits 2 --output x.csv
-simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --amplitude-error 2 --phase-error 1 --seed 1
+simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --errors 2,1 --seed 1
 simulate-modes              simulate {IDENTIFY}/task_7_1/model.toml --with c1=1e4,c2=2e4,c3=5e3 --modes --digits 3
 simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.14,m1=12,m2=28 --times 0:50:2 --digits 5
 simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
 simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
 simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
-modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
+modes-chain                 {SHAKEN} --errors 2,1 --output modes.csv
 modes-band                  {SHAKEN} --bands 24:28 --plot circles.png
 modes-one-side              {SHAKEN} --bands 25:26.2
 modes-no-reading            {SHAKEN} --bands 100:120Hz
@@ -256,7 +255,6 @@ fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
-fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html

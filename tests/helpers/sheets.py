@@ -34,8 +34,7 @@ COMMANDS = {
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
     "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv --sigma auto",
-    "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --amplitude-error 2 "
-    "--phase-error 1",
+    "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --errors 2,1",
     "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",
     "identify singular": "identify identify/task_4_1/model.toml identify/task_4_1/data.csv",
 }
