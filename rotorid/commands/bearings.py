@@ -13,7 +13,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import figures, sentence
 from rotorid.commands.moving import moving
 from rotorid.commands.quantities import Speeds, degrees, rising_speeds
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -190,5 +190,4 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
         keys=plain(document),
         pictures={"": result.figure},
         warnings=warnings,
-        provenance=provenance(what.files, options),
     )

@@ -12,7 +12,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures
 from rotorid.commands.model_places import model_places
 from rotorid.commands.quantities import Names
-from rotorid.report.options import file_of, rotor_source
+from rotorid.report.options import file_of, rotor_of
 from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -214,9 +214,10 @@ def prepared(
         As `calibrate`.
     """
     from rotorid.commands.unknown_numbers import unknowns
-    from rotorid.tables import read_job
+    from rotorid.tables import read_job, rotor_files
 
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
+    files = rotor_files(Path(rotor)) if isinstance(rotor, Path | str) else ()
     given = [data] if isinstance(data, Path | str) else list(data)
     if len({*map(str, given)}) < len(given):
         raise ValueError("one of the data files is given twice: it would count twice")

@@ -14,8 +14,8 @@ from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import percent
 from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
-from rotorid.report.options import rotor_source
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.options import rotor_of
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from fem import Campbell, Rotor
@@ -84,7 +84,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
 
     operating = band(options.operating)
     span, place = _span(options.cross_coupling)
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
     speeds = rising_speeds(options.speeds)
     solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
     whirl = solve(model)
@@ -134,7 +134,6 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
             "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
         },
         title="Whirl",
-        provenance=provenance(files, options),
     )
 
 

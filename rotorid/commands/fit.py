@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotorid.base.text import listing
 from rotorid.commands.quantities import check_names, number, pairs
 from rotorid.report.options import check_choices, file_of, refuse
-from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from rotorid.base.registry import Method
@@ -123,9 +123,7 @@ def fit(
         records = [file_of(records, "records")]
     if not records:
         raise ValueError("give a record after the model file")
-    paths = [Path(given) for given in records if isinstance(given, Path | str)]
-    _check_once(paths)
-    files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
+    _check_once([Path(given) for given in records if isinstance(given, Path | str)])
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     begin = None if options.start is None else _start(options.start, equations, len(records))
     weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
@@ -154,7 +152,6 @@ def fit(
 
     return outcome_of(
         result,
-        provenance(files, options),
         files=iterations if result.integrals else {},
         pictures={"Signals and residuals over time; parameters with 95 %.": lambda: figure_fit(result)},
         title="Parameters from time records",

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
 from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.report.options import file_of
-from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,14 +65,13 @@ def identify(
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
-    files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
         model = read_harmonic_model(file_of(model, "a model"))
     file = replace(model, errors=amplitude_errors(model.errors, options.errors))
     if data is None:
-        return _at_best(file.model, provenance(files, options))
+        return _at_best(file.model)
     if not isinstance(data, Experiments):
         data = read_measurements(file_of(data, "a table of amplitudes"), file)
     result = estimate(
@@ -91,14 +89,13 @@ def identify(
 
     return outcome_of(
         result,
-        provenance(files, options),
         pictures={"Amplitudes or shapes, measured and predicted.": picture},
         title="Coefficients from harmonic tests",
         solved=lambda: _equations(result),
     )
 
 
-def _at_best(model: HarmonicModel, origin: Mapping[str, Any]) -> Outcome:
+def _at_best(model: HarmonicModel) -> Outcome:
     """What data can determine at best."""
     words = list(model.combinations.words)
     return Outcome(
@@ -109,7 +106,6 @@ def _at_best(model: HarmonicModel, origin: Mapping[str, Any]) -> Outcome:
         file=Table("combinations", (Column("combination", words),)),
         lacking=_NO_DATA,
         solved=lambda: _equations(model),
-        provenance=origin,
     )
 
 

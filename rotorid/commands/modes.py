@@ -12,7 +12,7 @@ from rotorid.base.text import counted, error_figures, listing
 from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.report.options import file_of
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,7 +93,6 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
         title="Modes",
         warnings=fit.warnings,
         notes=() if lacking else fit.notes,
-        provenance=provenance([file], options),
     )
 
 

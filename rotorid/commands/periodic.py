@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
@@ -21,7 +21,7 @@ from rotorid.commands.moving import (
     reduction_notes,
 )
 from rotorid.commands.quantities import Band, Sensor, sensors, two_speeds
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -64,9 +64,7 @@ class PeriodicOptions:
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
-def _outcome(
-    motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray, origin: Mapping[str, Any]
-) -> Outcome:
+def _outcome(motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray) -> Outcome:
     """Branches as sensors read them, which have names and unit vectors (k, n): stability, bifurcations."""
     from rotorid.base.plot_style import on_figure
     from rotorid.motion.branches import amplitudes, jumps
@@ -125,7 +123,6 @@ def _outcome(
             ),
             motion.tried,
         ),
-        provenance=origin,
     )
 
 
@@ -245,7 +242,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         limit_cycle=options.limit_cycle,
         max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
     )
-    return _outcome(motion, labels, directions, provenance(what.files, options))
+    return _outcome(motion, labels, directions)
 
 
 def _range(given: Band) -> tuple[float, float]:

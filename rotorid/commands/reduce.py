@@ -23,14 +23,13 @@ from rotorid.commands.quantities import (
     one_speed,
     rising_speeds,
 )
-from rotorid.report.options import refuse, rotor_source
+from rotorid.report.options import refuse, rotor_of
 from rotorid.report.outcome import (
     EQUATIONS,
     WITH_REPORT,
     Outcome,
     command,
     outcome_of,
-    provenance,
     table_of,
 )
 
@@ -158,14 +157,13 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     options = options or ReduceOptions()
     _check_used(options, rotor is not None)
     if rotor is None:
-        result, files = _of_tables(options)
-        return _outcome({"": result}, options, files, "")
-    name = Path(rotor).name if isinstance(rotor, Path | str) else ""
-    parts, files = _of_rotor(rotor, options)
-    return _outcome(parts, options, files, name)
+        return _outcome({"": _of_tables(options)}, options, "")
+    return _outcome(
+        _of_rotor(rotor, options), options, Path(rotor).name if isinstance(rotor, Path | str) else ""
+    )
 
 
-def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[Path], name: str) -> Outcome:
+def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Outcome:
     """The masses, and what was asked for beside them, by their keys in the document; the ranking first."""
     result: Reduction = parts[""]
     small: SmallModel | None = parts.get("small_model")
@@ -200,7 +198,6 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
     return outcome_of(
         result,
-        provenance(files, options),
         answer=together([*first, *rest]),
         keys={**keys.pop(""), **keys},
         file=lambda: table_of((placement or result).to_frame()),
@@ -260,7 +257,7 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
         refuse(options, computed, "compares with the computed rotor, not with the measured modes")
 
 
-def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
+def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> dict[str, Any]:
     """The masses of a rotor, and what is asked for beside them."""
     from rotorid.commands.reduce_result import small_of
     from rotorid.files.modes import read_modes
@@ -275,7 +272,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     )
     from rotorid.reduction import reduce as reduce_rotor
 
-    whole, files = rotor_source(rotor)
+    whole = rotor_of(rotor)
     machine, held = whole, held_nodes(whole) if options.keep_supports else ()
     if options.keep_supports:
         machine = held_rigidly(whole)
@@ -290,7 +287,6 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     check_free(held, places)
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
-        files = (*files, Path(options.measured))
         data = modes_at(data, machine, places, options.measured)
     result = reduce_rotor(
         machine,
@@ -320,7 +316,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         parts["response"] = compare_response(machine, small, speeds)
     if stable is not None and small is not None:
         parts["stability"] = compare_stability(machine, small, stable[1], lowest=stable[0])
-    return parts | ({} if small is None else {"small_model": small}), files
+    return parts | ({} if small is None else {"small_model": small})
 
 
 def _places(
@@ -366,7 +362,7 @@ def _places(
     raise ValueError("say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book")
 
 
-def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
+def _of_tables(options: ReduceOptions) -> Reduction:
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.files.modes import read_compliance, read_modes
     from rotorid.reduction import reduce_measured
@@ -384,7 +380,7 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
     if lost := springs.keys() - {*map(str, wanted)}:
         raise ValueError(f"--seals: no mass stands at {min(lost)!r}")
-    result = reduce_measured(
+    return reduce_measured(
         alpha[order][:, order],
         data.frequencies,
         data.shapes,
@@ -395,7 +391,6 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
         nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
     )
-    return result, (Path(options.compliance), Path(options.measured))
 
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:

@@ -26,7 +26,7 @@ from rotorid.commands.quantities import (
     times,
 )
 from rotorid.report.options import file_of, refuse
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray
@@ -129,8 +129,6 @@ def simulate(
     noisy = any(getattr(options, name) is not None for name in _NOISE)
     if options.digits is not None and options.digits < 1:
         raise ValueError(f"--digits takes a number from 1, not {options.digits}")
-    sources = (model, options.times if _is_record(options.times) else None)
-    files = [Path(given) for given in sources if isinstance(given, Path | str)]
     solve = _amplitudes if way in ("frequencies", "modes") else _record
     values, simulated, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
@@ -153,7 +151,6 @@ def simulate(
         },
         pictures={},
         notes=notes,
-        provenance=provenance(files, options),
     )
 
 

@@ -98,15 +98,12 @@ def _check_finite(value: object, what: str) -> None:
         _check_finite(item, what)
 
 
-def rotor_source(given: Rotor | Path | str) -> tuple[Rotor, tuple[Path, ...]]:
-    """A rotor, and the files that it was read from."""
+def rotor_of(given: Rotor | Path | str) -> Rotor:
+    """A rotor, or that of a file."""
     from fem import Rotor
-    from rotorid.tables import read_rotor, rotor_files
+    from rotorid.tables import read_rotor
 
-    if isinstance(given, Rotor):
-        return given, ()
-    file = file_of(given, "a rotor")
-    return read_rotor(file), rotor_files(file)
+    return given if isinstance(given, Rotor) else read_rotor(file_of(given, "a rotor"))
 
 
 def job_source(given: Job | Path | str, phase: str | None = None, angles: str | None = None) -> Job:

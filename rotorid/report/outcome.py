@@ -66,13 +66,14 @@ class Outcome(Answered):
     solved
         What was solved, in symbols and in numbers; None: nothing that could be shown.
     provenance
-        Program version, input files with their hashes, date, and every option that differs from its default.
+        Program version, input files with their hashes, date, and every option that differs from its default;
+        of a command it follows from what that has read.
     """
 
     result: Any
     sentences: tuple[str, ...]
     keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
-    provenance: Mapping[str, Any]
+    provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
@@ -170,7 +171,7 @@ def _aligned(table: Table | str) -> str:
 
 def outcome_of(
     result: Any,  # noqa: ANN401 - any result that tells its answer
-    provenance: Mapping[str, Any],
+    provenance: Mapping[str, Any] | None = None,
     *,
     answer: Answer | None = None,
     **more: Any,  # noqa: ANN401 - fields of an outcome
@@ -189,7 +190,7 @@ def outcome_of(
         "pictures": {} if draw is None else {"": draw},
         "keys": getattr(result, "to_dict", None),
     }
-    return Outcome(result=result, provenance=provenance, **given | more)
+    return Outcome(result=result, provenance=provenance or {}, **given | more)
 
 
 def table_of(data: pd.DataFrame, name: str = "result") -> Table:
@@ -215,7 +216,10 @@ def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:
 
 
 def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Check its options first; while it works each file is read once: its hash is that of what was read."""
+    """Check its options first; while it works each file is read once: its hash is that of what was read.
+
+    Its outcome gets the provenance of these files, with texts among its arguments that are no file.
+    """
     signature, kind = inspect.signature(function), options_of(function)
     needed = signature.parameters["options"].default is inspect.Parameter.empty
 
@@ -226,9 +230,14 @@ def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
         given = signature.bind(*args, **kwargs)
         options = given.arguments.get("options")
         if options is not None or needed:
-            given.arguments["options"] = checked(options, kind)
-        with each_file_once():
-            return function(*given.args, **given.kwargs)
+            given.arguments["options"] = options = checked(options, kind)
+        with each_file_once() as files:
+            made = function(*given.args, **given.kwargs)
+            if not isinstance(made, Outcome) or made.provenance:
+                return made
+            names = [*map(str, files)]
+            texts = {key: x for key, x in given.arguments.items() if isinstance(x, str) and x not in names}
+            return dataclasses.replace(made, provenance=provenance(files, options or kind(), **texts))
 
     return wrapper
 
