@@ -165,7 +165,7 @@ class Labels:
     def weight_at(self, weight: complex) -> str:
         """A weight as text, such as "35 g at 120.0°"."""
         size, angle = self.weight(weight)
-        return f"{size:.5g} {self.weight_in} at {angle:.1f}°"
+        return f"{size:.4g} {self.weight_in} at {angle:.1f}°"
 
     def directions(self, angles: FloatArray) -> list[float]:
         """Angles in rad with the rotation in degrees as the job counts them, without the last digits."""

@@ -120,17 +120,23 @@ class Mounted(Answered):
         if not c.sound or self.check_rms > HARDLY_BELOW * rms(c.before):
             first = "These pieces would leave"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
-        lines = [f"Pieces in {labels.weight_in}{stays}:", *(f"  {words}" for words in self._in_planes())]
-        lines += ["", f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}"]
+        each = zip(c.planes, self.in_planes(), strict=True)
+        lines = [
+            f"Pieces in {labels.weight_in}{stays}:",
+            *(f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each),
+            "",
+            f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}",
+            f"Weights at any angle: rms {small(rms(free), old.max())} {unit}".rstrip() + ".",
+        ]
         fewer = (self._left(one, one.residual) for one in self.discrete.fewer)
-        each = [f"{one['pieces']} → {three_figures(one['rms_after'])} {unit}".rstrip() for one in fewer]
-        lines += [f"With fewer pieces: {', '.join(each)}."] if each else []
+        less = [f"{one['pieces']} → {three_figures(one['rms_after'])}" for one in fewer]
+        lines += [f"With fewer pieces, rms{unit and f' in {unit}'}: {', '.join(less)}."] if less else []
         if not self.discrete.enough:
             lines.append(
                 f"No set of pieces is enough: these are the fewest that leave {FEW} times the least."
             )
         return Answer(
-            f"{first} {left} (with any weights {small(rms(free), old.max())}).",
+            f"{first} {left}.",
             "\n".join(lines),
             tables=(f"Hole by hole:\n{text(_columns(self), left=2)}",) if self.weights.any() else (),
             more="hole by hole",
@@ -138,9 +144,12 @@ class Mounted(Answered):
 
     def in_holes(self) -> str:
         """What is in which hole of each plane, in a line."""
-        return f"{' · '.join(self._in_planes())}, in {self.correction.labels.weight_in}"
+        each = zip(self.correction.planes, self.in_planes(), strict=True)
+        words = " · ".join(f"{plane}: {holes}" for plane, holes in each)
+        return f"{words}, in {self.correction.labels.weight_in}"
 
-    def _in_planes(self) -> list[str]:
+    def in_planes(self) -> list[str]:
+        """What is in which hole of each plane, plane by plane."""
         lines, every = [], rows(_columns(self))
         for plane in self.correction.planes:
             here = [row for row in every if row["plane"] == plane]
@@ -150,8 +159,7 @@ class Mounted(Answered):
             words += equal_together(
                 (row["pieces"] or figures(row["mass"]), row["hole"]) for row in here if row["hole"] != _ANY
             )
-            gone = " (remove)" if plane in self.correction.remove else ""
-            lines.append(f"{plane}{gone}: {'; '.join(words) or 'nothing'}")
+            lines.append("; ".join(words) or "nothing")
         return lines
 
 

@@ -1,4 +1,4 @@
-"""One weight as it is mounted: in holes, as two fixed masses, by drilling or grinding, or rounded to a scale.
+"""One weight as it is mounted: in holes, as two fixed masses, or by drilling.
 
 Every weight is complex, kg or kg·m, its angle counted with the rotation. Taking the unbalance u away at the
 angle φ changes the rotor by −u e^{iφ}; so an added unbalance D is done by u = |D| at φ = arg D + 180°.
@@ -29,13 +29,10 @@ from rotorid.base.text import counted, percent
 
 __all__ = [
     "Removal",
-    "Rounded",
     "Split",
     "TwoPositions",
     "combine",
     "drill",
-    "grind",
-    "rounded",
     "split",
     "two_positions",
 ]
@@ -287,73 +284,6 @@ def combine(weights: Iterable[complex]) -> complex:
 
 
 @dataclass(frozen=True, eq=False)
-class Rounded:
-    """A weight rounded to what scale and angle marks can show.
-
-    Attributes
-    ----------
-    target
-        Wanted, kg or kg·m.
-    weight
-        After rounding.
-    worst
-        The largest error that rounding with these steps can make of a weight of this size.
-    """
-
-    target: complex
-    weight: complex
-    worst: float
-
-    def to_dict(self, labels: Labels) -> dict[str, Any]:
-        """As JSON types."""
-        return _document("one weight", self.target, labels, self.weight) | {
-            "weight": labels.weight_entry(self.weight),
-            "largest_possible_error": self.worst * labels.weight_scale,
-        }
-
-    def sentence(self, labels: Labels) -> str:
-        """The weight, and what rounding did to it."""
-        lost = f" (error {percent(_relative(self.weight, self.target))} %)" if self.worst else ""
-        return f"Mount {labels.weight_at(self.weight)}{lost}."
-
-
-def rounded(weight: complex, mass_step: float = 0.0, angle_step: float = 0.0) -> Rounded:
-    """A weight with its size and angle rounded to steps, and what that does to it.
-
-    With a size m′ within Δm/2 of m and an angle within Δφ/2, the error is |m′ e^{iδ} − m| with
-    |error|² = m′² + m² − 2 m m′ cos δ: convex in m′ and rising with |δ| ≤ π, so that `worst` stands at a
-    corner of the allowed range.
-
-    Parameters
-    ----------
-    weight
-        Wanted, kg or kg·m.
-    mass_step
-        Step of the scale in the same unit, 0: none.
-    angle_step
-        Step of the angle, rad, at most 2π, 0: none.
-
-    Raises
-    ------
-    ValueError
-        For steps that are negative, not finite, or beyond a full turn.
-    """
-    if not (0 <= mass_step < np.inf and 0 <= angle_step <= 2 * np.pi):
-        raise ValueError("the step of a scale must not be negative, that of an angle from 0 to 360°")
-    size, angle = abs(weight), float(np.angle(weight))
-    new = complex(weight)
-    if mass_step or angle_step:
-        new = _nearest(size, mass_step) * complex(np.exp(1j * _nearest(angle, angle_step)))
-    sizes = np.array([max(size - mass_step / 2, 0.0), size + mass_step / 2])
-    return Rounded(weight, new, float(np.abs(sizes * np.exp(0.5j * angle_step) - size).max()))
-
-
-def _nearest(value: float, step: float) -> float:
-    """The nearest multiple of a step (347 · 0.1 is 34.7); a step of 0 leaves the value."""
-    return float(f"{round(value / step) * step:.12g}") if step else value
-
-
-@dataclass(frozen=True, eq=False)
 class Removal:
     """Material taken away at one place, opposite to an unbalance that was to be added.
 
@@ -362,51 +292,36 @@ class Removal:
     target
         What was to be added, kg·m.
     radius
-        Of the surface that is drilled, or of the centre of mass of what is ground off, m.
+        Of the surface that is drilled, m.
     mass
         To be taken away, kg.
     diameter, depth, tip_depth
-        Of a hole, of its full diameter and of its tip, m; 0 for grinding.
+        Of the hole, of its full diameter and of its tip, m.
     """
 
     target: complex
     radius: float
     mass: float
-    diameter: float = 0.0
-    depth: float = 0.0
-    tip_depth: float = 0.0
+    diameter: float
+    depth: float
+    tip_depth: float
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types."""
         target = self.target / (1.0 if labels.unbalances else self.radius)
-        document = _document("drilling" if self.diameter else "grinding", target, labels)
+        document = _document("drilling", target, labels)
         document |= {"angle_deg": self._angle(labels), "radius_m": self.radius, "mass_kg": self.mass}
-        document["unbalance_kg_m"] = abs(self.target)
         hole = {"diameter_m": self.diameter, "depth_m": self.depth, "tip_depth_m": self.tip_depth}
-        return document | (hole if self.diameter else {})
+        return document | {"unbalance_kg_m": abs(self.target), **hole}
 
     def _angle(self, labels: Labels) -> float:
         return labels.weight_entry(-self.target)["angle_deg"]
 
     def sentence(self, labels: Labels) -> str:
         """Where, and how much or how deep."""
-        grams, at, radius = 1e3 * self.mass, f"at {self._angle(labels):.1f}°", 1e3 * self.radius
-        if not self.diameter:
-            return f"Grind off {grams:.5g} g {at}, radius {radius:g} mm."
+        grams, at = 1e3 * self.mass, f"at {self._angle(labels):.1f}°"
         size, tip = 1e3 * self.diameter, 1e3 * self.tip_depth
         return f"Drill a hole of diameter {size:.4g} mm {at}, down to {tip:.4g} mm (the tip): {grams:.4g} g."
-
-
-def grind(target: complex, radius: float) -> Removal:
-    """Material to be ground off at a radius (of its centre of mass, m) instead of adding an unbalance, kg·m.
-
-    Raises
-    ------
-    ValueError
-        For a radius that is not positive.
-    """
-    _positive(radius)
-    return Removal(target, radius, abs(target) / radius)
 
 
 def drill(target: complex, radius: float, diameter: float, density: float = STEEL) -> Removal:
@@ -440,7 +355,7 @@ def drill(target: complex, radius: float, diameter: float, density: float = STEE
     return Removal(target, radius, area * (depth + tip / 3), diameter, depth, depth + tip)
 
 
-OneWeight = Split | TwoPositions | Rounded | Removal
+OneWeight = Split | TwoPositions | Removal
 
 
 def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:

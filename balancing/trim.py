@@ -21,7 +21,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, text
-from rotorid.base.text import capital, figures, listing
+from rotorid.base.text import capital, figures
 
 WORTH = 0.9
 """Of the vibration in the check run: what a trim has to stay below."""
@@ -71,23 +71,31 @@ class LeftToDo(Answered):
 
     @property
     def answer(self) -> Answer:
-        """What to do; what is mounted."""
+        """What to do; what is mounted, and the trim in each plane."""
         c = self.correction
-        mounted = [c.labels.weight_at(w) if w else "nothing" for w in self.there]
-        what = capital(self.word)
+        columns = [
+            Column("plane", self.planes, str),
+            Column("mounted", [c.labels.weight_at(w) if w else "nothing" for w in self.there], str),
+        ]
+        lines = []
         if self.word == "trim" and self.pieces is not None:
-            what += f": {self.pieces.in_holes()}"
-        elif self.word == "trim":
-            at = c.places(self.planes, self.trim)
-            each = [
-                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(float(abs(w)))} at "
-                f"{at[p]:.1f}° in plane {plane!r}"
-                for p, (plane, w) in enumerate(zip(self.planes, self.trim, strict=True))
-                if w
+            each = zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True)
+            lines += ["", f"Trim with pieces, in {c.labels.weight_in}:"]
+            lines += [
+                f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
             ]
-            what += f": {listing(each, 'and')}"
-        columns = [Column("plane", self.planes, str), Column("mounted", mounted, str)]
-        return Answer(f"{what}; {self.why}.", text(columns, width=COLUMNS))
+        elif self.word == "trim":
+            places = c.places(self.planes, self.trim).tolist()
+            add = zip(self.planes, self.trim.tolist(), places, strict=True)
+            cells = [
+                f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(abs(w))} at {at:.1f}°"
+                if w
+                else "nothing"
+                for plane, w, at in add
+            ]
+            columns.append(Column("trim", cells, str))
+        table = text(columns, left=len(columns), width=COLUMNS)
+        return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]))
 
 
 def after_check_run(

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import HOPELESS, UndeterminedError
 from balancing.conventions import Labels
 from balancing.influence import Influence
-from balancing.regions import real_parts
+from balancing.regions import NORMAL_RADIUS, real_parts
 from balancing.tables import weight_columns
 from balancing.trials import Trials, check_names
 from rotorid.base.answer import Answer, Answered
@@ -34,7 +34,7 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.registry import Method, find
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import capital, listing
+from rotorid.base.text import capital, figures, listing
 from rotorid.regression import RCOND
 
 if TYPE_CHECKING:
@@ -159,17 +159,17 @@ class Unbalance(Answered):
         std = self.std * self.labels.weight_scale
         return (
             replace(station, name="station"),
-            replace(size, name="unbalance", shown="{:.5g}".format),
+            replace(size, name="unbalance", shown="{:.4g}".format),
             unit,
             angle,
-            Column("std", std, "± {:.3g}".format, "1 std"),
+            Column("std", std, lambda one: f"± {figures(NORMAL_RADIUS * one, 2)}", "95 %"),
             Column("own_share", self.own_share),
             Column("determined", self.determined),
         )
 
     @property
     def answer(self) -> Answer:
-        """What is determined, and the unbalance of each station with its standard deviation."""
+        """What is determined, and the unbalance of each station with its 95 % region."""
         sure = [
             "yes" if alone else f"no ({min(max(100 * share, 0.0), 99.0):.0f} % its own)"
             for alone, share in zip(self.determined, self.own_share, strict=True)

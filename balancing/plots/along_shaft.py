@@ -9,7 +9,7 @@ import numpy as np
 
 from balancing.plots.polar import arrows, on_paper, turning
 from balancing.regions import region_edge
-from rotorid.base.plot_style import BLUE, TEXT, new_figure, note, plain
+from rotorid.base.plot_style import BLUE, TEXT, new_figure, note, plain, plain_numbers
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:
@@ -48,7 +48,12 @@ def draw_verdict(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None)
     if not rows:
         raise ValueError("this verdict has no planes to draw: give a tolerance")
     ax, order = _bars(ax, {place: row.limit for place, row in rows.items()}, scale, t)
-    sizes = [size * scale for row in rows.values() for size in (row.low or row.size, row.limit) if size > 0]
+    sizes = [
+        size * scale
+        for row in rows.values()
+        for size in (row.low or row.size, row.high or 0.0, row.limit)
+        if size > 0
+    ]
     bottom = max(0.3 * min(sizes), 1e-5 * max(sizes))
     for x, row in enumerate(rows[place] for place in order):
         size, angle = (float(value) for value in v.labels.weight(row.value))
@@ -63,8 +68,9 @@ def draw_verdict(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None)
         note(ax, f"{text}\n{row.verdict}", at, (8, 3))
     name = f"residual unbalance, {v.labels.weight_in} (log scale)"
     title = f"Residual unbalance and tolerance ({v.source}): {v.overall}"
-    ax.set(yscale="log", ylim=(bottom, 4 * max(sizes)), ylabel=name, title=title)
-    ax.yaxis.set_major_formatter("{x:g}")
+    ax.set(yscale="log", ylim=(bottom, 4 * max(sizes)), ylabel=name)
+    ax.set_title(title, fontsize="medium")
+    plain_numbers(ax)
     return ax
 
 

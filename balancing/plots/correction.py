@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
     from balancing.correction import Correction
     from balancing.mount import Mounted
 
-_NAMED, _SPEEDS = 40, 12
-"""Readings that have room for the names of their sensors; speeds that have."""
+_NAMED, _SPEEDS, _LETTERS = 40, 12, 70
+"""Readings that have room for the names of their sensors; speeds that have; letters of a title's line."""
+_REGIONS = "95 % regions: closed lines, or smaller than the marks"
 
 
 def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
@@ -56,27 +58,33 @@ def correction_figure(
     """
     figure = new_figure(8.6)
     grid = figure.add_gridspec(2, height_ratios=[5, 6])
-    polar, lower = weights(c, figure.add_subplot(grid[0], projection="polar")), figure.add_subfigure(grid[1])
+    polar = weights(c, figure.add_subplot(grid[0], projection="polar"), check)
+    lower = figure.add_subfigure(grid[1])
     if below is None:
         amplitudes(c, axes := lower.subplots(2, sharex=True), check)
     else:
         below(axes := lower.add_subplot())
     words = c.sentence() if check is None else check.headline
-    figure.suptitle(words.replace("; ", ";\n"), fontsize="medium", fontweight="bold")
+    figure.suptitle(textwrap.fill(words, _LETTERS), fontsize="medium", fontweight="bold", parse_math=False)
     legend_below(figure, [polar, *np.atleast_1d(axes)], title=turning(c.labels))
     return figure
 
 
-def residual_figure(result: Correction, mounted: Mounted | None = None) -> Figure:
-    """A new figure of readings before and after (with pieces, where given), and what is left by itself."""
+def residual_figure(
+    result: Correction, mounted: Mounted | None = None, check: CheckComparison | None = None
+) -> Figure:
+    """A new figure of readings before and after (with pieces, in a check run), and what is left by itself."""
     figure = new_figure(4.2, 5.8)
-    amplitudes(result, axes := figure.subplots(2, sharex=True), mounted=mounted)
+    amplitudes(result, axes := figure.subplots(2, sharex=True), check, mounted)
     legend_below(figure, axes)
     return figure
 
 
-def weights(c: Correction, ax: Axes | None = None) -> Axes:
-    """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs."""
+def weights(c: Correction, ax: Axes | None = None, check: CheckComparison | None = None) -> Axes:
+    """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs.
+
+    With check runs what was mounted in the last of them, too.
+    """
     labels, shown, limits = c.labels, c.labels.weight, c.limits
     polar = polar_axes(ax, labels.angles_on_paper, f"Weights on the bare rotor, {labels.weight_in}")
     largest = np.abs(c.weights).max()
@@ -87,7 +95,10 @@ def weights(c: Correction, ax: Axes | None = None) -> Axes:
         draw_line(polar, shown, [0, c.weights[p]], lw=2, label=name, **of_plane(p))
         lines = []
         if c.region_known:
-            lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, "closed lines: 95 % regions"))
+            lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, _REGIONS))
+        if check is not None and plane in check.planes:
+            there = check.weights[-1, check.planes.index(plane)]
+            draw_line(polar, shown, [there], "o", mfc="white", ms=9, mew=1.5, color=of_plane(p)["color"])
         if limits is not None:
             arcs = [(limits.max_weight[p], 0.0, 2 * np.pi, "--", 0.9, "dashed circles: largest weights")]
             arcs += [
@@ -103,6 +114,9 @@ def weights(c: Correction, ax: Axes | None = None) -> Axes:
             styles[words] = style, thick
     for words, (style, thick) in styles.items():
         polar.plot([], [], style, lw=thick, color=QUIET, label=words)
+    if check is not None:
+        words = f"circles: mounted in run {cut(check.runs[-1], 24)!r}"
+        polar.plot([], [], "o", mfc="white", color=QUIET, label=words)
     # a region far larger than the weights would hide them: it may leave the picture
     from_zero(polar, shown, c.weights, 4 * largest * labels.weight_scale or 1.0)
     return polar
@@ -136,7 +150,7 @@ def amplitudes(
         label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
         ax.plot(beside, after, "o", color="black", ms=4.5, label=label)
         if check is not None:
-            ax.plot(places + 0.2, achieved, "*", color="black", ms=8, mec="white", label="achieved")
+            ax.plot(places + 0.2, achieved, "*", color="black", ms=9, mec="white", mew=0.5, label="achieved")
         elif c.limits is not None and np.isfinite(c.limits.residual).any():
             limit = c.limits.residual.ravel() * labels.vibration_scale
             ax.hlines(limit, places - 0.45, places + 0.45, color="black", lw=2.2, label="limit")

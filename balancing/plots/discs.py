@@ -24,10 +24,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from balancing.correction import Correction
     from balancing.mount import Mounted
 
-_HOLES, _NUMBERS, _TEXTS, _ARROW, _SIDE, _EDGE = 0.84, 0.63, 1.08, 0.5, 1.85, 1.55
+_HOLES, _NUMBERS, _TEXTS, _ARROW, _SIDE, _EDGE = 0.84, 0.63, 1.08, 0.46, 1.95, 1.42
 """Radii of holes, their numbers, what stands around the disc and the longest arrow; half of the picture."""
+_LINE, _NUMBERED = 0.22, 16
+"""Height of a line of text below; holes that all have their numbers."""
 
 
 def draw_disc(  # noqa: PLR0913
@@ -41,6 +44,7 @@ def draw_disc(  # noqa: PLR0913
     weight: complex = 0j,
     loose: Sequence[complex] = (),
     forbidden: Sequence[tuple[float, float]] = (),
+    zero: complex = 1.0,
 ) -> Axes:
     """Draw one plane: rotation, mark, numbered holes, weights (area by mass), and what they are to make.
 
@@ -64,6 +68,8 @@ def draw_disc(  # noqa: PLR0913
         Further weights at any angles, in one place each.
     forbidden
         First angle and width, rad with the rotation, of arcs where no weight can stand (hatched).
+    zero
+        Where 0° stands: 1 to the right, 1j at the top.
     """
     sign, minus = (-1.0, "−") if remove else (1.0, "")
     weights, taken = [*loose], np.zeros(1) if holes is None else holes.taken
@@ -72,48 +78,86 @@ def draw_disc(  # noqa: PLR0913
         for h in np.flatnonzero(mounting.amounts).tolist():
             weights.append(complex(mounting.amounts[h] * np.exp(1j * holes.angles[h])))
             texts.append(f"{holes.names[h]}: {minus}{content(holes, mounting, h, labels.weight_scale)}")
-    at = sign * on_paper(labels, weights)
+    at = sign * zero * on_paper(labels, weights)
     scale = min(0.1, _HOLES * np.pi / len(taken)) / np.sqrt(max([*np.abs(at), *taken]) or 1.0)
     what = "nothing" if mounting is not None and not weights else labels.weight_in
     title = f"{cut(plane, 20)}: {'take away' if remove else 'add'}, {what}"
-    ax.set_title(title, fontsize="medium", fontweight="bold")
+    ax.set_title(title, fontsize="medium", fontweight="bold", parse_math=False)
     ax.axis("off")
     ax.set(aspect="equal", xlim=(-_SIDE, _SIDE), ylim=(-_EDGE, _EDGE))
-    ax.text(-_SIDE, 0.9 * _EDGE, f"{turn_sign(labels)} rotation", fontsize=TEXT)
+    ax.text(-_SIDE, -0.95 * _EDGE, f"{turn_sign(labels)} rotation", fontsize=TEXT)
     _circle(ax, 0j, 1.0, fc="white")
-    ax.plot(0.965, 0, "<", color="black", ms=9)
+    turned = float(np.degrees(np.angle(zero)))
+    mark = 0.95 * zero
+    ax.plot(mark.real, mark.imag, marker=(3, 0, turned + 90.0), color="black", ms=8)
     for start, width in forbidden:
-        ends = np.degrees(np.sort(labels.drawn([start, start + width]))) + 180.0 * remove
+        ends = np.degrees(np.sort(labels.drawn([start, start + width]))) + 180.0 * remove + turned
         ax.add_patch(Wedge((0, 0), 1.0, *ends, width=0.32, fc="white", hatch="xxxx"))
     if holes is not None:
-        _draw_holes(ax, holes, sign * on_paper(labels, np.exp(1j * holes.angles)), scale)
+        _draw_holes(ax, holes, sign * zero * on_paper(labels, np.exp(1j * holes.angles)), scale)
     look: dict[str, Any] = {"fc": "white", "hatch": "xxx"} if remove else {"fc": "0.2"}
     for place in at:
         _circle(ax, _HOLES * place / abs(place), scale * np.sqrt(abs(place)), **look)
-    _write_around(ax, at, texts, labels)
+    _write_around(ax, at, texts, labels, zero)
     vectors = {"wanted (white)": weight, "made (black)": sum(weights)}
     if np.isclose(weight, sum(weights), rtol=1e-9, atol=0.0):
         del vectors["made (black)"]  # one arrow says it all
     shown = {name: vector for name, vector in vectors.items() if vector}
     lines = [f"{name}: {labels.weight_at(vector)}" for name, vector in shown.items()]
     size = _ARROW / (np.abs([*vectors.values()]).max() or 1.0)
-    arrows(ax, 0.0, size * on_paper(labels, [*shown.values()]), [name[-6:-1] for name in shown])
+    arrows(ax, 0.0, size * zero * on_paper(labels, [*shown.values()]), [name[-6:-1] for name in shown])
     lines = [f"like adding, {line}" if remove else line for line in lines]
     lines += ["hatched arcs: nothing goes there"] if forbidden else []
-    ax.text(0, -_EDGE, "\n".join(lines), ha="center", va="top", fontsize=TEXT)
+    bottom = -_EDGE - _LINE * len(lines)
+    ax.set_ylim(bottom, _EDGE)
+    ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)
     return ax
+
+
+def draw_plane(
+    ax: Axes,
+    c: Correction,
+    plane: str,
+    mounted: Mounted | None = None,
+    holes: Holes | None = None,
+    zero: complex = 1.0,
+) -> Axes:
+    """One plane of a correction with the pieces in its holes, or with the weight where it stands.
+
+    Parameters
+    ----------
+    ax
+        Where; ordinary axes.
+    c, plane
+        A correction and one of its planes.
+    mounted
+        Pieces in holes; None: none were chosen.
+    holes
+        Of the plane, where none were chosen for them.
+    zero
+        Where 0° stands: 1 to the right, 1j at the top.
+    """
+    p, mounting = c.planes.index(plane), None
+    wanted = loose = c.weights[p]
+    if mounted is not None:
+        holes, mounting = mounted.holes[p], mounted.discrete.mountings[p]
+        loose = mounted.weights[p] if mounting is None else 0.0
+        if mounted.on_top_of is not None:
+            wanted = c.to_add[c.mounted.planes.index(plane)]
+    look: dict[str, Any] = {"remove": plane in c.remove, "weight": complex(wanted), "zero": zero}
+    look |= {
+        "loose": [complex(loose)] if loose else [],
+        "forbidden": c.limits.forbidden[p] if c.limits else (),
+    }
+    return draw_disc(ax, plane, holes, mounting, c.labels, **look)
 
 
 def mounted_discs(m: Mounted) -> Figure:
     """A new figure of all planes and their holes; planes without show the weight where it stands."""
     c = m.correction
     figure, axes = _discs(len(c.planes), c.labels)
-    each = zip(axes, c.planes, c.weights.tolist(), m.holes, m.discrete.mountings, strict=True)
-    for p, (ax, plane, weight, holes, mounting) in enumerate(each):
-        loose = () if mounting is not None or weight == 0 else (weight,)
-        arcs = () if c.limits is None else c.limits.forbidden[p]
-        look: dict[str, Any] = {"remove": plane in c.remove, "loose": loose, "forbidden": arcs}
-        draw_disc(ax, plane, holes, mounting, c.labels, weight=weight, **look)
+    for ax, plane in zip(axes, c.planes, strict=True):
+        draw_plane(ax, c, plane, m)
     return figure
 
 
@@ -159,13 +203,22 @@ def _draw_holes(ax: Axes, holes: Holes, ways: ComplexArray, scale: float) -> Non
         _circle(ax, _HOLES * way, min(0.05, _HOLES / count), fc="white")
         if taken:
             _circle(ax, _HOLES * way, scale * np.sqrt(taken), fc="0.85", hatch="////")
-        if h % (count // 25 + 1) == 0:
+        if h % (count // (_NUMBERED + 1) + 1) == 0:
             inside = _NUMBERS * way
-            ax.text(inside.real, inside.imag, holes.names[h], ha="center", va="center", fontsize=TEXT)
+            ax.text(
+                inside.real,
+                inside.imag,
+                holes.names[h],
+                ha="center",
+                va="center",
+                fontsize=TEXT,
+                parse_math=False,
+            )
 
 
-def _write_around(ax: Axes, at: ComplexArray, texts: Sequence[str], labels: Labels) -> None:
+def _write_around(ax: Axes, at: ComplexArray, texts: Sequence[str], labels: Labels, zero: complex) -> None:
     """Twelve texts around the disc: of the weights that stand there, else the degrees."""
+    first = round(np.angle(zero) * 6 / np.pi)
     sectors = np.round(np.angle(at) * 6 / np.pi + 1e-6) % 12
     for sector in range(12):
         text = "\n".join(texts[k] for k in np.flatnonzero(sectors == sector).tolist())
@@ -173,9 +226,10 @@ def _write_around(ax: Axes, at: ComplexArray, texts: Sequence[str], labels: Labe
         ax.text(
             way.real,
             way.imag,
-            text or f"{30 * sector * labels.angles_on_paper % 360}°",
+            text or f"{30 * (sector - first) * labels.angles_on_paper % 360}°",
             ha=("right", "center", "left")[round(way.real) + 1],
             va=("top", "center", "bottom")[round(way.imag) + 1],
             fontsize=TEXT,
             fontweight="bold" if text else "normal",
+            parse_math=False,
         )

@@ -47,7 +47,7 @@ def polar_axes(ax: Axes | None, sign: int, title: str) -> PolarAxes:
     polar = cast("PolarAxes", ax)
     polar.set_theta_direction(1 if sign > 0 else -1)
     polar.tick_params(labelsize=TEXT, pad=0)
-    polar.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))
+    polar.yaxis.set_major_locator(MaxNLocator(4, prune="both"))
     polar.set_title(title, fontsize="medium", pad=10)
     return polar
 
@@ -64,9 +64,12 @@ def of_plane(p: int) -> dict[str, Any]:
 
 
 def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = np.inf) -> None:
-    """Radii from 0 (to `most` at most), their numbers away from the vectors."""
-    polar.set_rlabel_position(float(shown(-np.sum(vectors))[1]))
-    polar.set_rlim(0, min(polar.get_rmax(), most), auto=True)
+    """Radii from 0 (to `most` at most), their numbers farthest from the vectors."""
+    angles = np.sort(shown(np.atleast_1d(vectors))[1])
+    gaps = np.diff([*angles, angles[0] + 360.0])
+    middle = float(angles[k := int(gaps.argmax())] + gaps[k] / 2)
+    polar.set_rlabel_position(45.0 * (middle // 45.0) + 22.5 if gaps[k] > 90.0 else middle)  # none at 90°
+    polar.set_rlim(0, min(1.05 * polar.get_rmax(), most), auto=True)
 
 
 def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike) -> None:
@@ -131,6 +134,8 @@ def draw_readings(
             draw_line(polar, shown, change, ":", color=look["color"])
     from_zero(polar, shown, values)
     polar.plot([], [], color=QUIET, label="closed lines: 95 % of one reading")
+    if first is not None:
+        polar.plot([], [], ":", color=QUIET, label=f"dotted: change from {cut(first, 24)}")
     legend_above(polar, 2, height=-0.08)
     return polar
 

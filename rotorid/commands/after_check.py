@@ -11,7 +11,7 @@ from rotorid.commands.coefficients import choose
 
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
-    from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.commands.balance_solution import BalanceOptions
     from rotorid.tables import Job
 
 

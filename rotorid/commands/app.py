@@ -130,7 +130,6 @@ class Destination:
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
     """Refuse files that could not be written, with how their names may end, before any work is done."""
-    asked: list[Path] = []
     for path, endings in targets:
         if path is None:
             continue
@@ -142,13 +141,9 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
             f"the folder {folder} does not exist": not folder.is_dir(),
             f"cannot be written, it is {kind}": path.exists() and not path.is_file(),
             "cannot be written, permission denied": not os.access(path if path.exists() else folder, os.W_OK),
-            "two results cannot go into one file; give each its own name": any(
-                _same_file(path, other) for other in asked
-            ),
         }
         if why := [words for words, holds in refused.items() if holds]:
             raise ValueError(f"{path}: {why[0]}")
-        asked.append(path)
 
 
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotorid.base.answer import LINES, Answer, together
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
-from rotorid.commands.balance_options import BalanceOptions as BalanceOptions
-from rotorid.commands.balance_options import choices
+from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
 from rotorid.commands.balance_solution import (
-    read_source,
+    choices,
+    job_of,
     solve,
-    source_of,
     with_other_conventions,
 )
 from rotorid.commands.coefficients import KINDS
@@ -29,15 +28,7 @@ from rotorid.report.outcome import Outcome, command, outcome_of, provenance, tab
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import (
-        CheckComparison,
-        Correction,
-        Influence,
-        LeftToDo,
-        Mounted,
-        Tolerance,
-        Verdict,
-    )
+    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.report.equations import Equations
@@ -70,9 +61,8 @@ class Balance(Outcome):
         """The balancing sheet: one HTML file."""
         from rotorid.report.balance import balance_report
 
-        words = self.answer.judgement
-        made = self.result, self.mounted, self.left
-        return balance_report(self.to_dict(), made, self.influence, self.job, self.provenance, words)
+        made = self.result, self.mounted, self.check, self.left, self.verdict
+        return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
 
 @command
@@ -83,7 +73,8 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
 
-    --template job.xlsx writes a form; filled in, it is a job. --output sheet.xlsx is the job with results.
+    --template job.xlsx writes a form; filled in, it is a job. --output sheet.xlsx is the job with results,
+    --output w.json the coefficients, for --influence.
 
     Parameters
     ----------
@@ -98,44 +89,36 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     from balancing import compare_check, mount
-    from rotorid.files.job import JobSource
 
     options = options or BalanceOptions()
     _check(options)
-    source = source_of(job, options)
-    files = source if isinstance(source, JobSource) else None
-    read = read_source(source, options)
-    unstated = read.check is not None and not read.check_mounted
-    first = None
-    if unstated or not options.refine:
-        first = solve(read, replace(options, refine=False))
-        read = as_proposed(read, first.result, *first.known)
-    solved = first if first is not None and not options.refine else solve(read, options)
+    read, files = job_of(job, options)
+    stated = read.check is None or read.check_mounted
+    if options.refine and stated:
+        solved = solve(read, options)
+    else:
+        solved = solve(read, replace(options, refine=False))
+        read = as_proposed(read, solved.result, *solved.known)
+        solved = solve(read, options) if options.refine else solved
     influence, runs = solved.known
     # what was proposed before a refinement was proposed by these conventions and no others
-    alone = options.refine and unstated
-    result = with_other_conventions(solved, read, None if alone else files, options)
-    mounted, check, left, in_check = None, None, None, read.check_pieces
-    if options.split and in_check is not None and not options.refine:
-        mounted = in_check
-    elif options.split and (read.holes or in_check is None):
+    result = with_other_conventions(solved, read, files if stated or not options.refine else None, options)
+    mounted, check, left = None, None, None
+    if options.split and read.check_pieces is not None and not options.refine:
+        mounted = read.check_pieces
+    elif options.split and (read.holes or read.check_pieces is None):
         mounted = mount(result, influence, runs, read.holes, on_top=options.refine)
     if read.check is not None and not options.refine:
-        check = replace(compare_check(result, read.check, influence, runs), as_proposed=unstated)
+        check = replace(compare_check(result, read.check, influence, runs), as_proposed=not stated)
     tolerance = _tolerance(result.planes, options)
     verdict = _judge(result, influence, read, tolerance, mounted)
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
-    parts = {
-        "": result,
-        "mounting": mounted,
-        "check": check,
-        "left_to_do": left,
-        "verdict": verdict,
-        "of_type": solved.of_type,
-    }
-    made = provenance(read.files if solved.of_type is None else solved.of_type.files_beside(read), options)
+    of_type = solved.of_type
+    made = provenance(read.files if of_type is None else of_type.files_beside(read), options)
+    beside = {"mounting": mounted, "check": check, "left_to_do": left, "verdict": verdict, "of_type": of_type}
+    pieces = mounted if left is None else left.pieces
 
     def workbook(_: Path) -> Written:
         from rotorid.files.job_excel import job_workbook_bytes
@@ -154,28 +137,26 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
-    fields = vars(
-        outcome_of(
-            result,
-            made,
-            answer=_answer(parts, read, influence),
-            keys=partial(_document, parts),
-            file=lambda: table_of((mounted or result).to_frame()),
-            files={".xlsx": workbook, "save_influence": coefficients},
-            pictures={"": lambda: _figure(parts, tolerance)},
-            solved=solved_equations,
-            lines=LINES + 6 * bool(mounted or (left and left.pieces)),
-        )
+    plain = outcome_of(
+        result,
+        made,
+        answer=_answer(result, mounted, check, left, verdict, read, influence),
+        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
+        file=lambda: table_of((mounted or result).to_frame()),
+        files={".xlsx": workbook, ".json": coefficients},
+        pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
+        solved=solved_equations,
+        lines=LINES + 6 * bool(mounted or pieces),
     )
     outcome = Balance(
+        **vars(plain),
         influence=influence,
         job=read,
         mounted=mounted,
         check=check,
         left=left,
         verdict=verdict,
-        of_type=solved.of_type,
-        **fields,
+        of_type=of_type,
     )
     return outcome
 
@@ -195,27 +176,26 @@ def _check(options: BalanceOptions) -> None:
         )
 
 
-def _document(parts: Mapping[str, Any]) -> dict[str, Any]:
-    keys = {key: part.to_dict() for key, part in parts.items() if part is not None}
-    return {**keys.pop(""), **keys}
-
-
-def _answer(parts: Mapping[str, Any], job: Job, influence: Influence) -> Answer:
+def _answer(
+    result: Correction,
+    mounted: Mounted | None,
+    check: CheckComparison | None,
+    left: LeftToDo | None,
+    verdict: Verdict | None,
+    job: Job,
+    influence: Influence,
+) -> Answer:
     """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
     from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
 
-    result, mounted, check, left, verdict = (
-        parts[key] for key in ("", "mounting", "check", "left_to_do", "verdict")
-    )
     weights, sound = result.answer, result.sound
     if needs_trial_run(job, influence):
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
     limits = [] if verdict is None else [verdict.answer]
-    if left is not None:  # the verdict and what is left to do; the weights of the bare rotor are tables
-        first, cause = [one.judgement for one in (*limits, left.answer)], []
+    if left is not None:  # the weights of the bare rotor are tables
+        first = [one.judgement for one in (left.answer, *limits)]
         if check is not None:
-            first.insert(-1, check.headline)
-            cause.append(sentence(check.verdict))
+            first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
         if job.check_pieces is not None:
             pieces = job.check_pieces.in_holes()
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
@@ -223,7 +203,7 @@ def _answer(parts: Mapping[str, Any], job: Job, influence: Influence) -> Answer:
             first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
         tables = [_behind(part.answer) for part in (mounted, result) if part]
         every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
-        return replace(every, judgement="\n".join([" ".join(first), *cause]))
+        return replace(every, judgement=" ".join(first))
     if mounted:
         weights = replace(_behind(weights), judgement="" if sound else weights.judgement)
     judged = [*limits, *([mounted.answer] if mounted else [])]
@@ -235,18 +215,22 @@ def _behind(answer: Answer) -> Answer:
     return replace(answer, found="", tables=(answer.found, *answer.tables))
 
 
-def _figure(parts: Mapping[str, Any], tolerance: Tolerance | None) -> Figure:
+def _figure(
+    result: Correction,
+    pieces: Mounted | None,
+    check: CheckComparison | None,
+    verdict: Verdict | None,
+    tolerance: Tolerance | None,
+) -> Figure:
     """The correction, or what was asked for beside it: discs with holes, tolerances."""
     from balancing import plots
 
-    left, verdict = parts["left_to_do"], parts["verdict"]
-    pieces = parts["mounting"] if left is None else left.pieces
     if pieces is not None:
         return plots.mounted_discs(pieces)
     below = None
     if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
         below = partial(plots.draw_verdict, verdict, t=tolerance)
-    return plots.correction_figure(parts[""], parts["check"], below)
+    return plots.correction_figure(result, check, below)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -1,23 +1,26 @@
-"""The correction of a job by the options of `balance`, also as it were under other conventions."""
+"""Options of `balance`, and the correction of a job by them, also as it were under other conventions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
+from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import limited
-from rotorid.commands.quantities import names, speeds
+from rotorid.commands.quantities import Names, Speeds, names, speeds
 from rotorid.report.options import file_of
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
-    from rotorid.commands.balance_options import BalanceOptions
+    from rotorid.base.registry import Method
+    from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files.job import JobSource
     from rotorid.fleet.type_coefficients import TypeKnowledge
     from rotorid.tables import Job
@@ -26,34 +29,138 @@ if TYPE_CHECKING:
     """A job, its file, or a runs table and a weights table."""
 
 
-def source_of(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
-    """A job that has been read, or what is to be read."""
+def choices() -> dict[str, Sequence[Method[Any]]]:
+    """What `method` chooses from."""
+    from balancing import METHODS
+
+    return {"method": METHODS}
+
+
+@dataclass(frozen=True)
+class BalanceOptions:
+    """Options of `balance`; conventions and errors stand in place of what the job says.
+
+    Attributes
+    ----------
+    method : METHOD
+        How readings count; default: weighted where their errors are known.
+    influence : FILE
+        Stored influence coefficients, in place of trial runs.
+    coefficients : KIND
+        measured, computed (from the job's rotor) or combined.
+    machine_type : --type FLEET:TYPE
+        Coefficients of its type, from a fleet.
+    errors : PERCENT,DEGREES
+        One standard deviation of a reading's amplitude and of its phase: 2,1.
+    phase : lead|lag
+        What a positive phase means.
+    angles : DIRECTION
+        with rotation, against rotation; where the job states its rotation, clockwise or counter-clockwise.
+    planes : LIST
+        Use these planes only.
+    speeds : LIST
+        Use these speeds only, as in the runs, or 20Hz,25Hz.
+    max_mass : MASS
+        Largest weight of every plane, 5g; or left=5g,right=3g.
+    limit : SENSOR=VALUE
+        Largest amplitude of a sensor, or VALUE of all; repeatable.
+    ridge : STRENGTH
+        Small weights where planes act alike: 0.01 … 0.1.
+    split
+        Pieces in the holes of the job, as few as will do.
+    refine
+        Count check runs as trial runs: trim from all.
+    grade : GRADE
+        Judge one or two planes by ISO 21940-11: G0.4 to G4000.
+    rotor_mass : MASS
+        For --grade, such as 500kg.
+    service_speed : SPEED
+        For --grade, such as 3000rpm.
+    template : FILE.xlsx
+        Write an empty workbook to fill in.
+    """
+
+    method: str | None = None
+    influence: Path | str | None = None
+    coefficients: str | None = None
+    machine_type: str | None = None
+    errors: Errors | None = None
+    phase: str | None = None
+    angles: str | None = None
+    planes: Names | None = None
+    speeds: Speeds | None = None
+    max_mass: Weights | None = None
+    limit: Amplitudes = ()
+    ridge: float | None = None
+    split: bool = False
+    refine: bool = False
+    grade: str | None = None
+    rotor_mass: Amount | None = None
+    service_speed: Amount | None = None
+    template: Path | None = None
+    panels: ClassVar[Mapping[str, str]] = {
+        "Input and conventions": "phase angles errors",
+        "Method": "method planes speeds coefficients machine_type influence ridge",
+        "Limits, mounting, check run": "max_mass limit split refine grade rotor_mass service_speed",
+        "Output": "template",
+    }
+    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".json")
+
+    def before(self, job: Sequence[Path] | None) -> str | None:
+        """Write the empty workbook where it is asked for, and say so.
+
+        Raises
+        ------
+        ValueError
+            Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
+        """
+        from rotorid.commands.app import check_targets
+        from rotorid.files.job_excel import template_bytes
+        from rotorid.files.table_writing import write_bytes
+
+        path = self.template
+        if job and path is None:
+            return None
+        if job or path is None:
+            raise ValueError(
+                "give a job (.toml, .xlsx) or a runs table and a weights table; --template, without a "
+                "job, writes a form"
+            )
+        check_targets([(path, (".xlsx",))])
+        if path.exists():
+            raise ValueError(f"{path}: exists already, and may be filled in; choose another name")
+        write_bytes(path, template_bytes())
+        return f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}"
+
+
+def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | None]:
+    """The job with the limits of the options, and what it was read from; None: it had been read already."""
     from rotorid.files.job import JobSource, Overrides
     from rotorid.tables import Job
 
     stored = None if options.influence is None else Path(options.influence)
-    stated = (options.phase, options.angles, options.amplitude_error, options.phase_error)
+    errors = (None, None) if options.errors is None else percent_and_degrees(options.errors)
+    stated = (options.phase, options.angles, *errors)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-        return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
+        source = JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
+        return _read(source, options), source
     if any(value is not None for value in (stored, *stated)):
         raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
-    return job
+    return limited(job, options.max_mass, options.limit), None
 
 
-def read_source(source: Job | JobSource, options: BalanceOptions) -> Job:
-    """The job, with the limits of the options."""
-    from rotorid.files.job import JobSource
+def _read(source: JobSource, options: BalanceOptions) -> Job:
+    """The job of these files, with the limits of the options."""
     from rotorid.tables import job_from_files, read_job
 
-    if isinstance(source, JobSource):
-        files, overrides = source.files, asdict(source.overrides)
-        single = len(files) == 1 and source.influence is None
-        if single and files[0].suffix.lower() in (".toml", ".xlsx"):
-            source = read_job(files[0], **overrides)
-        else:
-            source = job_from_files(files, influence=source.influence, **overrides)
-    return limited(source, options.max_mass, options.limit)
+    files, overrides = source.files, asdict(source.overrides)
+    if len(files) == 1 and source.influence is None and files[0].suffix.lower() in (".toml", ".xlsx"):
+        read = read_job(files[0], **overrides)
+    else:
+        read = job_from_files(files, influence=source.influence, **overrides)
+    return limited(read, options.max_mass, options.limit)
 
 
 class Solved(NamedTuple):
@@ -118,7 +225,7 @@ def correct_job(
         influence,
         runs,
         planes,
-        _speeds(job, options),
+        None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit),
         refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
         method=options.method,
         limits=job.limits_of(influence.planes),
@@ -126,10 +233,6 @@ def correct_job(
         strength=options.ridge,
         remove=job.removed,
     )
-
-
-def _speeds(job: Job, options: BalanceOptions) -> list[float] | None:
-    return None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
 
 
 def with_other_conventions(
@@ -150,7 +253,7 @@ def with_other_conventions(
         overrides = replace(source.overrides, phase=other.phase, angles=other.angles)
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
-                again = read_source(replace(source, overrides=overrides), options)
+                again = _read(replace(source, overrides=overrides), options)
                 found = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue

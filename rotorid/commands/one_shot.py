@@ -18,8 +18,6 @@ from rotorid.calibration import RunReadings, run_errors
 from rotorid.files.input_file import sha256
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from balancing import Influence
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray
@@ -87,17 +85,12 @@ def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunRe
     )
 
 
-def _values(rotor: Rotor) -> Mapping[str, float]:
-    """The calibrated numbers as they stand."""
-    assert rotor.calibration is not None
-    numbers = zip(rotor.calibration.names, rotor.calibration.values.tolist(), strict=True)
-    angles = {path: value for path, value in numbers if is_reading(path)}
-    paths = dict.fromkeys(as_change(rotor, path) for path in (*rotor.calibration.names, *angles))
-    return {path: angles[path] if path in angles else parameter_value(rotor, path) for path in paths}
-
-
 def _derivatives(runs: RunReadings, rotor: Rotor) -> tuple[ComplexArray, ComplexArray]:
-    """Coefficients and their derivatives by the calibrated numbers that act on these sensors."""
+    """Coefficients and their derivatives by the calibrated numbers, at these, that act on these sensors."""
     assert rotor.calibration is not None
     names = [as_change(rotor, path) for path in rotor.calibration.names]
-    return runs.coefficients(rotor, _values(rotor), names)
+    numbers = zip(rotor.calibration.names, rotor.calibration.values.tolist(), strict=True)
+    angles = {path: value for path, value in numbers if is_reading(path)}
+    paths = dict.fromkeys((*names, *(as_change(rotor, path) for path in angles)))
+    values = {path: angles[path] if path in angles else parameter_value(rotor, path) for path in paths}
+    return runs.coefficients(rotor, values, names)

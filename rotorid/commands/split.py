@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from rotorid.commands.option_quantities import Amount, Vector
 
 _WAYS = ("holes", "two", "drill")
-_OF_HOLES = ("first_hole", "pieces", "per_hole", "taken")
-_APART = 1e-3
-"""Degrees between holes that count as one."""
+_OF_HOLES = ("pieces", "per_hole", "taken")
+_APART, _MOST = 1e-3, 1000
+"""Degrees between holes that count as one; holes at most."""
 _GOOD_ENOUGH = 0.2
 """The fewest pieces whose error is at most this, or at most 1.2 times the least."""
 
@@ -35,9 +35,7 @@ class SplitOptions:
     Attributes
     ----------
     holes : N|DEG,DEG,…
-        Number of equally spaced holes, or their angles, ascending.
-    first_hole : DEG
-        Angle of hole 1 of equally spaced ones; default: 0.
+        Number of equally spaced holes from 0°, or the angles of holes, ascending.
     pieces : 10g,20g
         Available pieces; without them amounts are free.
     per_hole : N from 1
@@ -57,7 +55,6 @@ class SplitOptions:
     """
 
     holes: str | int | Sequence[float] | None = None
-    first_hole: float | None = None
     pieces: str | Sequence[float] | None = None
     per_hole: int | None = None
     taken: str | Mapping[str, float] | None = None
@@ -68,7 +65,7 @@ class SplitOptions:
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "mounted radius angles",
-        "Holes": "holes pieces per_hole first_hole taken",
+        "Holes": "holes pieces per_hole taken",
         "Instead of holes": "two drill",
     }
     to: ClassVar[Sequence[str]] = USUAL
@@ -141,13 +138,14 @@ def _at_two_angles(target: complex, labels: Labels, radius: float | None, option
     masses = weights(options.two or "", "--two", labels, radius)
     if len(masses) != 2:
         raise ValueError(f"--two {options.two!r}: give two weights, such as 20g,30g")
-    low, high = abs(masses[0] - masses[1]), sum(masses)
-    if not low * (1 - 1e-12) <= abs(target) <= high * (1 + 1e-12):
-        words = [labels.weight_words(weight) for weight in (low, high, abs(target))]
+    try:
+        return two_positions(target, *masses)
+    except ValueError:
+        low, high = map(labels.weight_words, (abs(masses[0] - masses[1]), sum(masses)))
+        wanted = labels.weight_words(abs(target))
         raise ValueError(
-            f"--two: these together make from {words[0]} to {words[1]}, not {words[2]}; use other weights"
-        )
-    return two_positions(target, *masses)
+            f"--two: these together make from {low} to {high}, not {wanted}; use other weights"
+        ) from None
 
 
 def _drilled(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
@@ -171,30 +169,25 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
 
     from balancing import equal_holes, from_list
 
-    given = options.holes
-    if given is None or isinstance(given, int) or (isinstance(given, str) and "," not in given):
-        count = str(given).strip()
-        if not (count.isascii() and count.isdecimal() and 1 <= int(count) <= 1000):
-            raise ValueError(
-                f"--holes {given!r}: give the number of equally spaced holes, 1 to 1000, or their angles, "
-                "such as 0,30,75"
-            )
-        counted = equal_holes(int(count), np.radians(degrees(options.first_hole or 0.0, "--first-hole")))
+    given = options.holes or ""
+    if isinstance(given, int) or (isinstance(given, str) and given.strip().isdecimal()):
+        if not 1 <= int(given) <= _MOST:
+            raise ValueError(f"--holes {given}: give the number of equally spaced holes, 1 to {_MOST}")
+        angles = equal_holes(int(given))
     else:
-        counted = np.radians(_listed(given))
-    mounted = np.zeros(len(counted))
+        angles = np.radians(_listed(given))
     taken: dict[str, str | float] = pairs(
         options.taken or {}, "--taken", lambda _, text: text, "3:10g", sign=":"
     )
-    for name, amount in taken.items():
-        if name not in map(str, range(1, len(mounted) + 1)):
-            raise ValueError(f"--taken: {name!r} is not the number of a hole, 1 to {len(mounted)}")
-        mounted[int(name) - 1] = weight(amount, "--taken", labels, radius, "3:10g")
+    numbers = list(map(str, range(1, len(angles) + 1)))
+    if wrong := taken.keys() - numbers:
+        raise ValueError(f"--taken: {min(wrong)!r} is not the number of a hole, 1 to {len(angles)}")
+    there = [weight(taken[k], "--taken", labels, radius, "3:10g") if k in taken else 0.0 for k in numbers]
     return from_list(
-        labels.with_rotation(counted),
+        labels.with_rotation(angles),
         () if options.pieces is None else weights(options.pieces, "--pieces", labels, radius),
         per_hole=options.per_hole or 1,
-        taken=mounted,
+        taken=there,
     )
 
 
@@ -204,31 +197,31 @@ def _listed(given: str | Sequence[float]) -> list[float]:
     angles = [degrees(part, "--holes") for part in parts]
     if angles[-1] - angles[0] > 360 - _APART or any(b - a < _APART for a, b in pairwise(angles)):
         raise ValueError(
-            f"--holes {given!r}: list each hole once, in the order of their angles, within one turn"
+            f"--holes {given!r}: list each hole once, in the order of their angles, within one turn; or give "
+            "the number of equally spaced ones"
         )
     return angles
 
 
 def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """What is mounted or taken away, place by place."""
-    mass, method = f"mass_{found['unit']}", found["method"]
-    if method == "holes":
-        return [
-            {"hole": row["hole"], "angle_deg": row["angle_deg"], mass: row["mass"], "pieces": _pieces(row)}
-            for row in found["holes"]
+    mass = f"mass_{found['unit']}"
+    if "holes" in found:
+        pieces = [
+            " + ".join(f"{one['count']} × {one['mass']:g}" for one in row["pieces"]) for row in found["holes"]
         ]
-    if method == "two positions":
+        return [
+            {"hole": row["hole"], "angle_deg": row["angle_deg"], mass: row["mass"], "pieces": words}
+            for row, words in zip(found["holes"], pieces, strict=True)
+        ]
+    if "solutions" in found:
         return [
             {"solution": k, "angle_deg": angle, mass: size}
             for k, solution in enumerate(found["solutions"], start=1)
             for angle, size in zip(solution["angles_deg"], found["masses"], strict=True)
         ]
-    grams, radius, depth = 1e3 * found["mass_kg"], 1e3 * found["radius_m"], 1e3 * found["depth_m"]
-    return [{"angle_deg": found["angle_deg"], "mass_g": grams, "radius_mm": radius, "depth_mm": depth}]
-
-
-def _pieces(row: Mapping[str, Any]) -> str:
-    return " + ".join(f"{one['count']} × {one['mass']:g}" for one in row["pieces"])
+    scaled = {"mass_g": "mass_kg", "radius_mm": "radius_m", "depth_mm": "depth_m"}
+    return [{"angle_deg": found["angle_deg"], **{name: 1e3 * found[key] for name, key in scaled.items()}}]
 
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:

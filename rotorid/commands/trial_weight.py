@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, get_args
 
 from rotorid.base.answer import together
-from rotorid.base.tables import Table
 from rotorid.base.words import Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import mass, quantity, size, speed_with_unit
@@ -108,6 +107,8 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
     ValueError
         For a job or an option that cannot be, or that means nothing with or without a job.
     """
+    import pandas as pd
+
     from balancing import plane_load
     from balancing.plots import trial_figure
 
@@ -127,11 +128,6 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
         refuse(options, _WITHOUT_JOB, why)
         read = job_source(job, options.phase, options.angles)
         weights, files = _from_job(read, options, carried), read.files
-    tables = [table_of(weight.to_frame(), "trial weights") for weight in weights]
-    columns = (
-        replace(each, values=[value for table in tables for value in table.columns[k].values])
-        for k, each in enumerate(tables[0].columns)
-    )
     return outcome_of(
         tuple(weights),
         provenance(files, options),
@@ -140,7 +136,7 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
             "trial_weights": [weight.to_dict() for weight in weights],
             "conventions": weights[0].labels.conventions(),
         },
-        file=Table("trial weights", tuple(columns)),
+        file=lambda: table_of(pd.concat([weight.to_frame() for weight in weights]), "trial weights"),
         pictures={"The weight in each plane.": lambda: trial_figure(tuple(weights))},
         title="Trial weight",
     )
@@ -150,11 +146,8 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     """Without a job: amount from the load, angle from the phase and the lag."""
     from balancing import Labels, trial_from_force
 
-    missing = [name for name in ("speed", "radius") if getattr(options, name) is None]
-    if load is None:
-        missing.insert(0, "rotor-mass (or --bearing-load)")
     if options.speed is None or options.radius is None or load is None:
-        raise ValueError(f"without a job, give --{' and --'.join(missing)}")
+        raise ValueError("without a job, give --rotor-mass (or --bearing-load), --speed and --radius")
     phase_means: Phase = one_of(options.phase or "lead", "--phase", get_args(Phase))
     counted: Angles = one_of(options.angles or "with rotation", "--angles", get_args(Angles))
     labels = Labels(weight_unit="g", weight_scale=1e3, phase=phase_means, angles=counted)
@@ -207,11 +200,8 @@ def _lag(options: TrialWeightOptions) -> Lag | None:
     from balancing import expected_lag
 
     lag = options.lag
-    if lag is None:
-        return None
-    if lag in ("below", "at", "above"):
-        return expected_lag(str(lag))
-    angle = number(str(lag))
-    if not 0 <= angle <= 360:
+    if lag is None or lag in ("below", "at", "above"):
+        return None if lag is None else expected_lag(str(lag))
+    if not 0 <= (angle := number(str(lag))) <= 360:
         raise ValueError(f"--lag {lag!r}: below, at or above, or degrees from 0 to 360, are needed")
     return expected_lag(degrees=angle)

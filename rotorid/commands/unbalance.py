@@ -44,30 +44,22 @@ def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:
     rotor
         The rotor.
     """
-    from matplotlib.patches import ConnectionPatch
-
     from balancing.plots import draw_unbalance
     from fem import draw_rotor
-    from rotorid.base.plot_style import DARK, legend_below, new_figure
+    from rotorid.base.plot_style import DARK, legend_below, new_figure, note
 
-    many = len(unbalance.stations)
-    tall = min(7.0 / many, 3.0) + (1.4 if many > 8 else 0.0)  # of many the names stand upright
-    figure = new_figure(tall + 4.0)
-    above, below = figure.subplots(2, height_ratios=(tall + 1.0, 2.6))
+    tall = 1.0 + min(7.0 / len(unbalance.stations), 3.0) + 1.4 * (len(unbalance.stations) > 8)
+    figure = new_figure(tall + 3.0)
+    above, below = figure.subplots(2, height_ratios=(tall, 2.6))
     draw_unbalance(unbalance, above)
     draw_rotor(rotor, below)
     if legend := below.get_legend():
         legend.remove()
         legend_below(figure, (below,), 3)
-    above.xaxis.tick_top()
-    above.xaxis.set_label_position("top")
-    bottom, top = above.get_ylim()[0], below.get_ylim()[1]
-    for place, name in zip(above.get_xticks(), unbalance.stations, strict=True):
-        at = rotor.positions[rotor.node(name) - 1]
-        line = ConnectionPatch((place, bottom), (at, top), "data", "data", axesA=above, axesB=below)
-        line.set(color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
-        figure.add_artist(line)
-        below.vlines(at, below.get_ylim()[0] / 2, top, color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+    for k, name in enumerate(unbalance.stations):
+        at, top = rotor.positions[rotor.node(name) - 1], below.get_ylim()[1]
+        below.axvline(at, color=DARK, linewidth=0.9, linestyle=(0, (3, 2)))
+        note(below, name, (at, top), (2.0, -10.0 - 10.0 * (k % 2)))
     return figure
 
 

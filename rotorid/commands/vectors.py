@@ -163,7 +163,9 @@ def _table(columns: Sequence[Told], *, printed: bool = False) -> Table:
     return Table(
         "vectors",
         tuple(
-            Column((printed and one.title) or one.name, list(one.values), one.shown or str)
+            Column(
+                ((printed and one.title) or one.name).replace("±", "std"), list(one.values), one.shown or str
+            )
             for one in columns
             if one.shown is not None or not printed
         ),

@@ -87,7 +87,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     axes.secondary_xaxis("top").set_xticks(x, labels, rotation=45, fontsize=TEXT)
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
-    axes.set_ylim(-height, height)
+    axes.set(ylim=(-height, height), yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     axes.set_title(f"{n}-mass model (points) and {reduction.source} (lines)", pad=10)
     legend_above(axes, 1, 0.75, -0.15)
     return axes

@@ -1,27 +1,33 @@
-"""The balancing sheet: one page that a balancing engineer can work from without the program."""
+"""The balancing sheet: page 1 is all that is needed to mount the weights, without the program."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.text import capital, sentence
+from rotorid.base.plot_style import new_figure
+from rotorid.base.rpm import RPM
+from rotorid.base.tables import Column, Table, html
+from rotorid.base.text import figures, sentence
+from rotorid.files import units
 from rotorid.report import conventions_explained
-from rotorid.report.balance_data import sheet_data
-from rotorid.report.balance_figures import plane_figure
-from rotorid.report.balance_tables import sheet_tables
-from rotorid.report.document import Document
-from rotorid.report.page import every_warning, inline_svg, render_report
+from rotorid.report.page import block, inline_svg, render_report
 
 if TYPE_CHECKING:
     from markupsafe import Markup
+    from matplotlib.figure import Figure
 
-    from balancing import Correction, Influence, LeftToDo, Mounted
+    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict
+    from rotorid.base.answer import Answer
     from rotorid.tables import Job
+
+    Headings = Mapping[str, tuple[str, Callable[[Any], str]]]
+    """Heading and text of each column, by the key of its values in rows of the document."""
 
 _SOURCES = {
     "stated": "as stated in the job",
@@ -30,33 +36,35 @@ _SOURCES = {
     "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
     "residuals": "from the disagreement of the runs",
     "assumed": "assumed: nobody states them, and nothing measures them",
-    "unknown": "not known",
 }
+_HEAD = ("machine", "place", "date", "engineer", "instrument")
+_TWO, _THREE, _FOUR = (partial(figures, digits=n) for n in (2, 3, 4))
+LONG = 10**6
+"""Rows of the longest table that stands whole."""
 
 
 def balance_report(
     document: Mapping[str, Any],
-    made: tuple[Correction, Mounted | None, LeftToDo | None],
-    influence: Influence,
+    made: tuple[Correction, Mounted | None, CheckComparison | None, LeftToDo | None, Verdict | None],
     job: Job,
     provenance: Mapping[str, Any],
-    judgement: str,
+    answer: Answer,
 ) -> bytes:
     """Make the sheet of a balancing job: one HTML file that needs nothing else.
 
     Parameters
     ----------
     document
-        What `rotorid balance --json` prints, without its provenance. The sheet holds it as JSON, with what
-        only the sheet shows under the key "sheet".
+        What `rotorid balance --json` prints, without its provenance; the sheet holds it.
     made
-        What it is made of: the correction, pieces in holes, what is left to do after a check run.
-    influence, job
-        Coefficients and job of the correction.
+        What it is made of: the correction, pieces in holes, check runs, what is left to do after these, what
+        limits say.
+    job
+        Of the correction.
     provenance
         Program version, input files with hashes, date and options.
-    judgement
-        What to do: the lines of the answer's.
+    answer
+        What to do, and warnings.
 
     Raises
     ------
@@ -65,90 +73,222 @@ def balance_report(
     """
     from balancing.plots import residual_figure
 
-    result, mounted, left = made
+    result, mounted, check, left, verdict = made
     labels = result.labels
-    whole = Document({**document, "sheet": sheet_data(result, job, mounted)})
     known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: known[s] for s in result.sensors if s in known}
-    key_phasor = job.key_phasor if places or job.key_phasor else None
-    source, seen = result.influence.reading.source, conventions_explained.seen_from(labels)
-    discs = [] if left is not None else _discs(result, job, mounted, seen)
-    if left is not None and left.word == "trim":
-        add = dict(zip(left.planes, left.trim.tolist(), strict=True))
-        trim = replace(left.correction, weights=np.array([add[plane] for plane in left.correction.planes]))
-        discs = _discs(left.correction if left.pieces else trim, job, left.pieces, seen)
+    key = job.key_phasor if places or job.key_phasor else None
+    first = Path(job.files[0]).resolve()
+    names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
+    plain = left is None and mounted is None
     return render_report(
         "balance.html",
-        whole.data,
-        title=f"Balancing sheet: {_name(job)}",
-        warnings=[sentence(words) for words in every_warning(document)],
-        judgement=judgement.splitlines(),
+        document,
+        title=f"Balancing sheet: {', '.join(filter(None, names))}",
+        warnings=list(map(sentence, answer.warnings)),
         provenance=provenance,
-        job_files=[path.name for path in job.files],
-        about=[job.machine, job.date],
-        vibration=labels.vibration_in,
-        weight=labels.weight_in,
-        seen=seen,
-        turning=capital(labels.turning_in_words()),
-        method=_method(result),
-        errors=_SOURCES.get(source, source),
-        coefficients=_coefficients(influence, job, provenance),
-        turn=_turn(result),
-        tables=sheet_tables(whole, labels),
-        conventions=conventions_explained.words(labels, places, key_phasor),
-        rotor_figure=inline_svg(
-            conventions_explained.rotor_figure(labels, places, key_phasor),
-            "The rotor from its end: rotation, mark, a weight at 60°, sensor and key phasor",
-        ),
+        judgement=answer.judgement.splitlines(),
+        head={**dict.fromkeys(_HEAD, ""), "machine": job.machine, "date": job.date or ""}
+        | {key: value for key, value in job.sheet.items() if key in _HEAD and value},
+        labels=labels,
+        job_files=", ".join(path.name for path in job.files),
+        source=_SOURCES.get(result.influence.reading.source, ""),
+        method=f"{result.method_in_words} {result.conditioning.sentence()}",
+        seen=conventions_explained.seen_from(labels),
+        conventions=conventions_explained.words(labels, places, key),
         phase_figure=inline_svg(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        discs=discs,
-        residual_figure=inline_svg(residual_figure(result, mounted), "Vibration before and predicted after"),
-        forbidden=result.limits is not None and any(result.limits.forbidden),
-        unsplit=[p for p in result.planes if p in job.holes] if mounted is None and left is None else [],
+        residual_figure=inline_svg(residual_figure(result, mounted, check), "Vibration before and after"),
+        discs=[
+            inline_svg(figure, f"What goes into plane {plane}")
+            for plane, figure in _discs(result, job, mounted, left).items()
+        ],
+        unsplit=[plane for plane in result.planes if plain and plane in job.holes],
+        weights=html(_weights(document, result, job)) if plain else "",
+        trim="" if left is None else html(_trim(document, labels)),
+        holes="" if plain else _holes(document, labels, "mounting" if left is None else "left_to_do"),
+        stays=_if_run_stays(result) if plain else "",
+        readings=_readings(document, result, check),
+        verdict="" if verdict is None else block("\n\n".join([verdict.answer.found, *verdict.answer.tables])),
+        radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
+        runs=block(_runs(job), LONG),
+        there=_mounted_in_runs(job),
+        trial_radii=bool(job.trial_radii),
+        slow_roll=job.slow_roll is not None,
     )
 
 
-def _name(job: Job) -> str:
-    """The folder and the file of a job, "turbo_job, holes"; of a job called job the folder alone."""
-    first = Path(job.files[0]).resolve()
-    folder, own = first.parent.name, first.stem
-    if folder in ("", own):
-        return own
-    return folder if own.casefold() in ("job", "runs") else f"{folder}, {own}"
+def degrees(angle: float) -> str:
+    """An angle as text, 0 ≤ angle < 360."""
+    return f"{round(angle, 1) % 360:.1f}°"
 
 
-def _method(result: Correction) -> str:
-    """How the weights were found."""
-    words = result.method_in_words
-    if len(result.speeds) == 1 or result.method == "minmax":
-        return words
-    return f"{words} Den Hartog's method: influence coefficients at several speeds, least squares."
+def _at(document: Mapping[str, Any], path: str) -> Sequence[Mapping[str, Any]]:
+    """Rows of the document."""
+    rows: Any = document
+    for part in path.split("."):
+        rows = rows[part]
+    return rows  # type: ignore[no-any-return]
 
 
-def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any]) -> str:
-    """Where the coefficients come from, in words."""
-    kind = provenance["options"].get("coefficients")
-    if kind == "combined":
-        return "from the runs and the rotor model together"
-    if job.influence is not None and kind != "computed":
-        return "stored ones"
-    return "from the runs above" if influence.mounted.run else "from the rotor model"
-
-
-def _turn(result: Correction) -> str:
-    """What the angle of a weight does to the phase of its vibration."""
-    return "is added to" if result.labels.phase_sign == result.labels.angle_sign else "is taken from"
-
-
-def _discs(result: Correction, job: Job, mounted: Mounted | None, seen: str) -> list[Markup]:
-    """A picture of each plane."""
+def _columns(document: Mapping[str, Any], path: str, headings: Headings) -> list[Column]:
+    """Columns of rows of the document; those without any value are left out."""
+    every = {key: [row.get(key) for row in _at(document, path)] for key in headings}
     return [
-        inline_svg(
-            plane_figure(result, plane, holes=job.holes.get(plane), mounted=mounted),
-            f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
-        )
-        for plane in result.planes
+        Column(headings[key][0], values, headings[key][1], f"{path}.*.{key}")
+        for key, values in every.items()
+        if any(value is not None for value in values)
     ]
+
+
+def _work(document: Mapping[str, Any], path: str, weight: str, **more: str) -> list[Column]:
+    """Where to add, or to take away, how much; `more` columns of words."""
+    rows = _at(document, path)
+    away = [row.get("action") == "remove" for row in rows]
+    at = [row["angle_deg"] if row.get("remove_at_deg") is None else row["remove_at_deg"] for row in rows]
+    nothing = [row["mass"] == 0 for row in rows]
+    return [
+        *_columns(document, path, {"plane": ("plane", str), **{key: (key, str) for key in more}}),
+        Column("do", ["take away" if gone else "add" for gone in away]),
+        *_columns(document, path, {"mass": (weight, _FOUR)}),
+        Column("angle", [None if no else angle for no, angle in zip(nothing, at, strict=True)], degrees),
+    ]
+
+
+def _done(count: int) -> Column:
+    """A box to tick in each row."""
+    from markupsafe import Markup
+
+    return Column("done", ["box"] * count, lambda _: Markup('<span class="box" aria-label="to tick"></span>'))
+
+
+def _weights(document: Mapping[str, Any], c: Correction, job: Job) -> Table:
+    """Weights of the bare rotor, with their 95 % and, of unbalances, the mass at the radius of the plane."""
+    unit, (sizes, angles) = c.labels.weight_unit.partition("_")[0], c.half_widths()
+    columns = _work(document, "corrections", c.labels.weight_in)
+    if c.region_known:
+        columns.append(Column(f"± {c.labels.weight_in}, 95 %", sizes * c.labels.weight_scale, _TWO))
+        columns.append(Column("± °, 95 %", np.degrees(angles), _TWO))
+    if c.labels.unbalances and job.radii:
+        scale = units.MASS[unit].scale
+        masses = [
+            abs(weight) / job.radii[plane] * scale if plane in job.radii else None
+            for plane, weight in zip(c.planes, c.weights, strict=True)
+        ]
+        columns.append(Column(f"{unit} at radius", masses, _FOUR))
+    held = [plane for plane, limit in zip(c.planes, c.held, strict=True) if limit]
+    note = f"At its limit: {', '.join(held)}." if held else ""
+    return Table("", (*columns, _done(len(c.planes))), note)
+
+
+def _trim(document: Mapping[str, Any], labels: Labels) -> Table:
+    """What is mounted, and what is to come on top."""
+    there: Headings = {"mass": (f"mounted, {labels.weight_in}", _FOUR), "angle_deg": ("at", degrees)}
+    plane, *work = _work(document, "left_to_do.add", f"trim, {labels.weight_in}")
+    mounted = _columns(document, "left_to_do.mounted", there)
+    return Table("", (plane, *mounted, *work, _done(len(plane.values))))
+
+
+def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Markup | str:
+    """What goes into each hole."""
+    if not (rows := document[part]["holes"]):
+        return "" if part == "left_to_do" else "Nothing: no piece makes it better."
+    work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
+    return html(Table("", (*work, _done(len(rows)))))
+
+
+def _if_run_stays(c: Correction) -> Markup | str:
+    """What to do instead where the weights of the last run stay mounted."""
+    if not c.mounted.weights.any():
+        return ""
+    run, planes, _ = c.mounted
+    away = ["take away" if plane in c.remove else "add" for plane in planes]
+    masses, places = c.labels.weight(c.to_add)[0], c.places(planes, c.to_add)
+    columns = (
+        Column("plane", planes),
+        Column("do", away),
+        Column(c.labels.weight_in, masses, _FOUR),
+        Column("angle", np.where(masses > 0, places, np.nan), degrees),
+    )
+    return html(Table(f"Instead, only if the weights of run “{run}” stay mounted", columns))
+
+
+def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison | None) -> Markup:
+    """Readings before and predicted, with room for those of a check run; or with these."""
+    path, more = "residuals", []
+    numbers: Headings = {"before": ("before", _THREE), "before_phase_deg": ("at", degrees)}
+    if check is not None:
+        path = "check.readings"
+        numbers = {
+            **numbers,
+            "predicted": ("predicted", _THREE),
+            "predicted_phase_deg": ("at ", degrees),
+            "achieved": ("achieved", _THREE),
+            "achieved_phase_deg": ("at  ", degrees),
+            "distance": ("off by std", _TWO),
+        }
+    after = "mounting.residuals" if "mounting" in document and check is None else path
+    places: Headings = {"sensor": ("sensor", str)}
+    if check is not None and len(check.runs) > 1:
+        places = {"run": ("run", str), **places}
+    columns = [_speed(document, path, c.labels), *_columns(document, path, {**places, **numbers})]
+    if check is None:
+        left: Headings = {"after": ("predicted", _THREE), "after_phase_deg": ("at ", degrees)}
+        columns += _columns(document, after, left)
+        more = [Column("95 % within ±", c.within.ravel(), _TWO)] if c.errors_known else []
+        if c.limits is not None and np.isfinite(c.limits.residual).any():
+            limits = document["limits"]["amplitude"]
+            more.append(Column("limit", limits, _FOUR, "limits.amplitude.*"))
+        blank = ["\N{NO-BREAK SPACE}"] * c.before.size
+        more += [Column("amplitude read", blank), Column("phase read", blank)]
+    return html(Table("", (*columns, *more)), LONG)
+
+
+def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:
+    """Speeds of rows, in the job's unit."""
+    unit = labels.speed_unit
+    scale = 1.0 if unit == "rpm" else units.SPEED[unit].scale / RPM
+    rows = [row["speed_rpm"] for row in _at(document, path)]
+    values = [None if speed is None else speed * scale for speed in rows]
+    return Column(labels.speed_in, values, "{:.6g}".format, f"{path}.*.speed_rpm", scale)
+
+
+def _runs(job: Job) -> Table:
+    """Means of the readings of the runs."""
+    trials, labels = job.trials, job.trials.labels
+    speeds = [labels.speed_number(speed) for speed in trials.speeds for _ in trials.sensors]
+    columns = [Column(labels.speed_in, speeds), Column("sensor", trials.sensors * len(trials.speeds))]
+    for run, readings in zip(trials.runs, trials.mean, strict=True):
+        size, phase = labels.vibration(readings.ravel())
+        columns += [Column(run, size, "{:.4g}".format), Column("at", phase, degrees)]
+    return Table("", tuple(columns))
+
+
+def _mounted_in_runs(job: Job) -> list[tuple[str, str]]:
+    """What was mounted in each run."""
+    trials = job.trials
+    words = [
+        [f"{trials.labels.weight_at(w)} in plane {p}" for p, w in zip(trials.planes, row, strict=True) if w]
+        for row in trials.weights
+    ]
+    return [(run, ", ".join(each) or "nothing") for run, each in zip(trials.runs, words, strict=True)]
+
+
+def _discs(result: Correction, job: Job, mounted: Mounted | None, left: LeftToDo | None) -> dict[str, Figure]:
+    """A picture of each plane with what goes into it; none where nothing does after a check run."""
+    from balancing.plots import draw_plane
+
+    zero = 1j if job.sheet.get("zero") == "top" else 1.0
+    if left is not None:
+        if left.word != "trim":
+            return {}
+        add = dict(zip(left.planes, left.trim.tolist(), strict=True))
+        trim = np.array([add[plane] for plane in left.correction.planes])
+        mounted = left.pieces
+        result = left.correction if mounted else replace(left.correction, weights=trim)
+    figures = {plane: new_figure(3.1, 3.4) for plane in result.planes}
+    for plane, figure in figures.items():
+        draw_plane(figure.add_subplot(), result, plane, mounted, job.holes.get(plane), zero)
+    return figures

@@ -80,40 +80,30 @@ class Equations:
         numbers = {name: getattr(self, name) for name in ("rows", "columns", "matrix", "right", "solution")}
         return plain({"title": self.title, "symbolic": symbols, **numbers, "notes": self.notes})
 
-    def answer(self, told: Answer) -> Answer:
-        """In place of what a result tells, whose judgement and remarks stay."""
-        width = max((len(row.name) for row in self.symbolic), default=0)
-        symbols = [f"  {row.name:<{width}}  {row.written()}" for row in self.symbolic]
+    def answer(self, result: Answer) -> Answer:
+        """In place of a result's answer, whose judgement and remarks stay."""
+        symbols = [f"  {row.name}  {row.written()}" for row in self.symbolic]
         # no line ends inside "Re X1": an answer writes this blank as any other
         symbols = [re.sub(r"\b(Re|Im) (?!eq)", "\\1\u00a0", line) for line in symbols]
-        found = ["\n".join([f"{self.title}:", *symbols]), *self._tables(), self._solution()]
-        return Answer(told.judgement, "\n\n".join(found), told.warnings, (*self.notes, *told.notes))
-
-    def _system(self) -> list[Column]:
-        """Name of each row, the matrix, the right side."""
-        matrix, unknowns, right = self.names
-        columns = zip(
-            (*self.columns, f"| {right}"), (np.column_stack((self.matrix, self.right)) + 0.0).T, strict=True
-        )
-        numbers = [Column(name, values, "{:.6g}".format, cut(name, _LONGEST)) for name, values in columns]
-        return [Column(f"{matrix} {unknowns} = {right}", self.rows, str), *numbers]
+        parts = ["\n".join([f"{self.title}:", *symbols]), *self._tables(), self._solution()]
+        return Answer(result.judgement, "\n\n".join(parts), result.warnings, (*self.notes, *result.notes))
 
     def _tables(self) -> list[str]:
-        """The same in parts, each with as many columns as fit."""
+        """Name of each row, the matrix, the right side; in parts, each with as many columns as fit."""
         if not self.rows:
             return []
-        names, *numbers = self._system()
-        wide = max(12, *(len(one.title or "") for one in numbers))
+        matrix, unknowns, right = self.names
+        names = [cut(name, _LONGEST) for name in (*self.columns, f"| {right}")]
+        values = (np.column_stack((self.matrix, self.right)) + 0.0).T
+        numbers = [Column(*each, "{:.6g}".format) for each in zip(names, values, strict=True)]
+        first, wide = Column(f"{matrix} {unknowns} = {right}", self.rows, str), max(12, *map(len, names))
         each = max((COLUMNS - 4 - max(map(len, self.rows))) // (wide + 2), 1)
-        parts = [numbers[k : k + each] for k in range(0, len(numbers), each)]
-        return [text((names, *part), width=COLUMNS) for part in parts]
+        return [text((first, *numbers[k : k + each]), width=COLUMNS) for k in range(0, len(numbers), each)]
 
     def _solution(self) -> str:
-        if not len(self.solution):
-            return f"{self.names[1]}: {', '.join(self.columns)}"
-        found = zip(self.columns, self.solution, strict=True)
-        told = (f"{name} = {x:.6g}" if x == x else f"{name} not determined" for name, x in found)
-        return f"{self.names[1]}: {', '.join(told)}"
+        values = [f" = {x:.6g}" if x == x else " not determined" for x in self.solution]
+        values = values or [""] * len(self.columns)
+        return f"{self.names[1]}: {', '.join(map(''.join, zip(self.columns, values, strict=True)))}"
 
 
 def _words(expression: Expression) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import singledispatch
 
 import numpy as np
@@ -118,10 +119,6 @@ def correction_equations(found: Correction) -> Equations:
     if found.method != "least-squares" or found.active:
         how = f"{found.method}, within limits" if found.active else found.method
         notes.append(f"D by another way ({how}): plain least squares of these rows may give other weights")
-    w, d = ([Symbol(f"{x} {y}{p + 1}") for p in range(len(planes)) for x in PARTS] for y in "WD")
-    real = [((-1) ** j * w[j], d[j]) for j in range(len(d))]
-    imaginary = [(w[j ^ 1], d[j]) for j in range(len(d))]
-    rows = [Row("Re", real, [(-1, Symbol("Re Y"))]), Row("Im", imaginary, [(-1, Symbol("Im Y"))])]
     places = [f"{sensor}, {labels.speed_words(speed)}" for speed in found.speeds for sensor in found.sensors]
     stacked = [f"{part} {place}" for place in places for part in PARTS]
     unknowns = [f"{part} {plane}" for plane in planes for part in PARTS]
@@ -129,7 +126,7 @@ def correction_equations(found: Correction) -> Equations:
     right = stretch(-factors * found.before.ravel() * labels.vibration_scale)
     title = f"W D = -Y of each reading, stretched, [S] (31)–(33), (40): {counted(len(stacked), 'real row')}"
     weights = stretch(found.weights * labels.weight_scale)
-    return Equations(title, rows, ("W", "D", "-Y"), stacked, unknowns, matrix, right, weights, notes)
+    return Equations(title, (), ("W", "D", "-Y"), stacked, unknowns, matrix, right, weights, notes)
 
 
 @equations_of.register
@@ -138,59 +135,24 @@ def _(found: Reduction) -> Equations:
     n, k, seals = len(found.nodes), found.modes, found.seal_stiffness
     modes = found.rotor_frequencies[:k], found.rotor_shapes[:, :k]
     B, D = design(found.compliance, *modes, seal_stiffness=seals, normalise=found.normalise, rows=found.rows)
-    relative, gap = found.rows == "relative", "," if n > 9 else ""
-    units = "B in 1/kg, D without unit" if relative else "B in m/N, D in s²"
-    at = ", ".join(map(str, found.nodes))
-    notes = [f"{units}, masses in kg; λ = 1/ω² of a mode; m1, m2, … stand at {at}"]
+    notes = ["B in 1/kg, D without unit" if found.rows == "relative" else "B in m/N, D in s²"]
     if found.nonnegative:
         notes.append("no mass may be below 0: plain least squares of these rows may give another answer")
-    rows = []
-    for mode, i in np.ndindex(k, n):
-        U = [Symbol(f"U{j + 1}{gap}{mode + 1}") for j in range(n)]
-        U[0] = Integer(1) if found.normalise == "first" else U[0]
-        alpha = [Symbol(f"α{min(i, j) + 1}{gap}{max(i, j) + 1}") for j in range(n)]
-        scale = Symbol(f"λ{mode + 1}")
-        load = U[i] + sum(alpha[j] * Symbol(f"c{j + 1}") * U[j] for j in np.flatnonzero(seals))
-        left = [(alpha[j] * U[j] / (scale if relative else 1), Symbol(f"m{j + 1}")) for j in range(n)]
-        rows.append(Row(f"mass {i + 1}, mode {mode + 1}", left, [(1 if relative else scale, load)]))
     labels = [f"mass at {node}, mode {mode + 1}" for mode in range(k) for node in found.nodes]
     title, m = f"B m = D, [S] (50): {counted(n * k, 'row')}, {counted(n, 'unknown')}", found.masses
-    return Equations(title, rows, ("B", "m", "D"), labels, m.names, B, D, m.solution, notes)
+    return Equations(title, (), ("B", "m", "D"), labels, m.names, B, D, m.solution, notes)
 
 
 @equations_of.register
 def _(found: Fit) -> Equations:
-    """[F] (3.6), (3.7), or of quasilinearization (2.17) to (2.28) of [Q]."""
-    return _sensitivities(found) if found.regression is None else _linear_about_last(found)
-
-
-def _linear_about_last(found: Fit) -> Equations:
-    """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
-    model = found.model
-    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
-    if model.inertia:
-        raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
-    rates, _, _ = _as_written(model)
-    rows: list[Row] = []
-    for i, f in enumerate(rates):
-        rows += [Row("f_x", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in x]
-        rows += [Row("f_θ", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in thetas]
-    for i, f in enumerate(rates):
-        slopes = [usual(f.diff(by)) for by in x]
-        for j, theta in enumerate(thetas):
-            G = [Symbol(f"G{p + 1}{j + 1}") for p in range(len(x))]
-            terms = [*zip(slopes, G, strict=True), (usual(f.diff(theta)), 1)]
-            rows.append(Row("G", [(1, Symbol(f"dG{i + 1}{j + 1}/dt"))], terms))
-        D = [Symbol(f"D{p + 1}") - by for p, by in enumerate(x)]
-        known = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
-        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (known, 1)]))
-    K, Y = found.regression or (np.zeros((0, 0)), np.zeros(0))
-    labels = [f"M{j + 1}" for j in range(len(thetas))]
-    title = "x = G θ + D about the last trajectory x, θ, [Q] (2.17)–(2.24), and M θ = Y, (2.28)"
-    notes = ["G and D begin with G θ + D = x(t0); M and Y are those of the last iteration"]
-    return Equations(
-        title, rows, ("M", "θ", "Y"), labels, model.parameters, K.T @ K, K.T @ Y, found.estimate.values, notes
-    )
+    """Sensitivities, [F] (3.6), (3.7), and M θ = Y of the last step of quasilinearization, [Q] (2.28)."""
+    shown = _sensitivities(found)
+    if found.regression is None:
+        return shown
+    K, Y = found.regression
+    labels = [f"M{j + 1}" for j in range(len(found.model.parameters))]
+    title = f"{shown.title}, and M θ = Y of the last iteration, [Q] (2.28)"
+    return replace(shown, title=title, names=("M", "θ", "Y"), rows=labels, matrix=K.T @ K, right=K.T @ Y)
 
 
 def _sensitivities(found: Fit) -> Equations:
@@ -228,7 +190,7 @@ def _as_written(model: OdeModel) -> list[list[Expression]]:
     """Rates, initial values, outputs: with the names of the known where the model still has its own texts."""
     groups = {"state": model.states, "initial": model.states, "output": model.outputs}
     read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
-    told = {name for group in read for e in group for name in names(e)}
-    if {*model.parameters} <= told and not model.inertia:
+    written = {name for group in read for e in group for name in names(e)}
+    if {*model.parameters} <= written and not model.inertia:
         return read
     return [[*model.rates], [*model.initial], [*model.observed]]

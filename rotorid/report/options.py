@@ -36,11 +36,10 @@ def checked(given: object, kind: type[_T]) -> _T:
         raise ValueError(f"options are {kind.__name__}(...), not {given!r}")
     values: dict[str, Any] = {}
     for field in dataclasses.fields(given):
-        value = values[field.name] = _of_python(getattr(given, field.name))
+        value = values[field.name] = _of_python(getattr(given, field.name), option_name(field.name))
         if (str(field.type) == "bool") != isinstance(value, bool):
             needed = "True or False is needed" if str(field.type) == "bool" else "this is no switch"
             raise ValueError(f"{kind.__name__}({field.name}={value!r}): {needed}")
-        _check_finite(value, option_name(field.name))
     return dataclasses.replace(given, **values)
 
 
@@ -80,22 +79,17 @@ def plain(value: object) -> object:
     return [plain(item) for item in value] if isinstance(value, Collection) else str(value)
 
 
-def _of_python(value: object) -> object:
-    """Numbers and lists of NumPy and pandas as those of Python, also inside."""
+def _of_python(value: object, what: str = "") -> object:
+    """Numbers and lists of NumPy and pandas as those of Python, also inside; finite with a name, `what`."""
     if hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return {_of_python(key): _of_python(item) for key, item in value.items()}
-    return type(value)(map(_of_python, value)) if isinstance(value, list | tuple) else value
-
-
-def _check_finite(value: object, what: str) -> None:
-    if isinstance(value, Mapping):
-        value = [*value.values()]
-    if isinstance(value, int | float | complex) and not cmath.isfinite(value):
+        value = value.tolist()
+    if what and isinstance(value, int | float | complex) and not cmath.isfinite(value):
         raise ValueError(f"{what}: {value} is no finite number; leave out what has no bound")
-    for item in value if isinstance(value, Collection) and not isinstance(value, str) else ():
-        _check_finite(item, what)
+    if isinstance(value, Mapping):
+        return {_of_python(key): _of_python(item, what) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_of_python(item, what) for item in value)
+    return value
 
 
 def rotor_of(given: Rotor | Path | str) -> Rotor:

@@ -9,20 +9,19 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.tables import Table, html
+from rotorid.base.tables import LONG, Table, html
+from rotorid.base.text import figures
 from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.report.document import Document
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
 WIDTH, LETTERS = 6.0, 9.0
 """Of a picture on a page: inches and points."""
-ABREAST = 9
+ABREAST = 10
 """Columns of a table that stand side by side."""
 
 
@@ -35,12 +34,7 @@ def render_report(
     provenance: Mapping[str, Any],
     **context: object,
 ) -> bytes:
-    """Make a sheet: a template that extends base.html, filled from the JSON document of a result.
-
-    The template gets `document`, `title`, `warnings`, `provenance`, `context`, and the functions
-    `show("corrections.0.mass", digits=4)`, which prints a number of the document (`Document.show`),
-    `found("corrections.0.mass")`, what it holds there. The document itself, with its provenance, lies in the
-    sheet as JSON in the element "result".
+    """Make a sheet: a template that extends base.html; the document lies in it as JSON, in "result".
 
     Parameters
     ----------
@@ -51,7 +45,7 @@ def render_report(
     title
         Heading of the sheet and title of the page.
     warnings
-        Sentences, printed before everything else.
+        Sentences.
     provenance
         Program version, input files, date and options, as every JSON document has them.
     context
@@ -64,33 +58,29 @@ def render_report(
     jinja2.UndefinedError
         If the template names something that the context does not hold.
     """
-    whole = Document({**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)})
-    page = _environment().get_template(template)
-    text = page.render(
-        document=whole.data,
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    whole = {**document, "schema_version": SCHEMA_VERSION, "provenance": dict(provenance)}
+    pages = Environment(
+        loader=PackageLoader("rotorid.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    pages.filters["figures"] = figures
+    text = pages.get_template(template).render(
+        document=whole,
         title=title,
         warnings=list(warnings),
         provenance=provenance,
-        json_text=json_inside(whole.data),
-        show=whole.show,
-        found=whole.found,
+        json_text=json_inside(whole),
         **context,
     )
     return text.encode("utf-8", "replace")  # names of files may be anything
 
 
-def every_warning(document: Mapping[str, Any]) -> list[str]:
-    """All warnings of a document and its parts, in the order of the document, each once."""
-    every: list[str] = []
-    for key, value in document.items():
-        if key == "warnings":
-            every += map(str, value)
-        elif isinstance(value, Mapping):
-            every += every_warning(value)
-    return list(dict.fromkeys(every))
-
-
-def block(table: Table | str) -> Markup:
+def block(table: Table | str, longest: int = LONG) -> Markup:
     """A table, those too wide in parts that repeat its first two columns; or text as it stands."""
     from markupsafe import Markup
 
@@ -98,7 +88,7 @@ def block(table: Table | str) -> Markup:
         return Markup("<pre>{}</pre>").format(table)
     first, others, step = table.columns[:2], table.columns[2:], ABREAST - 2
     parts = [(*first, *others[k : k + step]) for k in range(0, max(len(others), 1), step)]
-    return Markup("\n").join(html(Table(table.name, part, table.note)) for part in parts)
+    return Markup("\n").join(html(Table(table.name, part, table.note), longest) for part in parts)
 
 
 def drawn(draw: Callable[[], Figure], caption: str) -> Markup:
@@ -150,12 +140,10 @@ def inline_svg(figure: Figure, title: str) -> Markup:
         figure.savefig(stream, format="svg", metadata={"Date": None}, facecolor="white")
     text = stream.getvalue()
     head = re.search(r"<svg\b[^>]*>", text, re.DOTALL)
-    if head is None:  # pragma: no cover - matplotlib always writes one
-        raise ValueError("the figure could not be drawn")
+    assert head is not None  # matplotlib always writes one
     body = text[head.end() : text.rindex("</svg>")]
-    for unwanted in (r"<metadata>.*?</metadata>", r"<style\b.*?</style>", r"<!--.*?-->"):
-        body = re.sub(unwanted, "", body, flags=re.DOTALL)
-    body = body.replace("xlink:href=", "href=")
+    unwanted = r"<metadata>.*?</metadata>|<style\b.*?</style>|<!--.*?-->|xlink:(?=href=)"
+    body = re.sub(unwanted, "", body, flags=re.DOTALL)
     prefix = "f" + hashlib.sha256((title + body).encode("utf-8", "replace")).hexdigest()[:10] + "-"
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(
@@ -163,22 +151,10 @@ def inline_svg(figure: Figure, title: str) -> Markup:
     )
     body = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}", body)
     body = re.sub(r"\n\s*", "\n", body)
-    box = re.search(r'viewBox="([^"]*)"', head.group())
-    view = box.group(1) if box else f"0 0 {figure.get_figwidth() * 72:g} {figure.get_figheight() * 72:g}"
+    wide, high = figure.get_size_inches()
     return Markup(
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" viewBox="{view}" '
-        f'style="width:100%;max-width:{figure.get_figwidth():.2f}in;height:auto;stroke-linejoin:round;'
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" '
+        f'viewBox="0 0 {wide * 72:g} {high * 72:g}" '
+        f'style="width:100%;max-width:{wide:.2f}in;height:auto;stroke-linejoin:round;'
         f'stroke-linecap:butt">{body}</svg>'
-    )
-
-
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("rotorid.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
     )

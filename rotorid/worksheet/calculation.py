@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import errno
 import json
+import math
 import os
 import signal
 import sys
@@ -167,13 +168,14 @@ def trial(job: str | None, version: int, options: dict[str, Any]) -> dict[str, A
 def convention(phase: str, angles: str) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
     from balancing import Labels
+    from balancing.plots import weight_figure
     from rotorid.files.conventions import as_angles, as_phase
-    from rotorid.report import conventions_explained as explained
+    from rotorid.report.conventions_explained import phase_figure
 
     labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
-    title = f"phase {phase}, angles {angles}"
-    turning = _svg(explained.rotor_figure(labels), f"The rotor from its end: {title}")
-    return turning + _svg(explained.phase_figure(labels), f"A reading over time: {title}")
+    weight, title = labels.weight_from(1.0, math.radians(60.0)), f"phase {phase}, angles {angles}"
+    turning = _svg(weight_figure(labels, complex(weight)), f"The rotor from its end: {title}")
+    return turning + _svg(phase_figure(labels), f"A reading over time: {title}")
 
 
 def rows(name: str, data: str, phase: str) -> dict[str, Any]:

@@ -43,7 +43,8 @@ def test_a_trim_makes_it_better(seed):
     assert rms(W @ (U + left.there + left.trim)) < 0.2 * rms(now)
     document = left.to_dict()
     assert [row["mass"] for row in document["add"]] == pytest.approx(np.abs(left.trim) * 1e3)
-    assert left.answer.brief().startswith("Trim: add ")
+    assert left.answer.judgement.startswith("Trim; rms ")
+    assert left.answer.found.count(" add ") == 2
 
 
 def test_limits_decide_where_there_are_some():

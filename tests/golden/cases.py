@@ -129,9 +129,9 @@ vectors-no-tacho            vectors sample_data/waveforms/run_up.wav --unit um
 BALANCE_COMMANDS = f"""
 turbo                       balance {TURBO}/job.toml --plot corrections.png
 waveforms                   balance sample_data/waveforms/job.toml
-turbo-files                 balance {TURBO}/runs.csv {TURBO}/weights.csv --amplitude-error 2 --phase-error 2
+turbo-files                 balance {TURBO}/runs.csv {TURBO}/weights.csv --errors 2,2
 turbo-output                balance {TURBO}/job.toml --output sheet.xlsx
-turbo-output-table          balance {TURBO}/job.toml --output corrections.csv --save-influence w.csv
+turbo-output-table          balance {TURBO}/job.toml --output corrections.csv
 turbo-minmax                balance {TURBO}/job.toml --method minmax --max-mass left=400,right=400
 turbo-minmax-bounded        balance {TURBO}/job.toml --method minmax --max-mass 430g_mm
 turbo-minmax-plain          balance {TURBO}/job.toml --method minmax
@@ -143,8 +143,8 @@ turbo-max-mass              balance {TURBO}/job.toml --max-mass 300g_mm
 turbo-ridge                 balance {TURBO}/job.toml --ridge 0.05
 turbo-part                  balance {TURBO}/job.toml --planes left,right --speeds 1220,3600
 turbo-lag                   balance {TURBO}/job.toml --phase lag --angles "against rotation"
-turbo-coarse-errors         balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8
-turbo-coarse-ridge          balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8 --ridge 0.05
+turbo-coarse-errors         balance {TURBO}/job.toml --errors 10,8
+turbo-coarse-ridge          balance {TURBO}/job.toml --errors 10,8 --ridge 0.05
 turbo-report                balance {TURBO}/job.toml --report sheet.html
 checked                     balance {TURBO}/checked.toml
 checked-verbose             balance {TURBO}/checked.toml --output sheet.xlsx
@@ -163,10 +163,10 @@ model-job-weighted          balance {MODEL_JOB} --method weighted --report sheet
 computed                    balance sample_data/model_job/modelled.toml --coefficients computed
 combined                    balance sample_data/model_job/modelled.toml --coefficients combined
 bk                          balance sample_data/bk_two_plane/job.toml
-bk-errors                   balance sample_data/bk_two_plane/job.toml --amplitude-error 2 --phase-error 1
+bk-errors                   balance sample_data/bk_two_plane/job.toml --errors 2,1
 bk-minmax                   balance sample_data/bk_two_plane/job.toml --method minmax
 bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method weighted
-bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --amplitude-error 2 --phase-error 1
+bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --errors 2,1
 left-in                     balance sample_data/left_in/job.toml
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
@@ -185,7 +185,7 @@ balance-misspelt-key        balance sample_data/turbo_job/misspelt.toml
 balance-no-file             balance {TURBO}/jop.toml
 balance-no-plane            balance {TURBO}/job.toml --planes left,midle
 balance-ending              balance {TURBO}/job.toml --output corrections.txt
-balance-undetermined        balance {TURBO}/runs.csv alike.csv --amplitude-error 2 --phase-error 2
+balance-undetermined        balance {TURBO}/runs.csv alike.csv --errors 2,2
 unbalance-model-job         unbalance {MODEL_JOB} --stations 6,9,12,15,18
 unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --output u.csv --plot u.png
 unbalance-no-rotor          unbalance {TURBO}/job.toml --stations 6,12
@@ -422,11 +422,10 @@ def _all() -> list[Case]:
         Case(f"fit-{name}", f"fit {FIT}/{name}/model.toml {FIT}/{name}/record.csv", "models")
         for name in RECORDS
     ]
-    stored = "balance sample_data/model_job/runs.csv --influence w.json --amplitude-error 2 --phase-error 2"
-    saved = f"balance {TURBO}/job.toml --save-influence w"
+    stored = "balance sample_data/model_job/runs.csv --influence w.json --errors 2,2"
+    saved = f"balance {TURBO}/job.toml --output w"
     cases += [
         Case("turbo-stored", stored, "balance", before=(f"{saved}.json",)),
-        Case("turbo-stored-xlsx", stored.replace("w.json", "w.xlsx"), "balance", before=(f"{saved}.xlsx",)),
         Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
     ]
     fitted = "fleet fit sample_data/fleet"

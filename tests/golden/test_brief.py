@@ -23,11 +23,19 @@ FEW = (
 """Cases whose texts are read; `make test-full` reads all that are answers."""
 NAMES = [n for n, case in CASES.items() if case.group not in ("usage", "demos", "fleet")] if FULL else FEW
 NO_ANSWER = ("schema", "demo")
-MOST = 24
 """What they print is no answer."""
+MOST, WITH_PIECES, TALL = 12, 18, 24
+"""Lines of an answer, of one with pieces, and of equations, records and what is long beside a sample."""
+LONG = ("simulate", "reduce", "identify")
+FORBIDDEN = (
+    r"\b1(\.0+)? times as much|with any weights|\(proven|\(and \d+ more of this kind\)"
+    r"|would leave \S+ times|\brms [^.;]* \(with"
+)
+"""What no answer, no sheet and no page says."""
 JUDGEMENTS = {
     "balance": r"(Mount|Remove) (these|this|nothing)|Do not mount|Measure again|"
-    r"(Pass|Fail|Not decidable) \(|As predicted: |Not as predicted: |Not judged: |written: ",
+    r"(Pass|Fail|Not decidable) \(|As predicted: |Not as predicted: |Not judged: |written: |"
+    r"(Trim|Done|Take off what is mounted|Add nothing yet); ",
     "calibrate": r"The model (explains|does NOT explain) the data |Run \d+ trial weights?: ",
     "modes": r"\d+ modes?: |Not every mode is determined: ",
     "split": r"Mount |Instead of adding .*(take away opposite:|grind off )|.* from two weights:$",
@@ -49,7 +57,14 @@ def printed():
 
 def complaints(words, output):
     lines = output.rstrip("\n").splitlines()
-    found = [f"{len(lines)} lines"] if len(lines) > MOST and "--table" not in words else []
+    most = WITH_PIECES if "--split" in words or " in hole" in output else MOST
+    most = (
+        TALL
+        if "--show" in words or words[0] in LONG
+        else most + sum(line.startswith("written: ") for line in lines)
+    )
+    found = [f"{len(lines)} lines"] if len(lines) > most and "--table" not in words else []
+    found += [f"says {match[0]!r}" for match in re.finditer(FORBIDDEN, " ".join(output.split()))]
     found += [f"{len(line)} columns: {line}" for line in lines if len(line) > COLUMNS]
     found += [f"a token for a unit: {line}" for line in lines if re.search(r"\d (g_mm|um_pp)", line)]
     if not re.match(JUDGEMENTS.get(words[0], ""), lines[0]):
@@ -68,15 +83,16 @@ def test_an_answer_fits_a_terminal_and_begins_with_the_judgement(printed):
 @pytest.mark.parametrize(
     ("output", "words"),
     [
-        ("Mount these weights: rms 3 → 1.\n" + 24 * "more\n", "25 lines"),
+        ("Mount these weights: rms 3 → 1.\n" + 12 * "more\n", "13 lines"),
         ("Mount these weights: rms 3 → 1.\n" + 101 * "x", "101 columns"),
         ("Corrections\nMount these weights.", "no judgement: Corrections"),
+        ("Mount these weights: rms 3 → 1 (with any weights 0).", "says "),
         ("Mount these weights: 3 g_mm", "a token for a unit: Mount these weights: 3 g_mm"),
     ],
 )
 def test_what_does_not_fit_is_found(output, words):
     assert complaints(["balance", "job.toml"], output)[0].startswith(words)
-    assert not complaints(["balance", "job.toml"], "Mount these weights: rms 3 → 1.\n" + 23 * "more\n")
+    assert not complaints(["balance", "job.toml"], "Mount these weights: rms 3 → 1.\n" + 11 * "more\n")
 
 
 JOBS = {

@@ -30,8 +30,8 @@ def check_hygiene(figure, *, legends=1, unitless=(), smallest=9.0, widest=7.0):
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw_without_rendering()
     assert figure.get_figwidth() <= widest + 1e-9, f"{figure.get_figwidth():g} in wide"
-    hidden = _hidden(figure)
-    written = [text for text in figure.findobj(_is_text) if text not in hidden]
+    hidden = undrawn(figure)
+    written = [text for text in figure.findobj(is_text) if text not in hidden]
     small = {
         text.get_text(): text.get_fontsize() for text in written if text.get_fontsize() < smallest - 1e-9
     }
@@ -59,13 +59,13 @@ def _axes(figure):
     return list(dict.fromkeys(figure.findobj(_AxesBase)))
 
 
-def _is_text(artist):
+def is_text(artist):
     from matplotlib.text import Text
 
     return isinstance(artist, Text) and artist.get_visible() and bool(artist.get_text().strip())
 
 
-def _hidden(figure):
+def undrawn(figure):
     """Texts that are not drawn: of hidden axes, and of ticks outside the limits; ticks know no axes."""
     found = set()
     for ax in _axes(figure):
@@ -73,7 +73,7 @@ def _hidden(figure):
             label for axis in _each(ax) for tick in axis.majorTicks + axis.minorTicks for label in _of(tick)
         }
         if not ax.get_visible():
-            found |= every | set(ax.findobj(_is_text))
+            found |= every | set(ax.findobj(is_text))
         elif ax.axison:
             found |= every - {label for axis in _each(ax) for label in _drawn(axis)}
         else:

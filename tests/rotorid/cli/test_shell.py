@@ -163,8 +163,7 @@ OPTIONS = {
     ("influence", ROTOR, "--planes", "3", "--sensors", "5"): {"--speeds": SPEEDS},
     ("critical", ROTOR): {"-n": EXTREME, "--operating": ("1:1e308", "1e308:1e309", "1e300rpm:1e301rpm")},
     ("balance", BK / "job.toml"): {
-        "--amplitude-error": EXTREME,
-        "--phase-error": EXTREME,
+        "--errors": (*EXTREME, *(f"{each},{each}" for each in EXTREME)),
         "--run-error": EXTREME,
         "--ridge": EXTREME,
         "--max-mass": (*EXTREME, "1e30g", "1e-300g"),

@@ -38,7 +38,8 @@ def test_holes_pieces_and_what_is_taken(run, tmp_path):
 
 
 def test_against_the_rotation_is_the_same_split_with_the_same_numbers(run):
-    args = ("35g@122", "--holes", "24", "--first-hole", "7.5", "--pieces", "10g,20g")
+    holes = ",".join(str(7.5 + 15 * k) for k in range(24))
+    args = ("35g@122", "--holes", holes, "--pieces", "10g,20g")
     one, other = (run(*args, "--angles", way, "--json").json for way in ("with rotation", "against rotation"))
     assert one["mounted"]["mass"] == pytest.approx(other["mounted"]["mass"], rel=1e-9)
     assert [r["angle_deg"] for r in one["holes"]] == pytest.approx([r["angle_deg"] for r in other["holes"]])
@@ -113,7 +114,6 @@ def test_drilling_takes_away_opposite(run, tmp_path):
         ("35g@120 --holes 0,90,90", "list each hole once"),
         ("35g@120 --holes 0,90,360", "within one turn"),
         ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
-        ("35g@120 --holes 4 --first-hole 500", "--first-hole"),
         ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),
         ("35g@120 --holes 4 --pieces 10", "expected a unit of weight"),
         ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),

@@ -54,7 +54,7 @@ def test_files(cli, tmp_path):
 @each_of(
     ("args", "words"),
     [
-        ((), "without a job, give --rotor-mass (or --bearing-load) and --speed and --radius"),
+        ((), "without a job, give --rotor-mass (or --bearing-load), --speed and --radius"),
         (
             ("--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "0mm"),
             "--radius '0mm': expected a value above 0, such as 200mm",

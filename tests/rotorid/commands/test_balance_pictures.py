@@ -55,9 +55,13 @@ def test_corrections_before_and_after_have_one_legend_and_units_in_words(turbo):
         assert band.max() < ax.get_ylim()[1], "the whole band is in the picture"
 
 
-def test_a_checked_job_draws_what_was_achieved(checked):
+def test_a_checked_job_draws_what_was_mounted_and_achieved(checked):
     found, figure = checked
     check_hygiene(figure)
+    circles = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    places = [line.get_xydata()[0] for line in circles if len(line.get_xdata())]
+    drawn = [size * np.exp(1j * angle) for angle, size in places]
+    assert drawn == pytest.approx(found.check.weights[-1] * found.result.labels.weight_scale)
     check = found.check
     for ax in figure.axes[1:]:
         stars = named(ax, "achieved")

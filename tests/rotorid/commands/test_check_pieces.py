@@ -122,6 +122,6 @@ def test_the_sheet_has_what_is_mounted_and_no_set_to_mount(tmp_path: Path) -> No
     assert pieces is not None
     sheet = balance(machine.checked(1e3 * pieces.weights), BalanceOptions(split=True)).sheet().decode()
     weights = sheet.partition('<section id="weights">')[2].partition("</section>")[0]
-    assert "Leave everything mounted" in weights
+    assert "Leave everything that was mounted" in weights
     assert "Remove every trial weight" not in sheet
     assert 'class="holes' not in weights

@@ -83,17 +83,17 @@ def test_each_default_passes_and_is_not_recorded(kind):
 
 def test_falsy_values_are_recorded_and_nested_ones_are_plain():
     given = BalanceOptions(
-        limit=[], amplitude_error=0, ridge="", speeds=np.array([1.0]), phase_error=np.int64(2), refine=True
+        limit=[], grade="", ridge=0, speeds=np.array([1.0]), errors=(np.int64(2), 1.0), refine=True
     )
     document = {name: plain(value) for name, value in changed(given).items()}
     assert document == {
-        "amplitude_error": 0,
-        "ridge": "",
+        "grade": "",
+        "ridge": 0,
         "speeds": [1.0],
-        "phase_error": 2,
+        "errors": [2, 1.0],
         "refine": True,
     }
-    assert type(document["phase_error"]) is int
+    assert type(document["errors"][0]) is int
     assert plain({1: (np.float32(2), Path("a"), np.bool_(True), 1j)}) == {"1": [2.0, "a", True, "1j"]}
 
 

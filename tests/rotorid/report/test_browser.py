@@ -57,14 +57,15 @@ def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
         assert browser.title().strip()
 
         shown = browser.shown()
-        assert len(shown) >= (15 if name.startswith(("balance", "critical")) else 0)
+        assert len(shown) >= (10 if name.startswith(("balance", "critical")) else 0)
         assert [element.key for element in shown if not element.visible] == []
         inside = browser.document()  # what the command printed, and what the sheet adds for itself
         assert {key: inside.get(key) for key in document} == document
         assert disagreements(shown, inside) == []
 
         (top,) = browser.tops("#warnings")
-        assert top < min(browser.tops("table, svg, h2:not(#warnings h2)"))
+        if not name.startswith("balance"):  # there the weights come first
+            assert top < min(browser.tops("table, svg, h2"))
         read = " ".join(browser.text("#warnings").split())
         for warning in document["warnings"]:
             assert " ".join(warning.split())[1:] in read  # as a sentence
@@ -77,12 +78,12 @@ def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", ["balance two planes", "balance holes"])
-def test_four_pages_hold_a_balance_and_the_first_all_to_mount_by(browser, address, name):
+def test_three_pages_hold_a_balance_and_the_first_all_to_mount_by(browser, address, name):
     path = address(name)
     browser.resize(SCREEN)
     browser.open(path)
-    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) <= 4
-    for section in ("#readings", "#besides", "#machine", "#conventions", "#runs", "#influence", "footer"):
+    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) <= 3
+    for section in ("main", "footer"):
         browser.driver.execute_script(
             "document.querySelectorAll(arguments[0]).forEach(e => e.remove())", section
         )

@@ -231,12 +231,6 @@ def test_the_printed_matrices_of_formula_50_with_a_seal():
     )
     found = reduce(None, options)
     shown = found.equations
-    left = [[f"α{min(i, j)}{max(i, j)}" for j in (1, 2, 3)] for i in (1, 2, 3)]
-    right = ["λ{k}*(1 + α12*c2*U2{k})", "λ{k}*U2{k}*(1 + α22*c2)", "λ{k}*(U3{k} + α23*c2*U2{k})"]
-    for row, (k, i) in zip(shown.symbolic, ((k, i) for k in (1, 2) for i in (0, 1, 2)), strict=True):
-        a = left[i]
-        text = f"{a[0]}*m1 + {a[1]}*U2{k}*m2 + {a[2]}*U3{k}*m3 = {right[i].format(k=k)}"
-        assert same(row, text), row.written()
     m = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
     np.testing.assert_allclose(m, found.result.masses.values, rtol=1e-9)
     result = found.result
@@ -244,11 +238,13 @@ def test_the_printed_matrices_of_formula_50_with_a_seal():
     values = {f"α{i + 1}{j + 1}": result.compliance[i, j] for i in range(3) for j in range(i, 3)}
     values |= {f"U{i + 1}{k + 1}": U[i, k] for i in range(3) for k in range(2)}
     values |= {f"λ{k + 1}": result.rotor_frequencies[k] ** -2 for k in range(2)} | {"c2": 2e6}
-    for row, own, D in zip(shown.symbolic, shown.matrix, shown.right, strict=True):
-        np.testing.assert_allclose(
-            [float(sympy.sympify(c).subs(values)) for c, _ in row.left], own, rtol=1e-12
-        )
-        np.testing.assert_allclose(float(side(row.right).subs(values)), D, rtol=1e-12)
+    right = ["λ{k}*(1 + α12*c2*U2{k})", "λ{k}*U2{k}*(1 + α22*c2)", "λ{k}*(U3{k} + α23*c2*U2{k})"]
+    rows = [(k, i) for k in (1, 2) for i in (1, 2, 3)]
+    assert shown.rows == [f"mass at {result.nodes[i - 1]}, mode {k}" for k, i in rows]
+    for (k, i), own, D in zip(rows, shown.matrix, shown.right, strict=True):
+        left = [f"α{min(i, j)}{max(i, j)}*U{j}{k}" for j in (1, 2, 3)]
+        numbers = [float(sympy.sympify(text).subs(values)) for text in (*left, right[i - 1].format(k=k))]
+        np.testing.assert_allclose([*own, D], numbers, rtol=1e-12)
 
 
 # -- sensitivities
@@ -306,21 +302,13 @@ def simulated(model, n=60):
     return Record(t, dict(zip(model.outputs, found.y.T, strict=True)))
 
 
-def test_quasilinearization_shows_its_own_equations():
-    """f_x, f_θ, G and D of [Q] (2.17) to (2.22) in symbols, and M θ = Y, (2.28), of the last iteration."""
+def test_quasilinearization_shows_its_last_step():
+    """M θ = Y, [Q] (2.28), of the last iteration."""
     paths = (FIT / "quasilinearization" / name for name in ("model.toml", "record.csv"))
     options = FitOptions(method="quasilinearization", integrator="sequential-heun")
     found = fit(*paths, options)
     shown = found.equations
-    assert "∂f1/∂x2 = theta1" in written(shown, "f_x")
-    assert "∂f2/∂theta3 = x2" in written(shown, "f_θ")
-    assert "dG23/dt = theta2·G13 + theta3·G23 + x2" in written(shown, "G")
-    x, theta = sympy.symbols("x1 x2"), sympy.symbols("theta1:4")
-    D1, D2 = sympy.symbols("D1 D2")
-    f = theta[1] * x[0] + theta[2] * x[1] + sympy.cos(sympy.Symbol("t"))
-    (row,) = [row for row in shown.symbolic if row.name == "D" and "dD2" in row.written()]
-    expected = f + theta[1] * (D1 - x[0]) + theta[2] * (D2 - x[1]) - theta[1] * x[0] - theta[2] * x[1]
-    assert sympy.simplify(side(row.right) - expected) == 0
+    assert "∂x2/∂theta3" in " ".join(written(shown, "rate"))
     np.testing.assert_allclose(np.linalg.solve(shown.matrix, shown.right), found.result.values, rtol=1e-6)
 
 

@@ -7,10 +7,8 @@ from html.parser import HTMLParser
 
 import jinja2
 import pytest
-from cases import each_of
 from matplotlib.figure import Figure
 
-from rotorid.report.document import Document, fixed, significant
 from rotorid.report.page import inline_svg, json_inside, render_report
 
 PROVENANCE = {
@@ -107,43 +105,3 @@ def test_ids_stay_unique_beside_other_figures_and_every_reference_has_its_target
     used = re.findall(r'(?:href="#|url\(#)([^")]+)', made)
     assert len(ids) == len(set(ids)) > 3
     assert set(used) == set(ids)
-
-
-@each_of(
-    ("value", "digits", "text"),
-    [
-        (416.9288, 4, "416.9"),
-        (0.048295, 3, "0.0483"),
-        (9.999, 3, "10.0"),
-        (-2.5, 2, "-2.5"),
-        (0.0, 3, "0"),
-        (23912.0, 3, "23900"),
-        (1234567.0, 3, "1230000"),
-        (12345678.0, 3, "1.23e+07"),
-        (1.234e-4, 2, "0.00012"),
-        (1.2e-6, 2, "1.2e-06"),
-        (float("nan"), 3, "–"),
-    ],
-)
-def test_significant_digits(value, digits, text):
-    assert significant(value, digits) == text
-
-
-def test_digits_after_the_point():
-    assert fixed(359.96, 1, angle=True) == "0.0"
-    assert fixed(359.96, 1) == "360.0"
-    assert fixed(-0.001, 2) == "0.00"
-    assert fixed(12.0, 0) == "12"
-    assert fixed(float("inf"), 1) == "–"
-
-
-def test_numbers_are_shown_with_the_path_at_which_the_document_has_them():
-    show = Document({"rows": [{"mass": 416.9288, "angle": 359.99, "std": None, "ok": True}], "n": 20}).show
-    assert show("rows.0.mass", digits=4) == '<span data-key="rows.0.mass">416.9</span>'
-    assert show("rows.0.angle", decimals=1, unit="°") == '<span data-key="rows.0.angle">0.0°</span>'
-    assert show("rows.0.mass", digits=2, unit="g") == '<span data-key="rows.0.mass">420\u202fg</span>'
-    assert show("rows.0.std") == '<span data-key="rows.0.std">–</span>'
-    assert show("n", digits=5, trim=True) == '<span data-key="n">20</span>'
-    for missing in ("rows.1.mass", "rows.0.size", "rows.x", "n.0", "rows.0.ok", "rows"):
-        with pytest.raises(KeyError, match="the document has no"):
-            show(missing)
