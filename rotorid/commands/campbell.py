@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -15,7 +15,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import percent
 from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
 from rotorid.report.options import rotor_of
-from rotorid.report.outcome import Outcome, command
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Campbell, Rotor
@@ -50,6 +50,7 @@ class CampbellOptions:
     heavy: float = 6.0
     mesh_check: bool = False
     cross_coupling: str | tuple[float, float] | None = None
+    to: ClassVar[Sequence[str]] = USUAL
     panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
@@ -62,7 +63,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
 
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:9000:250rpm
-    --operating 5300:6500rpm --cross-coupling 0:1e7 --report whirl.html
+    --operating 5300:6500rpm --cross-coupling 0:1e7 --plot whirl.png
 
     Parameters
     ----------

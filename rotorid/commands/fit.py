@@ -37,8 +37,6 @@ class FitOptions:
         How the equations are solved.
     start : LIST
         Starting values instead of the model's: k=2,d=0.1; the others stay.
-    starts : N from 1
-        Begin from so many places; default: from others where the first minimum does not describe the record.
     tolerance : X
         ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
         the sum of squares times Δt, is below it; default: where no step matters.
@@ -55,14 +53,13 @@ class FitOptions:
     method: str = "levenberg-marquardt"
     integrator: str = "auto"
     start: Values | None = None
-    starts: int | None = None
     tolerance: float | None = None
     allow_missing: bool = False
     ridge: float | None = None
     sigma: Values | float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "sigma start allow_missing",
-        "Method": "method starts ridge integrator tolerance",
+        "Method": "method ridge integrator tolerance",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
 
@@ -135,7 +132,6 @@ def fit(
         method=options.method,
         integrator=options.integrator,
         start=begin,
-        starts=options.starts,
         tolerance=options.tolerance,
         weigh=weigh,
         ridge=options.ridge or 0.0,

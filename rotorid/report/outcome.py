@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-USUAL = ("plot", "output", "table", "json")
+WITHOUT_FILE = ("plot", "table", "json")
+USUAL = ("output", *WITHOUT_FILE)
 WITH_REPORT = ("report", *USUAL)
 EQUATIONS = ("show",)
 """Fields of `app.Destination` that a command has."""
