@@ -179,6 +179,7 @@ class TrialWeight(Answered):
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
             tables=table,
             more="every reading",
+            to_mount=True,
         )
 
     def _share(self) -> float | None:

@@ -133,8 +133,8 @@ class BearingEquilibria:
 def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> Outcome:
     """Static equilibrium in journal bearings over speed, linear coefficients, stability.
 
-    Gravity points to -y. --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
-    and reduce read.
+    Gravity points to -y. --output FILE.toml writes the rotor with bearing tables over speed, which critical,
+    campbell, response and reduce read.
 
     Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm
 

@@ -175,7 +175,10 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Out
     if options.keep_supports and result.rotor is not None:
         at = listing((str(support.node) for support in result.rotor.supports), "and")
         first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
-    rest = (part.answer for part in parts.values() if part is not placement)
+    rest = [part.answer for part in parts.values() if part is not placement and part is not small]
+    if small is not None:
+        words = small.answer
+        rest.append(Answer("", "", words.warnings, tables=(words.judgement,), more="the small model"))
 
     def model(path: Path) -> Written:
         from rotorid.commands.reduce_result import model_files, small_of

@@ -50,6 +50,8 @@ class Outcome(Answered):
         What `more` shows, in words; empty: the names of its tables.
     short
         Whether the first table is a short form of the first of `more`, which then stands for it.
+    to_mount
+        Whether the first table is what to mount, which is shown whole.
     file
         What `--output` writes and `to_frame` gives.
     lacking
@@ -79,6 +81,7 @@ class Outcome(Answered):
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
     short: bool = False
+    to_mount: bool = False
     file: Table | Callable[[], Table]
     lacking: str = ""
     files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
@@ -104,6 +107,7 @@ class Outcome(Answered):
             ),
             self.beyond or listing(names, "and"),
             self.short,
+            self.to_mount,
         )
 
     @property
@@ -187,6 +191,7 @@ def outcome_of(
         "beyond": told.more,
         "warnings": told.warnings,
         "notes": told.notes,
+        "to_mount": told.to_mount,
         "file": lambda: table_of(result.to_frame()),
         "pictures": {} if draw is None else {"": draw},
         "keys": getattr(result, "to_dict", None),
