@@ -13,6 +13,7 @@ from rotorid.base.words import Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
+from rotorid.commands.response import STANDARD_GRAVITY
 from rotorid.files import units
 from rotorid.report.options import job_source, refuse
 from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance, table_of
@@ -128,13 +129,14 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
 
 def _load(given: Amount) -> float:
     """Read "250kg" or "2500N" in N."""
-    from balancing import plane_load
-
-    if not isinstance(given, str):
-        return plane_load(None, given) or 0.0
-    value, unit = read_with_unit(given, "--load", units.one_of(units.MASS | units.FORCE), "250kg or 2500N")
-    amount = unit.to_si(value)
-    return plane_load(*((amount, None) if unit.kind == "mass" else (None, amount))) or 0.0
+    amount = given if not isinstance(given, str) else 0.0
+    if isinstance(given, str):
+        known = units.MASS | units.FORCE
+        value, unit = read_with_unit(given, "--load", units.one_of(known), "250kg or 2500N")
+        amount = unit.to_si(value) * (STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
+    if not amount > 0:
+        raise ValueError(f"--load {given!r}: expected a value above 0, such as 250kg or 2500N")
+    return amount
 
 
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:

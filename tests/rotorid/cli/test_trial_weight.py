@@ -76,7 +76,7 @@ def test_files(cli, tmp_path):
         ((TURBO, "--share", "0"), "share of the largest reading must be"),
         ((BK, "--radius", "0mm"), "--radius '0mm': expected a value above 0"),
         ((TURBO, "--radius", "200mm"), "--radius is for weights as masses"),
-        ((TURBO, "--load", "0kg"), "mass of the rotor must be a finite number above 0"),
+        ((TURBO, "--load", "0kg"), "--load '0kg': expected a value above 0"),
     ],
 )
 def test_bad_input_is_one_message(cli, args, words):
