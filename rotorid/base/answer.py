@@ -70,7 +70,10 @@ class Answer:
     to_mount: bool = False
 
     def brief(self, lines: int = LINES) -> str:
-        """At most so many lines that are not blank; of each kind of remark (the same words with other names or numbers) one."""
+        """At most so many lines that are not blank; of each kind of remark one.
+
+        Remarks of a kind are the same words with other names or numbers.
+        """
         head = _wrapped(self.judgement.splitlines())
         remarks = [_remark("Warning", one) for one in kinds(self.warnings)]
         remarks += [_remark("Note", one) for one in kinds(self.notes)]
