@@ -115,7 +115,7 @@ def _check(
         )
     if (prior or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
         raise ValueError(
-            "[prior], --ridge and --loss belong to models that have as many outputs as equations"
+            "a prior, a ridge and a robust loss belong to models with as many outputs as equations"
         )
     words = NAME.findall(" ".join(model.equations))
     for name in model.signals:
