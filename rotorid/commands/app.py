@@ -120,11 +120,7 @@ class Destination:
             return
         written = [f"written: {printable(str(path))}" for path in built]
         answer = equations.answer(made.answer) if equations else made.answer
-        text = (
-            answer.whole()
-            if self.table
-            else answer.brief((2 * LINES if equations else made.lines) - len(written))
-        )
+        text = answer.whole() if self.table else answer.brief(2 * LINES if equations else made.lines)
         typer.echo("\n".join([text, *written]))
 
 
