@@ -41,7 +41,6 @@ from balancing.trial_weight import (
     Lag,
     TrialWeight,
     expected_lag,
-    plane_load,
     trial_from_coefficients,
     trial_from_force,
 )
@@ -104,7 +103,6 @@ __all__ = [
     "match_speeds",
     "model_influence",
     "mount",
-    "plane_load",
     "reading_of",
     "real_parts",
     "refine",

@@ -296,6 +296,7 @@ class Correction(Prediction, Answered):
             tuple(notes),
             tables if predicted in first else (f"Predicted: {predicted}.", *tables),
             "every reading, method and errors",
+            to_mount=True,
         )
 
     def _left(self) -> str:

@@ -430,8 +430,7 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
     variance = float(np.trace(B @ errors.C @ B.T, axis1=1, axis2=2).mean()) / 2
     if not variance > 1e-12 * channels[:, 0, 0].mean():
         raise NoErrorsError(
-            "the method weighted needs errors of the readings ([errors], --amplitude-error, --phase-error or "
-            "repeated readings)"
+            "the method weighted needs errors of the readings ([errors], --errors or repeated readings)"
         )
 
     def wider(share: float) -> _Errors:

@@ -140,6 +140,7 @@ class Mounted(Answered):
             "\n".join(lines),
             tables=(f"Hole by hole:\n{text(_columns(self), left=2)}",) if self.weights.any() else (),
             more="hole by hole",
+            to_mount=True,
         )
 
     def in_holes(self) -> str:

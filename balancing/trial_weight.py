@@ -179,6 +179,7 @@ class TrialWeight(Answered):
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
             tables=table,
             more="every reading",
+            to_mount=True,
         )
 
     def _share(self) -> float | None:
@@ -197,41 +198,6 @@ class TrialWeight(Answered):
             *vector_columns(self.labels, "after", self.expected),
             Column("change", change.ravel(), three_figures),
         )
-
-
-def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int = 1) -> float | None:
-    """What a plane carries.
-
-    Parameters
-    ----------
-    rotor_mass
-        kg, of which each of the `planes` carries a share; None: not known.
-    bearing_load
-        N, of the bearing beside the plane; None: not known.
-    planes
-        How many there are.
-
-    Returns
-    -------
-    N; None where nothing is known.
-
-    Raises
-    ------
-    ValueError
-        For both of them, and for a number that is not positive.
-    """
-    if rotor_mass is not None and bearing_load is not None:
-        raise ValueError(
-            "the mass of the rotor and the load of the bearing are two ways to the same load: "
-            "choose one of them"
-        )
-    positive("number of planes", planes)
-    if rotor_mass is not None:
-        positive("mass of the rotor", rotor_mass)
-        return rotor_mass * GRAVITY / planes
-    if bearing_load is not None:
-        positive("load of the bearing", bearing_load)
-    return bearing_load
 
 
 def trial_from_force(  # noqa: PLR0913

@@ -95,7 +95,7 @@ class LeftToDo(Answered):
             ]
             columns.append(Column("trim", cells, str))
         table = text(columns, left=len(columns), width=COLUMNS)
-        return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]))
+        return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]), to_mount=True)
 
 
 def after_check_run(

@@ -203,7 +203,7 @@ GALLERY = (
     Picture(
         "places",
         "reduction",
-        "reduce sample_data/rotor23.csv --rank",
+        "reduce sample_data/rotor23.csv --place compromise",
         "Few of the 2024 choices of three nodes have both good frequencies and good shapes: the line "
         "joins those that no other beats in both.",
     ),
@@ -231,15 +231,14 @@ GALLERY = (
     Picture(
         "identify",
         "identification",
-        f"identify {IDENTIFY}/section_1_6/model.toml {IDENTIFY}/section_1_6/data.csv "
-        "--amplitude-error 2 --phase-error 1",
+        f"identify {IDENTIFY}/section_1_6/model.toml {IDENTIFY}/section_1_6/data.csv --errors 2,1",
         "The model passes through all amplitudes and phases within their errors; these tell the three "
         "damping coefficients to 7, 16 and 11 %.",
     ),
     Picture(
         "circles",
         "identification",
-        "modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2 --phase-error 1",
+        "modes sample_data/modes/amplitudes.csv --excitation force --errors 2,1",
         "All three resonances are read on both sides, and the readings lie on the circles and peaks of "
         "one fit; in the third mode the circle of X3 is small.",
     ),

@@ -31,8 +31,6 @@ from dataclasses import dataclass
 from rotorid.base.text import capital, counted, cut
 
 LINES, COLUMNS = 12, 100
-TALLEST = 14
-"""Lines of the first block that are shown whatever the room is."""
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
 _QUANTITY = re.compile(r"(only |at most )?([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?= ?%| (?!rpm|Hz|rad/s)[^\W\d])")
@@ -58,6 +56,8 @@ class Answer:
         What these show, in words.
     short
         Whether `found` is a short form of the first of these, which the whole text leaves out.
+    to_mount
+        Whether the first block of `found` is what to mount, which is shown whatever the room is.
     """
 
     judgement: str
@@ -67,16 +67,20 @@ class Answer:
     tables: tuple[str, ...] = ()
     more: str = ""
     short: bool = False
+    to_mount: bool = False
 
     def brief(self, lines: int = LINES) -> str:
-        """At most so many lines; of each kind of remark (the same words with other names or numbers) one."""
+        """At most so many lines that are not blank; of each kind of remark one.
+
+        Remarks of a kind are the same words with other names or numbers.
+        """
         head = _wrapped(self.judgement.splitlines())
         remarks = [_remark("Warning", one) for one in kinds(self.warnings)]
         remarks += [_remark("Note", one) for one in kinds(self.notes)]
         room = lines - len(head) - 3 - bool(remarks)  # blank lines, and where the rest is
-        found, hidden = _first(
-            _wrapped(self.found.splitlines()), room - max(map(len, remarks[:1]), default=0)
-        )
+        remark = max(map(len, remarks[:1]), default=0)
+        most = len(self.found) if self.to_mount else lines - len(head) - remark - 1
+        found, hidden = _first(_wrapped(self.found.splitlines()), room - remark, most)
         told, untold = _fitting(remarks, room - len(found))
         more = self.more if len(self.more) < COLUMNS // 2 else "the tables"
         left = [hidden, counted(untold, "more remark") if untold else "", more if self.tables else ""]
@@ -116,6 +120,7 @@ def together(answers: Iterable[Answer]) -> Answer:
         tuple(dict.fromkeys(note for one in each for note in one.notes)),
         tuple(table for one in each for table in one.tables),
         "; ".join(dict.fromkeys(one.more for one in each if one.tables)),
+        to_mount=any(one.to_mount for one in each),
     )
 
 
@@ -155,16 +160,15 @@ def _wrapped(lines: Iterable[str]) -> list[str]:
     return [part.replace(_KEPT, " ") for part in parts]
 
 
-def _first(lines: list[str], room: int) -> tuple[list[str], str]:
+def _first(lines: list[str], room: int, most: int) -> tuple[list[str], str]:
     """As many lines as there is room for, and words for the others.
 
-    A block that does not fit is left out whole, the first stands whole if that can be: half a table of
-    weights looks like all of them.
+    A block that does not fit is left out whole, of the first at most so many lines are shown.
     """
     if len(lines) <= room:
         return lines, ""
     ends = [k for k, line in enumerate(lines) if not line] or [len(lines)]
-    shown = lines[: max([min(ends[0], max(room, TALLEST)), *(end for end in ends if end <= room)])]
+    shown = lines[: max([min(ends[0], max(room, most)), *(end for end in ends if end <= room)])]
     return shown, counted(hidden, "more line") if (hidden := sum(map(bool, lines[len(shown) :]))) else ""
 
 

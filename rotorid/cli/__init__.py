@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -43,13 +44,6 @@ def worksheet(
     job: Annotated[
         Path, typer.Argument(metavar="JOB | FOLDER", help="Job (.toml, .xlsx), or a folder for one.")
     ] = Path(),
-    port: Annotated[
-        int,
-        typer.Option(metavar="N", min=0, max=65535, help="Default: any free one.", rich_help_panel="Input"),
-    ] = 0,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Only print the address.", rich_help_panel="Output")
-    ] = False,
 ) -> None:
     """A local page to type, balance, check and print a job; nothing leaves the machine.
 
@@ -63,12 +57,12 @@ def worksheet(
 
     def opened(address: str) -> None:
         typer.echo(f"worksheet: {address}   (end it with Ctrl+C)")
-        if not no_browser:
+        if sys.stdout.isatty():
             import webbrowser
 
             webbrowser.open(address)
 
-    serve(job, port, opened)
+    serve(job, 0, opened)
 
 
 def schema(

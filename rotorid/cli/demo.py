@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import shlex
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-
-from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.commands.app import json_text
 
 _COPIED = (".csv", ".toml", ".md", ".txt")
 STEPS = {
@@ -30,9 +26,6 @@ def demo(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
     ),
-    as_json: Annotated[
-        bool, typer.Option("--json", help="The documents of all commands.", rich_help_panel="Output")
-    ] = False,
 ) -> None:
     """Write a sample job to DIR, run the main commands on it, and say where the pictures are.
 
@@ -44,14 +37,6 @@ def demo(
     pictures = [words[-1] for words in commands.values()]
     _copy(folder, [Path(picture) for picture in pictures])
     typed = [shlex.join(["rotorid", *words]) for words in commands.values()]
-    if as_json:
-        documents: dict[str, Any] = {
-            key: json.loads(_run([*words, "--json"])) for key, words in commands.items()
-        }
-        keys = {"folder": str(folder), "pictures": pictures, "commands": typed, **documents}
-        made = {"schema_version": SCHEMA_VERSION, "provenance": documents["balance"]["provenance"]}
-        typer.echo(json_text(keys | made))
-        return
     for number, (line, words) in enumerate(zip(typed, commands.values(), strict=True), start=1):
         typer.echo("\n".join([f"{number}. {line}", *_run(words).splitlines()[:_LINES]]))
     typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")

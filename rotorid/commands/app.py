@@ -84,8 +84,7 @@ class Destination:
         work
             Gives the outcome.
         options
-            Of a class that may have `outputs`, how the name of the table may end, and `writes`: fields that
-            take a further file, and how its name may end.
+            Of a class that may have `outputs`: how the name of --output may end.
 
         Raises
         ------
@@ -95,14 +94,11 @@ class Destination:
         from rotorid.files.problems import printable
         from rotorid.files.table_writing import write_files
 
-        further: Mapping[str, Sequence[str]] = getattr(options, "writes", {})
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
             (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),
             (self.output, getattr(options, "outputs", TABLES), lambda made, path: made.written(path)),
             (self.report, (".html",), lambda made, path: made.sheet()),
         ]
-        for name, endings in further.items():
-            asked.append((getattr(options, name), endings, _further(name)))
         check_targets([(path, endings) for path, endings, _ in asked])
         with busy(what):
             made = work()
@@ -124,21 +120,12 @@ class Destination:
             return
         written = [f"written: {printable(str(path))}" for path in built]
         answer = equations.answer(made.answer) if equations else made.answer
-        text = (
-            answer.whole()
-            if self.table
-            else answer.brief((2 * LINES if equations else made.lines) - len(written))
-        )
+        text = answer.whole() if self.table else answer.brief(2 * LINES if equations else made.lines)
         typer.echo("\n".join([text, *written]))
-
-
-def _further(option: str) -> Callable[[Outcome, Path], Written]:
-    return lambda made, path: made.written(path, option)
 
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
     """Refuse files that could not be written, with how their names may end, before any work is done."""
-    asked: list[Path] = []
     for path, endings in targets:
         if path is None:
             continue
@@ -150,13 +137,9 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
             f"the folder {folder} does not exist": not folder.is_dir(),
             f"cannot be written, it is {kind}": path.exists() and not path.is_file(),
             "cannot be written, permission denied": not os.access(path if path.exists() else folder, os.W_OK),
-            "two results cannot go into one file; give each its own name": any(
-                _same_file(path, other) for other in asked
-            ),
         }
         if why := [words for words, holds in refused.items() if holds]:
             raise ValueError(f"{path}: {why[0]}")
-        asked.append(path)
 
 
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
+from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import Names, Speeds, names, speeds
@@ -49,10 +50,8 @@ class BalanceOptions:
         measured, computed (from the job's rotor) or combined.
     machine_type : --type FLEET:TYPE
         Coefficients of its type, from a fleet.
-    amplitude_error : PERCENT from 0
-        Standard deviation of a reading's amplitude.
-    phase_error : DEGREES from 0
-        Standard deviation of a reading's phase.
+    errors : PERCENT,DEGREES
+        One standard deviation of a reading's amplitude and of its phase: 2,1.
     phase : lead|lag
         What a positive phase means.
     angles : DIRECTION
@@ -77,8 +76,6 @@ class BalanceOptions:
         For --grade, such as 500kg.
     service_speed : SPEED
         For --grade, such as 3000rpm.
-    save_influence : FILE
-        Write the coefficients: .json keeps their errors; .csv or .xlsx.
     template : FILE.xlsx
         Write an empty workbook to fill in.
     """
@@ -87,8 +84,7 @@ class BalanceOptions:
     influence: Path | str | None = None
     coefficients: str | None = None
     machine_type: str | None = None
-    amplitude_error: float | None = None
-    phase_error: float | None = None
+    errors: Errors | None = None
     phase: str | None = None
     angles: str | None = None
     planes: Names | None = None
@@ -101,16 +97,15 @@ class BalanceOptions:
     grade: str | None = None
     rotor_mass: Amount | None = None
     service_speed: Amount | None = None
-    save_influence: Path | None = None
     template: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
-        "Input and conventions": "phase angles amplitude_error phase_error",
+        "Input and conventions": "phase angles errors",
         "Method": "method planes speeds coefficients machine_type influence ridge",
         "Limits, mounting, check run": "max_mass limit split refine grade rotor_mass service_speed",
-        "Output": "save_influence template",
+        "Output": "template",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    writes: ClassVar[Mapping[str, Sequence[str]]] = {"save_influence": (".json", ".csv", ".xlsx")}
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".json")
 
     def before(self, job: Sequence[Path] | None) -> str | None:
         """Write the empty workbook where it is asked for, and say so.
@@ -145,7 +140,8 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | Non
     from rotorid.tables import Job
 
     stored = None if options.influence is None else Path(options.influence)
-    stated = (options.phase, options.angles, options.amplitude_error, options.phase_error)
+    errors = (None, None) if options.errors is None else percent_and_degrees(options.errors)
+    stated = (options.phase, options.angles, *errors)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
         source = JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))

@@ -12,8 +12,8 @@ from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import figures, sentence
 from rotorid.commands.moving import moving
-from rotorid.commands.quantities import Speeds, degrees, rising_speeds
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.commands.quantities import Speeds, rising_speeds
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,12 +40,9 @@ class BearingsOptions:
     ----------
     speeds : SPEEDS
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:9000:250rpm.
-    gravity_direction : DEGREES
-        Where gravity points, from x with the rotation; default: -90, to -y.
     """
 
     speeds: Speeds
-    gravity_direction: float = -90.0
     outputs: ClassVar[tuple[str, ...]] = (".csv", ".xlsx", ".toml")
     to: ClassVar[tuple[str, ...]] = USUAL
 
@@ -136,8 +133,8 @@ class BearingEquilibria:
 def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -> Outcome:
     """Static equilibrium in journal bearings over speed, linear coefficients, stability.
 
-    --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
-    and reduce read.
+    Gravity points to -y. --output FILE.toml writes the rotor with bearing tables over speed, which critical,
+    campbell, response and reduce read.
 
     Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm
 
@@ -161,7 +158,7 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     from rotorid.motion.linear_coefficients import linear_rotor, threshold
 
     speeds = rising_speeds(options.speeds)
-    what = moving(rotor, direction=degrees(options.gravity_direction, "--gravity-direction"))
+    what = moving(rotor)
     system = what.system(speeds[0], speeds[-1])
     if not (system.walls < float("inf")).any():
         raise ValueError("the rotor has no [[journal_bearing]], [[squeeze_film]] or [[annular_seal]]")
@@ -190,5 +187,4 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
         keys=plain(document),
         pictures={"": result.figure},
         warnings=warnings,
-        provenance=provenance(what.files, options),
     )

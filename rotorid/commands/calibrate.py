@@ -11,8 +11,8 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures
 from rotorid.commands.model_places import model_places
-from rotorid.commands.quantities import Names, Nodes, nodes
-from rotorid.report.options import file_of, rotor_source
+from rotorid.commands.quantities import Names
+from rotorid.report.options import file_of, rotor_of
 from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -40,17 +40,11 @@ class CalibrateOptions:
     exact
         Modulus (1 %), discs (1 %), pedestals (10 %) and angles of probes (2°) are not estimated; ± count that
         they may be off by so much. Else they are unknown, too, with these standard deviations.
-    unbalance_at : LIST
-        Nodes where the rotor's own unbalance may stand: the readings of the bare rotor count, too.
-    bow : N from 0
-        Shapes of an unknown bow, modes of the free shaft; with --unbalance-at.
     """
 
     estimate: Names
     prior: str | Mapping[str, str] = ""
     exact: bool = False
-    unbalance_at: Nodes | None = None
-    bow: int = 0
     outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
@@ -69,7 +63,6 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
     parameters = parameter_dict(names, every)
     for name, unknown, share in zip(names, calibrated.unknowns, calibrated.data_share, strict=True):
         parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
-    unbalance = _unbalance(calibrated)
     taken = counted(len(calibrated.exact), "number")
     notes = {
         calibrated.seen: bool(calibrated.seen),
@@ -92,7 +85,6 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
         "exact": calibrated.exact,
         "explained": calibrated.explained,
         "lack_of_fit": calibrated.lack_of_fit,
-        "unbalance": unbalance.records,
         "warnings": calibrated.warnings,
         "rotor": None,
     }
@@ -110,7 +102,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
         result=calibrated,
         sentences=(f"The model {fits} the data ({chi}).",),
         tables=(_short(*_part(calibrated, wished)),),
-        more=(*parts, *([unbalance] if calibrated.bare else [])),
+        more=(*parts,),
         beyond="all numbers, with 95 %",
         short=True,
         file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
@@ -151,22 +143,6 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
         cells += [name, "not determined" if np.isnan(value) else known]
     cells += [""] * (-len(cells) % 4)
     return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
-
-
-def _unbalance(calibrated: CalibratedRotor) -> Table:
-    """What the bare rotor's readings say of its unbalances and bows."""
-    import numpy as np
-
-    names, values = calibrated.bare, np.concatenate((*calibrated.unbalance, [0]))[:-1]
-    std = np.concatenate((*calibrated.unbalance_std, [0]))[:-1]
-    columns = (
-        Column("unbalance", names),
-        Column("size", np.abs(values), "{:.4g}".format),
-        Column("std", std, error_figures),
-        Column("unit", ["m" if name.startswith("bow") else "kg·m" for name in names]),
-        Column("angle_deg", np.degrees(np.angle(values)) % 360, "{:.1f}".format),
-    )
-    return Table("unbalance", columns)
 
 
 class Prepared(NamedTuple):
@@ -238,22 +214,19 @@ def prepared(
         As `calibrate`.
     """
     from rotorid.commands.unknown_numbers import unknowns
-    from rotorid.tables import read_job
+    from rotorid.tables import read_job, rotor_files
 
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
+    files = rotor_files(Path(rotor)) if isinstance(rotor, Path | str) else ()
     given = [data] if isinstance(data, Path | str) else list(data)
     if len({*map(str, given)}) < len(given):
         raise ValueError("one of the data files is given twice: it would count twice")
-    named = [] if options.unbalance_at is None else nodes(options.unbalance_at, "--unbalance-at")
-    places = [*dict.fromkeys(model.node(node) for node in named)]
-    if options.bow and not places:
-        raise ValueError("--bow counts beside unbalance: name the nodes where that may be, --unbalance-at")
     sources = [file_of(file, "data") for file in given]
     readings, read = [], list[Path]()
     for file in sources:
         job = read_job(file)
         try:
-            readings.append(run_readings(job, model, places, options.bow))
+            readings.append(run_readings(job, model))
         except ValueError as error:
             raise ValueError(f"{file.name}: {error}") from None
         read += job.files
@@ -262,7 +235,7 @@ def prepared(
     return without._replace(numbers=numbers)
 
 
-def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int = 0) -> RunReadings:
+def run_readings(job: Job, rotor: Rotor) -> RunReadings:
     """The runs of a job at their places in the model.
 
     Raises
@@ -280,11 +253,10 @@ def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int
             f"the job names a rotor of {counted(job.rotor.n_nodes, 'node')}, this one has {rotor.n_nodes}: "
             "its planes and sensors would be elsewhere"
         )
-    changed = bool((trials.weights != trials.weights[0]).any())
-    if not (unbalance or bow or changed):
+    if not (trials.weights != trials.weights[0]).any():
         raise ValueError(
             "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
-            "are needed, or nodes at which the unbalance may stand (--unbalance-at)"
+            "are needed"
         )
     return RunReadings(
         trials,
@@ -293,6 +265,4 @@ def run_readings(job: Job, rotor: Rotor, unbalance: Sequence[int] = (), bow: int
         tuple(places.sensors[sensor] for sensor in trials.sensors),
         places.derivatives,
         job.key_phasor,
-        tuple(unbalance),
-        bow,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,8 +14,8 @@ from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import percent
 from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
-from rotorid.report.options import rotor_source
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.options import rotor_of
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Campbell, Rotor
@@ -50,6 +50,7 @@ class CampbellOptions:
     heavy: float = 6.0
     mesh_check: bool = False
     cross_coupling: str | tuple[float, float] | None = None
+    to: ClassVar[Sequence[str]] = USUAL
     panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 
@@ -62,7 +63,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
 
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:9000:250rpm
-    --operating 5300:6500rpm --cross-coupling 0:1e7 --report whirl.html
+    --operating 5300:6500rpm --cross-coupling 0:1e7 --plot whirl.png
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
 
     operating = band(options.operating)
     span, place = _span(options.cross_coupling)
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
     speeds = rising_speeds(options.speeds)
     solve = functools.partial(fem.campbell, speeds=speeds, n=options.number, heavy=options.heavy)
     whirl = solve(model)
@@ -134,7 +135,6 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
             "Campbell diagram over the logarithmic decrements.": lambda: campbell_figure(whirl, operating)
         },
         title="Whirl",
-        provenance=provenance(files, options),
     )
 
 

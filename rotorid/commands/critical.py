@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
 from rotorid.commands.quantities import Band, band
-from rotorid.report.options import rotor_source
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.options import rotor_of
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,7 +72,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
 
     options = options or CriticalOptions()
     operating = band(options.operating)
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
     modes = fem.critical_speeds(model, options.number)
     speeds = modes.frequencies
     n = options.number or int((speeds > 0).sum()) or 1
@@ -104,7 +104,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         notes=(modes.cut,) if modes.cut else (),
         pictures=_pictures(modes, chart, operating),
         title="Critical speeds",
-        provenance=provenance(files, options),
     )
 
 

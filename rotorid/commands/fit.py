@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotorid.base.text import listing
 from rotorid.commands.quantities import check_names, number, pairs
 from rotorid.report.options import check_choices, file_of, refuse
-from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from rotorid.base.registry import Method
@@ -35,12 +35,8 @@ class FitOptions:
         How the parameters are searched.
     integrator : NAME
         How the equations are solved.
-    loss : LOSS
-        What a residual counts.
     start : LIST
         Starting values instead of the model's: k=2,d=0.1; the others stay.
-    starts : N from 1
-        Begin from so many places; default: from others where the first minimum does not describe the record.
     tolerance : X
         ε of gauss-newton and quasilinearization, [F]: end where no parameter moves by more, or where I(β),
         the sum of squares times Δt, is below it; default: where no step matters.
@@ -56,16 +52,14 @@ class FitOptions:
 
     method: str = "levenberg-marquardt"
     integrator: str = "auto"
-    loss: str = "linear"
     start: Values | None = None
-    starts: int | None = None
     tolerance: float | None = None
     allow_missing: bool = False
     ridge: float | None = None
     sigma: Values | float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "sigma start allow_missing",
-        "Method": "method loss starts ridge integrator tolerance",
+        "Method": "method ridge integrator tolerance",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
 
@@ -74,9 +68,8 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
     """What the options of these names choose from."""
     from rotorid.identify.fit_records import METHODS
     from rotorid.identify.simulation import INTEGRATORS
-    from rotorid.regression.robust import LOSSES
 
-    return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
+    return {"method": METHODS, "integrator": INTEGRATORS}
 
 
 @command
@@ -128,9 +121,7 @@ def fit(
         records = [file_of(records, "records")]
     if not records:
         raise ValueError("give a record after the model file")
-    paths = [Path(given) for given in records if isinstance(given, Path | str)]
-    _check_once(paths)
-    files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
+    _check_once([Path(given) for given in records if isinstance(given, Path | str)])
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     begin = None if options.start is None else _start(options.start, equations, len(records))
     deviations = None if options.sigma is None else sigmas(options.sigma, equations.outputs)
@@ -140,9 +131,7 @@ def fit(
         data,
         method=options.method,
         integrator=options.integrator,
-        loss=options.loss,
         start=begin,
-        starts=options.starts,
         tolerance=options.tolerance,
         ridge=options.ridge or 0.0,
     )
@@ -158,7 +147,6 @@ def fit(
 
     return outcome_of(
         result,
-        provenance(files, options),
         files=iterations if result.integrals else {},
         pictures={"Signals and residuals over time; parameters with 95 %.": lambda: figure_fit(result)},
         title="Parameters from time records",

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.commands.amplitude_errors import amplitude_errors
-from rotorid.report.options import check_choices, file_of, refuse
-from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of, provenance
+from rotorid.commands.amplitude_errors import Errors, amplitude_errors
+from rotorid.report.options import file_of
+from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.base.registry import Method
     from rotorid.identify import Experiments, HarmonicModel
     from rotorid.report.equations import Equations
     from rotorid.tables import HarmonicFile
@@ -30,26 +28,12 @@ class IdentifyOptions:
 
     Attributes
     ----------
-    loss : LOSS
-        What a residual counts.
-    amplitude_error : PERCENT
-        One standard deviation of an amplitude, in place of the one that the model states.
-    phase_error : DEGREES
-        One standard deviation of a phase, in place of the one that the model states.
+    errors : PERCENT,DEGREES
+        One standard deviation of an amplitude and of a phase, in place of those that the model states: 2,1.
     """
 
-    loss: str = "linear"
-    amplitude_error: float | None = None
-    phase_error: float | None = None
-    panels: ClassVar[Mapping[str, str]] = {"Method": "loss"}
+    errors: Errors | None = None
     to: ClassVar[tuple[str, ...]] = (*WITH_REPORT, *EQUATIONS)
-
-
-def choices() -> dict[str, tuple[Method[Any], ...]]:
-    """What the options of these names choose from."""
-    from rotorid.regression.robust import LOSSES
-
-    return {"loss": LOSSES}
 
 
 @command
@@ -81,24 +65,19 @@ def identify(
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
-    check_choices(options, choices())
-    if data is None:
-        refuse(options, ("loss",), "belongs to DATA: nothing is fitted without them")
-    files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
         model = read_harmonic_model(file_of(model, "a model"))
-    file = replace(model, errors=amplitude_errors(model.errors, options.amplitude_error, options.phase_error))
+    file = replace(model, errors=amplitude_errors(model.errors, options.errors))
     if data is None:
-        return _at_best(file.model, provenance(files, options))
+        return _at_best(file.model)
     if not isinstance(data, Experiments):
         data = read_measurements(file_of(data, "a table of amplitudes"), file)
     result = estimate(
         file.model,
         data,
         bounds=file.bounds or None,
-        loss=options.loss,
         start=file.start or None,
         prior=file.prior,
     )
@@ -110,14 +89,13 @@ def identify(
 
     return outcome_of(
         result,
-        provenance(files, options),
         pictures={"Amplitudes or shapes, measured and predicted.": picture},
         title="Coefficients from harmonic tests",
         solved=lambda: _equations(result),
     )
 
 
-def _at_best(model: HarmonicModel, origin: Mapping[str, Any]) -> Outcome:
+def _at_best(model: HarmonicModel) -> Outcome:
     """What data can determine at best."""
     words = list(model.combinations.words)
     return Outcome(
@@ -128,7 +106,6 @@ def _at_best(model: HarmonicModel, origin: Mapping[str, Any]) -> Outcome:
         file=Table("combinations", (Column("combination", words),)),
         lacking=_NO_DATA,
         solved=lambda: _equations(model),
-        provenance=origin,
     )
 
 

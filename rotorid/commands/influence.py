@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
-from rotorid.report.options import rotor_source
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.options import rotor_of
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +33,7 @@ class InfluenceOptions:
     planes: Nodes
     sensors: str | Sequence[Sensor]
     speeds: Speeds
+    to: ClassVar[Sequence[str]] = USUAL
 
 
 @command
@@ -58,7 +59,7 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
     import fem
     from fem.plots import influence_figure
 
-    model, files = rotor_source(rotor)
+    model = rotor_of(rotor)
     planes, places = nodes(options.planes, "--planes"), sensors(options.sensors)
     speeds = rising_speeds(options.speeds)
     result = fem.influence(model, planes, places, speeds)
@@ -76,5 +77,4 @@ def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> Outcome:
             )
         },
         title="Influence coefficients",
-        provenance=provenance(files, options),
     )

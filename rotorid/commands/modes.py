@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, listing
 from rotorid.base.unit_words import SPEEDS
-from rotorid.commands.amplitude_errors import amplitude_errors
+from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.report.options import file_of
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,16 +38,13 @@ class ModesOptions:
     bands : LIST
         Around each resonance, one mode in each: 120:150,500:580 in rad/s, or 20:25Hz,80:90Hz; default:
         around each peak.
-    amplitude_error : PERCENT from 0
-        One standard deviation of an amplitude.
-    phase_error : DEGREES from 0
-        One standard deviation of a phase.
+    errors : PERCENT,DEGREES
+        One standard deviation of an amplitude and of a phase: 2,1.
     """
 
     excitation: Excitation | None = None
     bands: str | Sequence[Band] | None = None
-    amplitude_error: float | None = None
-    phase_error: float | None = None
+    errors: Errors | None = None
     to: ClassVar[Sequence[str]] = USUAL
 
 
@@ -57,8 +54,8 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
 
     The table of modes is for `reduce --measured`, and for `identify` in place of amplitudes.
 
-    Example: rotorid modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2
-    --phase-error 1 --output modes.csv
+    Example: rotorid modes sample_data/modes/amplitudes.csv --excitation force --errors 2,1
+    --output modes.csv
 
     Parameters
     ----------
@@ -97,7 +94,6 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
         title="Modes",
         warnings=fit.warnings,
         notes=() if lacking else fit.notes,
-        provenance=provenance([file], options),
     )
 
 
@@ -115,9 +111,7 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
     from rotorid.files.measurements import read_amplitudes
     from rotorid.identify.modes_result import Readings
 
-    if (options.amplitude_error is None) != (options.phase_error is None):
-        raise ValueError("--amplitude-error and --phase-error belong together")
-    errors = amplitude_errors(None, options.amplitude_error, options.phase_error)
+    errors = amplitude_errors(None, options.errors)
     table = read_amplitudes(file)
     if options.excitation is not None:
         one_of(options.excitation, "--excitation", get_args(Excitation))

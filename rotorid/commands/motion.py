@@ -27,7 +27,7 @@ from rotorid.commands.quantities import (
     two_speeds,
 )
 from rotorid.report.options import refuse
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -298,7 +298,6 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
             f"differ by {error:.1g} of that from those with {_LOOSER:g} times this tolerance",
             *reduction_notes(fine.system),
         ),
-        provenance=provenance(source.files, options),
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted, percent
-from rotorid.report.options import rotor_source
+from rotorid.report.options import rotor_of
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -32,15 +32,12 @@ class Moving:
         By node, kg·m and m, complex; None: the small model's own.
     direction
         Of gravity, degrees from x with the rotation.
-    files
-        Read for it.
     """
 
     model: Rotor | SmallModel
     unbalance: Mapping[int, complex] | None
     bow: Mapping[int, complex] | None
     direction: float
-    files: tuple[Path, ...]
 
     def system(self, lowest: float, highest: float) -> MotionSystem:
         """Its equations from one speed to another, rad/s, as `rotorid.motion.system` has them."""
@@ -90,20 +87,17 @@ def moving(
     """
     from rotorid.files.small_model import is_small_model
     from rotorid.reduction import SmallModel
-    from rotorid.tables import read_bow, read_small_model, read_unbalance, rotor_files
+    from rotorid.tables import read_bow, read_small_model, read_unbalance
 
     model: Rotor | SmallModel
-    files: tuple[Path, ...] = ()
     if isinstance(given, SmallModel):
         model = given
     elif isinstance(given, Path | str) and is_small_model(Path(given)):
-        model, files = read_small_model(given), rotor_files(Path(given))
+        model = read_small_model(given)
     else:
-        model, files = rotor_source(given)
+        model = rotor_of(given)
     if isinstance(unbalance, Path | str):
-        files = (*files, Path(unbalance))
-        unbalance = read_unbalance(files[-1], model)
+        unbalance = read_unbalance(Path(unbalance), model)
     if isinstance(bow, Path | str):
-        files = (*files, Path(bow))
-        bow = read_bow(files[-1], model)
-    return Moving(model, unbalance, bow, direction, files)
+        bow = read_bow(Path(bow), model)
+    return Moving(model, unbalance, bow, direction)

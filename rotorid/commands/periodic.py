@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, range_text, rpm_text
@@ -20,8 +20,8 @@ from rotorid.commands.moving import (
     reduction,
     reduction_notes,
 )
-from rotorid.commands.quantities import Band, Sensor, degrees, sensors, two_speeds
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.commands.quantities import Band, Sensor, sensors, two_speeds
+from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -48,10 +48,6 @@ class PeriodicOptions:
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
-    bow : FILE
-        Table of the shaft's bow at rest; in place of a small model's own.
-    gravity_direction : DEGREES
-        Where gravity points, from x with the rotation; default: -90, to -y.
     max_seconds : S from 0.01
         Limit of the search; what is known by then is given, with a warning. Default: none.
     """
@@ -60,8 +56,6 @@ class PeriodicOptions:
     sensors: str | Sequence[Sensor] | None = None
     limit_cycle: bool = False
     unbalance: Path | str | Mapping[int, complex] | None = None
-    bow: Path | str | Mapping[int, complex] | None = None
-    gravity_direction: float = -90.0
     max_seconds: float | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Motion": "limit_cycle",
@@ -70,9 +64,7 @@ class PeriodicOptions:
     to: ClassVar[tuple[str, ...]] = USUAL
 
 
-def _outcome(
-    motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray, origin: Mapping[str, Any]
-) -> Outcome:
+def _outcome(motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray) -> Outcome:
     """Branches as sensors read them, which have names and unit vectors (k, n): stability, bifurcations."""
     from rotorid.base.plot_style import on_figure
     from rotorid.motion.branches import amplitudes, jumps
@@ -131,7 +123,6 @@ def _outcome(
             ),
             motion.tried,
         ),
-        provenance=origin,
     )
 
 
@@ -236,8 +227,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     from rotorid.motion.system import reduced_system
 
     low, high = _range(options.speeds)
-    direction = degrees(options.gravity_direction, "--gravity-direction")
-    what = moving(model, options.unbalance, options.bow, direction)
+    what = moving(model, options.unbalance)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
     kept = [node for node, _ in sensed] + mounted_nodes(full)
@@ -252,7 +242,7 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
         limit_cycle=options.limit_cycle,
         max_seconds=np.inf if options.max_seconds is None else options.max_seconds,
     )
-    return _outcome(motion, labels, directions, provenance(what.files, options))
+    return _outcome(motion, labels, directions)
 
 
 def _range(given: Band) -> tuple[float, float]:

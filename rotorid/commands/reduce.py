@@ -23,14 +23,13 @@ from rotorid.commands.quantities import (
     one_speed,
     rising_speeds,
 )
-from rotorid.report.options import refuse, rotor_source
+from rotorid.report.options import refuse, rotor_of
 from rotorid.report.outcome import (
     EQUATIONS,
     WITH_REPORT,
     Outcome,
     command,
     outcome_of,
-    provenance,
     table_of,
 )
 
@@ -47,6 +46,7 @@ Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
+STATE_SPACE = (".json", ".npz", ".mat")
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
@@ -59,12 +59,10 @@ class ReduceOptions:
     nodes : LIST
         Where the masses stand: nodes or stations, 7,12,18.
     place
-        Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
-        (extrema of the first two modes).
-    rank
-        Rank all places of the masses; without --nodes or --place they are those of the best compromise.
+        Instead of nodes: all places are ranked, and the best by frequency, the best by MAC or a compromise
+        taken; or those of the book's rule (extrema of the first two modes).
     masses : N from 1
-        How many masses are placed or ranked; default: 3.
+        How many masses are placed; default: 3.
     candidates : LIST
         Nodes that places are chosen from.
     modes : N from 1
@@ -96,20 +94,14 @@ class ReduceOptions:
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
     force : LIST
-        Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
+        Nodes of measured forces, inputs f_x12 of the small model that --output writes, 12 or 7,12.
     keep_supports
         For motion: masses of the shaft alone, estimated with rigid bearings in place of bearings and films;
         all supports and forces stay in the model, at nodes of their own.
-    model : FILE.toml
-        Write the small model for `rotorid motion`, `periodic`, `bearings`, and for `fit`, `identify` and
-        `simulate`, a damper to be estimated at each mass.
-    state_space : FILE
-        Write A, B, C, D in both planes: .json, .npz or .mat.
     """
 
     nodes: Nodes | None = None
     place: Place | None = None
-    rank: bool = False
     masses: int | None = None
     candidates: Nodes | None = None
     modes: int | None = None
@@ -127,19 +119,14 @@ class ReduceOptions:
     stability: Band | None = None
     force: Nodes | None = None
     keep_supports: bool = False
-    model: Path | None = None
-    state_space: Path | None = None
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "nodes modes speed measured compliance seals",
-        "Method": "rank place masses candidates methods errors",
-        "Small model": "response stability model state_space damping force keep_supports",
+        "Method": "place masses candidates methods errors",
+        "Small model": "response stability damping force keep_supports",
         "Expert": "rows nonnegative supports_apart",
     }
     to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    writes: ClassVar[Mapping[str, Sequence[str]]] = {
-        "model": (".toml",),
-        "state_space": (".json", ".npz", ".mat"),
-    }
+    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml", *STATE_SPACE)
 
 
 @command
@@ -147,12 +134,13 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
-    small model (--response, --stability, --model, --state-space). With --keep-supports bearings, films and
-    other forces stay apart from the masses, for motion.
+    small model: --output FILE.toml writes it for motion, periodic, bearings, and for fit, identify and
+    simulate, with a damper to be estimated at each mass; .json, .npz or .mat A, B, C, D in both planes. With
+    --keep-supports bearings, films and other forces stay apart from the masses, for motion.
 
     Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
 
-    Example: rotorid reduce sample_data/rotor23.csv --rank --plot map.png
+    Example: rotorid reduce sample_data/rotor23.csv --place compromise --plot map.png
 
     Parameters
     ----------
@@ -169,14 +157,13 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     options = options or ReduceOptions()
     _check_used(options, rotor is not None)
     if rotor is None:
-        result, files = _of_tables(options)
-        return _outcome({"": result}, options, files, "")
-    name = Path(rotor).name if isinstance(rotor, Path | str) else ""
-    parts, files = _of_rotor(rotor, options)
-    return _outcome(parts, options, files, name)
+        return _outcome({"": _of_tables(options)}, options, "")
+    return _outcome(
+        _of_rotor(rotor, options), options, Path(rotor).name if isinstance(rotor, Path | str) else ""
+    )
 
 
-def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[Path], name: str) -> Outcome:
+def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Outcome:
     """The masses, and what was asked for beside them, by their keys in the document; the ranking first."""
     result: Reduction = parts[""]
     small: SmallModel | None = parts.get("small_model")
@@ -188,7 +175,10 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     if options.keep_supports and result.rotor is not None:
         at = listing((str(support.node) for support in result.rotor.supports), "and")
         first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
-    rest = (part.answer for part in parts.values() if part is not placement)
+    rest = [part.answer for part in parts.values() if part is not placement and part is not small]
+    if small is not None:
+        words = small.answer
+        rest.append(Answer("", "", words.warnings, tables=(words.judgement,), more="the small model"))
 
     def model(path: Path) -> Written:
         from rotorid.commands.reduce_result import model_files, small_of
@@ -199,6 +189,8 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     def state_space(path: Path) -> Written:
         from rotorid.commands.reduce_result import small_of, state_space_bytes
 
+        if options.keep_supports:
+            raise ValueError(f"{path}: with --keep-supports the small model is for motion: FILE.toml")
         return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
 
     def solved() -> Equations:
@@ -209,11 +201,10 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, files: Sequence[P
     keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
     return outcome_of(
         result,
-        provenance(files, options),
         answer=together([*first, *rest]),
         keys={**keys.pop(""), **keys},
         file=lambda: table_of((placement or result).to_frame()),
-        files={"model": model, "state_space": state_space},
+        files={".toml": model, **dict.fromkeys(STATE_SPACE, state_space)},
         pictures={
             caption: partial(_picture, key, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
         },
@@ -253,27 +244,23 @@ def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:
 
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
-    computed = ("rank", "place", "methods", "response", "stability")
+    computed = ("place", "methods", "response", "stability")
     if has_rotor:
         refuse(options, ("compliance", "seals"), "takes the place of a rotor: give it, or ROTOR, not both")
     else:
         others = ("candidates", "speed", "supports_apart", "damping", "keep_supports")
         refuse(options, (*computed, *others), "needs a rotor: give ROTOR instead of --compliance")
-    if not options.rank and options.place is None:
-        refuse(options, ("masses", "candidates"), "does nothing without --rank or --place")
-    if options.model is None:
-        refuse(options, ("force",), "does nothing without --model")
+    if options.place is None:
+        refuse(options, ("masses", "candidates"), "does nothing without --place")
     if options.keep_supports:
         on_supports = ("measured", "supports_apart", "speed", "response", "stability", "force")
         rigid = "asks for the rotor on its supports; with --keep-supports the masses are found on rigid ones"
         refuse(options, on_supports, rigid)
-        if options.state_space:
-            raise ValueError(f"--state-space {rigid}")
     if options.measured is not None:
         refuse(options, computed, "compares with the computed rotor, not with the measured modes")
 
 
-def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[str, Any], tuple[Path, ...]]:
+def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> dict[str, Any]:
     """The masses of a rotor, and what is asked for beside them."""
     from rotorid.commands.reduce_result import small_of
     from rotorid.files.modes import read_modes
@@ -288,7 +275,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     )
     from rotorid.reduction import reduce as reduce_rotor
 
-    whole, files = rotor_source(rotor)
+    whole = rotor_of(rotor)
     machine, held = whole, held_nodes(whole) if options.keep_supports else ()
     if options.keep_supports:
         machine = held_rigidly(whole)
@@ -303,7 +290,6 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     check_free(held, places)
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
-        files = (*files, Path(options.measured))
         data = modes_at(data, machine, places, options.measured)
     result = reduce_rotor(
         machine,
@@ -317,7 +303,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         errors=input_errors(options.errors, data, used),
     )
     parts: dict[str, Any] = {"": result}
-    if placement is not None and options.rank:
+    if placement is not None:
         parts["placement"] = placement
     if options.methods:
         parts["methods"] = compare_methods(result)
@@ -325,7 +311,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
     small, ratios = None, _damping_ratios(options.damping)
     if options.keep_supports:
         small = keep_supports(whole, places, result.masses.solution, modal_damping=ratios)
-    elif options.response is not None or stable is not None or options.model or options.state_space or ratios:
+    elif options.response is not None or stable is not None or ratios:
         small = small_of(result, ratios)
     if options.response is not None and small is not None:
         automatic = str(options.response) == "auto"
@@ -333,7 +319,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> tuple[dict[s
         parts["response"] = compare_response(machine, small, speeds)
     if stable is not None and small is not None:
         parts["stability"] = compare_stability(machine, small, stable[1], lowest=stable[0])
-    return parts | ({} if small is None else {"small_model": small}), files
+    return parts | ({} if small is None else {"small_model": small})
 
 
 def _places(
@@ -349,7 +335,7 @@ def _places(
     if options.nodes is not None and options.place is not None:
         raise ValueError("--nodes and --place are two ways to the same end: choose one")
     masses, placement = 3 if options.masses is None else options.masses, None
-    if options.rank or options.place not in (None, "book"):
+    if options.place not in (None, "book"):
         candidates: Sequence[int | str] = [n for n in range(1, rotor.n_nodes + 1) if n not in held]
         placement = rank_nodes(
             rotor,
@@ -376,12 +362,10 @@ def _places(
         return placement, placement.nodes[which].tolist()
     if data is not None:
         return None, [rotor.node(node) for node in data.nodes]
-    raise ValueError(
-        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
-    )
+    raise ValueError("say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book")
 
 
-def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
+def _of_tables(options: ReduceOptions) -> Reduction:
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.files.modes import read_compliance, read_modes
     from rotorid.reduction import reduce_measured
@@ -399,7 +383,7 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
     springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
     if lost := springs.keys() - {*map(str, wanted)}:
         raise ValueError(f"--seals: no mass stands at {min(lost)!r}")
-    result = reduce_measured(
+    return reduce_measured(
         alpha[order][:, order],
         data.frequencies,
         data.shapes,
@@ -410,7 +394,6 @@ def _of_tables(options: ReduceOptions) -> tuple[Reduction, tuple[Path, ...]]:
         nonnegative=options.nonnegative,
         errors=input_errors(options.errors, data, used),
     )
-    return result, (Path(options.compliance), Path(options.measured))
 
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:

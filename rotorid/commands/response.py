@@ -26,7 +26,7 @@ from rotorid.commands.quantities import (
     sensors,
 )
 from rotorid.report.options import file_of
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -409,23 +409,20 @@ def response(
     from rotorid.commands.operating_range import critical_peaks
     from rotorid.tables import read_unbalance
 
-    source = moving(rotor)
-    model, files, operating = source.model, source.files, band(options.operating)
+    model, operating = moving(rotor).model, band(options.operating)
     speeds = rising_speeds(options.speeds)
-    highest, asked, standard = operating[1] if operating else speeds[-1], {}, ""
+    highest, standard = operating[1] if operating else speeds[-1], ""
     if isinstance(unbalance, str) and re.match("api(:|@|$)", unbalance):
         if not isinstance(model, fem.Rotor):
             raise ValueError(f"--unbalance {unbalance} follows from the journals of a rotor: give a table")
-        asked, standard = {"unbalance": unbalance}, f"Unbalance after API 617 ({unbalance}): "
+        standard = f"Unbalance after API 617 ({unbalance}): "
         unbalance = _api_unbalance(model, unbalance, speeds, highest)
         planes = [f"{1e6 * abs(amount):.4g} g·mm at node {node}" for node, amount in unbalance.items()]
         standard += f"{listing(planes, 'and')}, N = {rpm_text(highest)}."
     elif unbalance == "own":
-        asked, unbalance = {"unbalance": unbalance}, getattr(model, "unbalance", {})
+        unbalance = getattr(model, "unbalance", {})
     elif not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
-        table = file_of(unbalance, "unbalance by node or station,")
-        files = (*files, table)
-        unbalance = read_unbalance(table, model)
+        unbalance = read_unbalance(file_of(unbalance, "unbalance by node or station,"), model)
     if not unbalance:
         raise ValueError(
             "no unbalance is given: a table with --unbalance, or own of a small model that has it"
@@ -455,7 +452,6 @@ def response(
         ),
         pictures=result.pictures(options.view, at),
         title="Unbalance response",
-        provenance=provenance(files, options, **asked),
     )
 
 

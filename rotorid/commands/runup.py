@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.json import plain
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures, listing
 from rotorid.commands.modes import NO_MODES, bands, frequencies
-from rotorid.commands.quantities import Band, Names, acceleration, names, one_of
-from rotorid.commands.quantities import speeds as read_speeds
+from rotorid.commands.quantities import Band, acceleration, one_of
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
@@ -37,10 +36,6 @@ class RunUpOptions:
     ----------
     phase
         What a positive phase is; default: lead, and that is said.
-    run : NAME
-        Whose modes are fitted, where there are several runs; all are drawn.
-    sensors : LIST
-        Only these.
     tacho : NAME
         Of a record: channel of the tacho, where no waveforms file says.
     unit : UNIT
@@ -49,29 +44,14 @@ class RunUpOptions:
         Where the table has no times: 50rpm/s, or -50rpm/s down; 0: the speed is held for each vector.
     bands : LIST
         Around each critical speed, one mode in each: 700:1200,2000:3000; default: around each peak.
-    slow_roll : SPEED|FILE
-        Run-out is the mean at or below this speed, or a runs table of one run; default: fit, what no speed
-        changes.
     """
 
     phase: Phase | None = None
-    run: str | None = None
-    sensors: Names | None = None
     tacho: str | None = None
     unit: str | None = None
     acceleration: str | float | None = None
     bands: str | Sequence[Band] | None = None
-    slow_roll: str | float | Path = "fit"
     to: ClassVar[Sequence[str]] = USUAL
-
-
-class SlowRoll(NamedTuple):
-    """Vectors (C,), standard deviations of either part, where they are from, and warnings; None: unknown."""
-
-    vectors: ComplexArray | None
-    std: FloatArray | None
-    words: str
-    warnings: tuple[str, ...] = ()
 
 
 @command
@@ -96,7 +76,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     ValueError
         For a table or an option that cannot be.
     """
-    from rotorid.identify.modes import fit_sweep
+    from rotorid.identify.modes import constant_vectors, fit_sweep
 
     options = options or RunUpOptions()
     files: list[Path] = []
@@ -108,32 +88,34 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
         files = [*read]
         if options.phase is None and not recorded:
             notes.append("nobody says whether phases lead or lag: lead is assumed (--phase)")
-    sweeps = _ordered(data, options)
-    around = bands(options.bands, sweeps[0].labels.speed_unit)
+    if len(data) > 1:
+        raise ValueError(f"one run is needed, not {len(data)}: {listing(sweep.run for sweep in data)}")
     rate = None if options.acceleration is None else acceleration(options.acceleration, "--acceleration")
-    sweeps = [_timed(sweep, rate) for sweep in sweeps]
+    sweep = _timed(data[0], rate)
+    around = bands(options.bands, sweep.labels.speed_unit)
     modes, why = None, ""
     try:
-        modes = fit_sweep(sweeps[0], steady=rate == 0.0, bands=around or None)
+        modes = fit_sweep(sweep, steady=rate == 0.0, bands=around or None)
     except ValueError as error:
         why = str(error)
-    turned = _turned(sweeps[0], modes) if modes else ()
+    turned = _turned(sweep, modes) if modes else ()
     doubts = (*turned, *modes.undetermined) if modes else (why,)
     fit = None if doubts else modes
-    roll = _slow_roll(sweeps[0], modes, options.slow_roll, files)
-    mean, time = 0.0 if rate == 0.0 else None, sweeps[0].time
+    roll, slow = None, None
+    if modes and not modes.undetermined:
+        roll, std = constant_vectors(modes)
+        slow = _roll_table(sweep, roll, std)
+    mean, time = 0.0 if rate == 0.0 else None, sweep.time
     if mean is None and time is not None and len(time) > 1:
-        mean = float((sweeps[0].speeds[-1] - sweeps[0].speeds[0]) / (time[-1] - time[0]))
-    slow = None if roll.vectors is None else _roll_table(sweeps[0], roll.vectors, roll.std)
+        mean = float((sweep.speeds[-1] - sweep.speeds[0]) / (time[-1] - time[0]))
     steady, estimate = (modes.steady, modes.fit.estimate) if modes else (None, None)
     warnings = (*turned, *modes.warnings) if modes else (f"no modes: {why}",)
-    warnings = (*warnings, *(_hasty(fit) if fit else ()), *roll.warnings)
+    warnings = (*warnings, *(_hasty(fit) if fit else ()))
     document = {
-        "run": sweeps[0].run,
-        "phase": sweeps[0].labels.phase,
+        "run": sweep.run,
+        "phase": sweep.labels.phase,
         "modes": _modes(fit, steady) if fit else [],
         "slow_roll": slow.records if slow else [],
-        "slow_roll_from": roll.words,
         "acceleration_rad_s2": mean,
         "chi_square": estimate and estimate.chi_square,
         "degrees_of_freedom": estimate and estimate.dof,
@@ -141,15 +123,15 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     }
     return Outcome(
         result=modes,
-        sentences=(_sentence(sweeps[0].run, fit),),
-        tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweeps[0])] if slow else [])),
+        sentences=(_sentence(sweep.run, fit),),
+        tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweep)] if slow else [])),
         file=fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES,
         lacking=f"there is no table of modes: {doubts[0]}" if doubts else "",
         title="Run-up",
         keys=dict(plain(document)),
-        pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweeps, fit, roll)},
+        pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweep, fit, roll)},
         warnings=warnings,
-        notes=(f"slow roll {roll.words}", *_course(mean), *notes, *(fit.notes if fit else ())),
+        notes=(*_course(mean), *notes, *(fit.notes if fit else ())),
         provenance=provenance(files, options),
     )
 
@@ -167,35 +149,10 @@ def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], 
     from rotorid.files.vectors_table import read_vectors
     from rotorid.files.waveforms import read_vectors_grid
 
-    given = {
-        "tacho": options.tacho,
-        "sensors": names(options.sensors),
-        "unit": options.unit,
-        "phase": options.phase,
-    }
+    given = {"tacho": options.tacho, "sensors": None, "unit": options.unit, "phase": options.phase}
     problems = Problems()
     grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
     return read_vectors(grid, phase), read
-
-
-def _ordered(sweeps: Sequence[Readings], options: RunUpOptions) -> list[Readings]:
-    """The run whose modes are fitted, then the others, of the sensors asked for."""
-    import numpy as np
-
-    runs = [sweep.run for sweep in sweeps]
-    if options.run is None and len(runs) > 1:
-        raise ValueError(f"there are {len(runs)} runs: say with --run whose modes to fit, {listing(runs)}")
-    first = one_of(options.run or runs[0], "--run", runs)
-    ordered = sorted(sweeps, key=lambda sweep: sweep.run != first)
-    wanted = names(options.sensors) or list(ordered[0].sensors)
-    for name in wanted:
-        one_of(name, f"--sensors: of run {first!r},", ordered[0].sensors)
-    columns = [[sweep.sensors.index(name) for name in wanted if name in sweep.sensors] for sweep in ordered]
-    return [
-        sweep.take(np.arange(len(sweep.speeds)), np.array(chosen))
-        for sweep, chosen in zip(ordered, columns, strict=True)
-        if chosen
-    ]
 
 
 def _timed(sweep: Readings, rate: float | None) -> Readings:
@@ -238,29 +195,6 @@ def _hasty(fit: FittedModes) -> list[str]:
     ]
 
 
-def _slow_roll(
-    sweep: Readings, modes: FittedModes | None, given: str | float | Path, files: list[Path]
-) -> SlowRoll:
-    """Run-out: of the fit, the mean at slow speeds, or of a file."""
-    from rotorid.files.vectors_table import read_slow_roll
-    from rotorid.identify.modes import constant_vectors, slow_vectors
-
-    if isinstance(given, str) and given == "fit":
-        if modes is None or modes.undetermined:
-            return SlowRoll(None, None, "unknown: there is no fit to tell it (--slow-roll SPEED does)")
-        words = "of the fit: what no speed changes, modes far below the sweep included"
-        return SlowRoll(*constant_vectors(modes), words)
-    if isinstance(given, Path) or (isinstance(given, str) and Path(given).suffix.lower() in TABLES):
-        file = file_of(given, "a runs table of one run at slow speed")
-        files.append(file)
-        vectors, remarks = read_slow_roll(file, sweep)
-        return SlowRoll(vectors, None, f"of {file.name}", remarks)
-    wanted = given if isinstance(given, str) else [float(given)]
-    (speed,) = read_speeds(wanted, sweep.labels.speed_unit, "--slow-roll")
-    words = f"mean of the vectors at or below {sweep.labels.speed_words(speed)}"
-    return SlowRoll(*slow_vectors(sweep, speed), words)
-
-
 def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
     """A row a mode: with the acceleration, and as a steady fit has it."""
     columns = frequencies(fit, "critical rpm", RPM)
@@ -270,19 +204,18 @@ def _table(fit: FittedModes, steady: FittedModes | None) -> Table:
     return Table("critical speeds", columns)
 
 
-def _roll_table(sweep: Readings, vectors: ComplexArray, std: FloatArray | None) -> Table:
-    """A row a sensor."""
+def _roll_table(sweep: Readings, vectors: ComplexArray, std: FloatArray) -> Table:
+    """A row a sensor: what no speed changes, run-out and modes far below the sweep."""
     labels = sweep.labels
     unit = f"_{labels.vibration_unit}" if labels.vibration_unit else ""
     size, angle = labels.vibration(vectors)
-    columns = [
+    columns = (
         Column("sensor", sweep.sensors),
         Column(f"amplitude{unit}", size, figures),
+        Column(f"std{unit}", labels.vibration_scale * std, error_figures),
         Column("phase_deg", angle, "{:.1f}".format),
-    ]
-    if std is not None:
-        columns.insert(2, Column(f"std{unit}", labels.vibration_scale * std, error_figures))
-    return Table("slow roll", tuple(columns))
+    )
+    return Table("slow roll", columns)
 
 
 def _plain(table: Table, sweep: Readings) -> Table:
@@ -335,11 +268,10 @@ def _course(rate: float | None) -> list[str]:
     ] * bool(rate)
 
 
-def _figure(sweeps: Sequence[Readings], fit: FittedModes | None, roll: SlowRoll) -> Figure:
+def _figure(sweep: Readings, fit: FittedModes | None, roll: ComplexArray | None) -> Figure:
     """Amplitude and phase over speed, less the slow roll."""
     import numpy as np
 
     from rotorid.identify.plots import bode_plot
 
-    vectors = np.zeros(len(sweeps[0].sensors), dtype=complex) if roll.vectors is None else roll.vectors
-    return bode_plot(sweeps, vectors, fit)
+    return bode_plot(sweep, np.zeros(len(sweep.sensors), dtype=complex) if roll is None else roll, fit)

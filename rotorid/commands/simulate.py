@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, cast
 from rotorid.base import result
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
-from rotorid.commands.amplitude_errors import amplitude_errors
+from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.commands.fit import Values, sigmas
 from rotorid.commands.quantities import (
     Speeds,
@@ -26,7 +26,7 @@ from rotorid.commands.quantities import (
     times,
 )
 from rotorid.report.options import file_of, refuse
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 TABLES = (".csv", ".xlsx")
 BESIDE = 7
 """Columns of the text beside the first; more stand below."""
-_NOISE = {"amplitude_error", "phase_error", "sigma"}
+_NOISE = {"errors", "sigma"}
 _WAYS = {
-    "frequencies": {"inputs", "amplitude_error", "phase_error"},
+    "frequencies": {"inputs", "errors"},
     "modes": {"inputs", "round"},
     "times": {"sigma"},
 }
@@ -69,10 +69,8 @@ class SimulateOptions:
     digits : N from 1
         Round real and imaginary parts, natural frequencies or samples to so many significant digits (not
         decimals), after errors.
-    amplitude_error : PERCENT
-        Draw errors of this standard deviation; the other one is what the model states.
-    phase_error : DEGREES
-        Draw errors of this standard deviation.
+    errors : PERCENT,DEGREES
+        Draw errors of amplitudes of these standard deviations: 2,1.
     sigma : LIST
         Draw errors of samples of this standard deviation: 0.01, or y1=0.01,y2=0.02.
     seed : N from 0
@@ -86,11 +84,10 @@ class SimulateOptions:
     round: str | None = None
     times: Times | Path | None = None
     digits: int | None = None
-    amplitude_error: float | None = None
-    phase_error: float | None = None
+    errors: Errors | None = None
     sigma: Values | float | None = None
     seed: int | None = None
-    panels: ClassVar[Mapping[str, str]] = {"As if read": "digits amplitude_error phase_error sigma seed"}
+    panels: ClassVar[Mapping[str, str]] = {"As if read": "digits errors sigma seed"}
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
@@ -132,8 +129,6 @@ def simulate(
     noisy = any(getattr(options, name) is not None for name in _NOISE)
     if options.digits is not None and options.digits < 1:
         raise ValueError(f"--digits takes a number from 1, not {options.digits}")
-    sources = (model, options.times if _is_record(options.times) else None)
-    files = [Path(given) for given in sources if isinstance(given, Path | str)]
     solve = _amplitudes if way in ("frequencies", "modes") else _record
     values, simulated, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
@@ -156,7 +151,6 @@ def simulate(
         },
         pictures={},
         notes=notes,
-        provenance=provenance(files, options),
     )
 
 
@@ -175,7 +169,7 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
     given = pairs(options.inputs or {}, "--inputs", _amplitude, "F=10,Fy=10@-90")
     excited = [] if options.modes else list(equations.inputs)
     check_names(given, "--inputs", [*excited, *equations.varying], "input", needed=equations.varying)
-    errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error) if noisy else None
+    errors = amplitude_errors(file.errors, options.errors) if noisy else None
     if options.modes:
         exact, polynomial = free_vibration(equations, theta, given, _digits_of_z(options.round))
     else:

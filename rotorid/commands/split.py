@@ -11,7 +11,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.commands.option_quantities import size, vectors, weight, weights
 from rotorid.commands.quantities import degrees, pairs
 from rotorid.report.options import changed, refuse
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
+from rotorid.report.outcome import Outcome, command, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,8 +42,6 @@ class SplitOptions:
         Pieces in one hole, at most; default: 1.
     taken : HOLE:WEIGHT,…
         Holes in which something is mounted already, such as 3:10g,7:20g.
-    mounted : VECTOR
-        What is mounted already and counts towards VECTOR, such as 10g@30+20g@200 (trim).
     two : 20g,30g
         Angles of two fixed weights instead of holes.
     drill : DIAMETER
@@ -58,17 +56,16 @@ class SplitOptions:
     pieces: str | Sequence[float] | None = None
     per_hole: int | None = None
     taken: str | Mapping[str, float] | None = None
-    mounted: Vector | None = None
     two: str | Sequence[float] | None = None
     drill: Amount | None = None
     radius: Amount | None = None
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
-        "Input": "mounted radius angles",
+        "Input": "radius angles",
         "Holes": "holes pieces per_hole taken",
         "Instead of holes": "two drill",
     }
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = ("plot", "json")
 
 
 @command
@@ -103,11 +100,6 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
         raise ValueError("say how to mount the weight, in one way: --holes, --two or --drill")
     if ways != ["holes"]:
         refuse(options, _OF_HOLES, "means something only with --holes")
-    if options.mounted is not None:
-        other, there = vectors(options.mounted, options.angles, "--mounted")
-        if labels.unbalances != other.unbalances:
-            raise ValueError("--mounted: write it as VECTOR is written, both masses or both unbalances")
-        each = [*each, *(-weight for weight in there)]
     target = combine(each)
     if target == 0:
         raise ValueError("there is nothing to mount: the weight is 0")

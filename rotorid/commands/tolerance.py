@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     from balancing import Tolerance
@@ -40,7 +40,7 @@ class ToleranceOptions:
     planes: Positions | None = None
     bearings: str | tuple[float, float] | None = None
     centre: Amount | None = None
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = WITHOUT_FILE
 
 
 @command

@@ -11,41 +11,35 @@ from typing import TYPE_CHECKING, ClassVar, get_args
 from rotorid.base.answer import together
 from rotorid.base.words import Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.option_quantities import mass, quantity, size, speed_with_unit
+from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
-from rotorid.files.units import FORCE
+from rotorid.commands.response import STANDARD_GRAVITY
+from rotorid.files import units
 from rotorid.report.options import job_source, refuse
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance, table_of
+from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from balancing import Lag, TrialWeight
     from rotorid.commands.option_quantities import Amount
     from rotorid.tables import Job
 
-_WITH_JOB = ("plane", "share")
-_WITHOUT_JOB = ("reading_phase", "lag", "sensor_angle", "speed", "fraction")
+_WITHOUT_JOB = ("reading_phase", "lag", "sensor_angle", "speed")
 
 
 @dataclass(frozen=True)
 class TrialWeightOptions:
-    """Options of `trial_weight`: angles in degrees, `fraction` and `share` in percent.
+    """Options of `trial_weight`: angles in degrees.
 
     Attributes
     ----------
-    rotor_mass : MASS
-        Of the rotor, such as 500kg.
-    bearing_load : FORCE
-        Carried at the plane, such as 2500N.
-    carried_by : N from 1
-        Planes that share the mass of the rotor.
+    load : MASS|FORCE
+        What the plane carries: its share of the rotor, 250kg, or the load of its bearing, 2500N.
     speed : SPEED
         Of the trial run, such as 3000rpm.
     radius : RADIUS
         Where the weight goes, 200mm.
-    fraction : PERCENT
-        Without a job: its force, percent of the load.
     share : PERCENT
-        With a job: the change it makes, percent of the largest reading.
+        Of the load, its force, 10 by default; with a job of the largest reading, the change it makes, 40.
     plane : LIST
         Planes of the job; default: all of them.
     reading_phase : DEGREES
@@ -61,13 +55,10 @@ class TrialWeightOptions:
         states its rotation.
     """
 
-    rotor_mass: Amount | None = None
-    bearing_load: Amount | None = None
-    carried_by: int = 1
+    load: Amount | None = None
     speed: Amount | None = None
     radius: Amount | None = None
-    fraction: float = 10.0
-    share: float = 40.0
+    share: float | None = None
     plane: Names | None = None
     reading_phase: float | None = None
     lag: str | float | None = None
@@ -75,12 +66,12 @@ class TrialWeightOptions:
     phase: str | None = None
     angles: str | None = None
     panels: ClassVar[Mapping[str, str]] = {
-        "Input": "rotor_mass speed radius bearing_load carried_by",
-        "Weight": "fraction share plane",
+        "Input": "load speed radius",
+        "Weight": "share plane",
         "Angle": "reading_phase lag sensor_angle",
         "Conventions": "phase angles",
     }
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = WITHOUT_FILE
 
 
 @command
@@ -89,9 +80,9 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
 
     Amount from the load or from coefficients; angle opposite to the heavy spot.
 
-    Example: rotorid trial-weight --rotor-mass 500kg --speed 3000rpm --radius 200mm --fraction 10
+    Example: rotorid trial-weight --load 250kg --speed 3000rpm --radius 200mm
 
-    Example: rotorid trial-weight --bearing-load 9kN --speed 50Hz --radius 8in --reading-phase 120 --lag below
+    Example: rotorid trial-weight --load 9kN --speed 50Hz --radius 8in --reading-phase 120 --lag below
 
     Example: rotorid trial-weight sample_data/model_job/job.toml --plane middle
 
@@ -109,19 +100,13 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
     """
     import pandas as pd
 
-    from balancing import plane_load
     from balancing.plots import trial_figure
 
     options = options or TrialWeightOptions()
-    rotor, load = options.rotor_mass, options.bearing_load
-    carried = plane_load(
-        None if rotor is None else mass(rotor, "--rotor-mass"),
-        None if load is None else quantity(load, "--bearing-load", FORCE, "2500N"),
-        options.carried_by,
-    )
+    carried = None if options.load is None else _load(options.load)
     files: Sequence[Path] = ()
     if job is None:
-        refuse(options, _WITH_JOB, "needs a job with coefficients")
+        refuse(options, ("plane",), "needs a job with coefficients")
         weights = [_from_force(options, carried)]
     else:
         why = "is for a trial weight without a job, which has phases, speeds and coefficients"
@@ -142,12 +127,24 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
     )
 
 
+def _load(given: Amount) -> float:
+    """Read "250kg" or "2500N" in N."""
+    amount = given if not isinstance(given, str) else 0.0
+    if isinstance(given, str):
+        known = units.MASS | units.FORCE
+        value, unit = read_with_unit(given, "--load", units.one_of(known), "250kg or 2500N")
+        amount = unit.to_si(value) * (STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
+    if not amount > 0:
+        raise ValueError(f"--load {given!r}: expected a value above 0, such as 250kg or 2500N")
+    return amount
+
+
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     """Without a job: amount from the load, angle from the phase and the lag."""
     from balancing import Labels, trial_from_force
 
     if options.speed is None or options.radius is None or load is None:
-        raise ValueError("without a job, give --rotor-mass (or --bearing-load), --speed and --radius")
+        raise ValueError("without a job, give --load, --speed and --radius")
     phase_means: Phase = one_of(options.phase or "lead", "--phase", get_args(Phase))
     counted: Angles = one_of(options.angles or "with rotation", "--angles", get_args(Angles))
     labels = Labels(weight_unit="g", weight_scale=1e3, phase=phase_means, angles=counted)
@@ -157,7 +154,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         speed_with_unit(options.speed, "--speed"),
         size(options.radius, "--radius", "200mm"),
         load,
-        fraction=options.fraction / 100,
+        fraction=(10.0 if options.share is None else options.share) / 100,
         phase=None if phase is None else labels.leading(radians(degrees(phase, "--reading-phase"))),
         lag=_lag(options),
         sensor_angle=labels.with_rotation(radians(degrees(options.sensor_angle, "--sensor-angle"))),
@@ -186,7 +183,7 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
             trial_from_coefficients(
                 today,
                 name,
-                share=options.share / 100,
+                share=(40.0 if options.share is None else options.share) / 100,
                 limit=limit,
                 radius=radius,
                 trial_radius=stated or job.trial_radii.get(name) if radius is not None else None,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from rotorid.commands.coefficients import computed
 from rotorid.commands.quantities import Nodes, nodes
 from rotorid.report.options import job_source
-from rotorid.report.outcome import USUAL, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +31,7 @@ class UnbalanceOptions:
     """
 
     stations: Nodes
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = WITHOUT_FILE
 
 
 def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:

@@ -13,7 +13,7 @@ from rotorid.base.result import rows
 from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, listing
-from rotorid.commands.quantities import Names, Speeds, names, speeds
+from rotorid.commands.quantities import Speeds, speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -30,15 +30,9 @@ class VectorsOptions:
     ----------
     tacho : NAME
         Channel of the tacho.
-    sensors : LIST
-        Channels of the sensors: A,B; default: all others.
     unit : UNIT
         Of the numbers in the records, peak values: um, mm_s, g, V; where neither a channel's name nor the
         waveforms file says.
-    pulses : N
-        Of the tacho a turn; default: 1.
-    rate : HZ
-        Samples a second, where the records do not say.
     phase
         How phases are written; default: as the waveforms file says, else lead.
     orders : LIST
@@ -49,15 +43,12 @@ class VectorsOptions:
     """
 
     tacho: str | None = None
-    sensors: Names | None = None
     unit: str | None = None
-    pulses: int | None = None
-    rate: float | None = None
     phase: Phase | None = None
     orders: str | Sequence[int] | None = None
     speeds: Speeds | None = None
     panels: ClassVar[Mapping[str, str]] = {
-        "Input": "tacho sensors unit phase pulses rate",
+        "Input": "tacho unit phase",
         "Vectors": "orders speeds",
     }
     to: ClassVar[Sequence[str]] = USUAL
@@ -89,11 +80,9 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     options = options or VectorsOptions()
     given = {
         "tacho": options.tacho,
-        "sensors": names(options.sensors),
+        "sensors": None,
         "unit": options.unit,
-        "pulses": options.pulses,
         "phase": options.phase,
-        "rate_Hz": options.rate,
         "orders": _orders(options.orders),
         "speeds_rad_s": None if options.speeds is None else list(speeds(options.speeds)),
     }

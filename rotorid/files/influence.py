@@ -273,7 +273,7 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
         return influence
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        problems.add(str(path), None, None, None, f"coefficients as --save-influence writes them ({reason})")
+        problems.add(str(path), None, None, None, f"coefficients as rotorid balance writes them ({reason})")
     return None
 
 

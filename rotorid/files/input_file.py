@@ -6,7 +6,7 @@ import errno
 import hashlib
 import stat
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -18,22 +18,26 @@ MOST_BYTES = 200_000_000
 reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
 """Is called before a file is opened, and may refuse it by an OSError."""
 _read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
+_asked: ContextVar[dict[Path, None] | None] = ContextVar("asked", default=None)
 
 
 @contextmanager
-def each_file_once(held: Mapping[Path, bytes] | None = None) -> Iterator[None]:
+def each_file_once(held: Mapping[Path, bytes] | None = None) -> Iterator[Collection[Path]]:
     """While a command runs, a file that was read is not read again, and `-` is standard input.
 
-    Inside another one what that has read counts; `held` is what is known of files beforehand.
+    Inside another one what that has read counts; `held` is what is known of files beforehand. Gives the files
+    that are asked for inside, in that order.
     """
     seen = _read.get()
     known = {} if seen is None else seen
     known.update(held or {})
-    token = _read.set(known)
+    asked: dict[Path, None] = {}
+    tokens = _read.set(known), _asked.set(asked)
     try:
-        yield
+        yield asked
     finally:
-        _read.reset(token)
+        _read.reset(tokens[0])
+        _asked.reset(tokens[1])
 
 
 def file_content(path: Path) -> bytes:
@@ -44,7 +48,9 @@ def file_content(path: Path) -> bytes:
     OSError
         If it cannot be read, is larger than 200 MB, or no regular file (a pipe could go on for ever).
     """
-    seen = _read.get()
+    seen, asked = _read.get(), _asked.get()
+    if asked is not None:
+        asked[path] = None
     if seen is not None and path in seen:
         return seen[path]
     if seen is not None and str(path) == STANDARD_INPUT:

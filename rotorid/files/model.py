@@ -219,7 +219,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
 
     Instead of equations there may be matrices `M`, `C`, `K` as `read_ode_model` reads them and `rotorid
-    reduce --model` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its
+    reduce --output` writes them: (M p² + C p + K) X = F with amplitudes named like the coordinates. Its
     `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
     `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
     those not in the table are 0. An output that is a number times a displacement is measured in place of it;

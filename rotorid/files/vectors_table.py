@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing import Labels, Trials
-from rotorid.base.arrays import ComplexArray
+from balancing import Labels
 from rotorid.base.words import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
@@ -17,7 +16,6 @@ from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
 from rotorid.files.layout import read_runs_grid
 from rotorid.files.problems import Problems
-from rotorid.files.slow_roll import make_slow_roll
 from rotorid.files.units import one_of
 from rotorid.identify.modes_result import Readings
 
@@ -89,21 +87,3 @@ def _complain_about_twins(table: Table) -> None:
         if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)
-
-
-def read_slow_roll(path: Path, sweep: Readings) -> tuple[ComplexArray, tuple[str, ...]]:
-    """Slow-roll vectors (C,) of the sensors of a sweep, of a runs table at one speed, and warnings.
-
-    Raises
-    ------
-    InputError
-        With all problems of the file.
-    """
-    problems, conventions = Problems(), Conventions(sweep.labels)
-    vectors = np.nan_to_num(sweep.vectors[:1])[None]
-    start = sweep.speeds.max(keepdims=True)
-    trials = Trials(
-        (sweep.run,), start, sweep.sensors, (), vectors, np.zeros((1, 0), dtype=complex), labels=sweep.labels
-    )
-    roll = problems.need(make_slow_roll(path, trials, conventions, problems))
-    return roll.at(start, sweep.sensors)[0], roll.warnings

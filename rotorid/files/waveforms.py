@@ -228,7 +228,7 @@ def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, 
     sampled = read_samples(path)
     rate = file.rate or sampled.rate
     if rate is None:
-        raise refusal(path, "a rate: a channel t_s of times, --rate, or rate_Hz in a waveforms file")
+        raise refusal(path, "a rate: a channel t_s of times, or rate_Hz in a waveforms file")
     if sampled.rate is not None and abs(rate / sampled.rate - 1.0) > SAME_RATE:
         raise refusal(path, f"the rate that the file has, {sampled.rate:.6g} Hz, not {rate:.6g} Hz")
     stems = Counter(_parted(name)[0] for name in sampled.channels)

@@ -110,12 +110,12 @@ def _check(
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     if prior and not experiments.stated:
         raise ValueError(
-            "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
-            "--phase-error, or [errors] in the model file)"
+            "[prior] is weighed against the errors of the amplitudes: state them (--errors, or "
+            "[errors] in the model file)"
         )
     if (prior or ridge or loss != "linear") and len(model.outputs) != len(model.equations):
         raise ValueError(
-            "[prior], --ridge and --loss belong to models that have as many outputs as equations"
+            "a prior, a ridge and a robust loss belong to models with as many outputs as equations"
         )
     words = NAME.findall(" ".join(model.equations))
     for name in model.signals:

@@ -218,25 +218,6 @@ def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     return vectors[0], np.sqrt(np.trace(covariances[0], axis1=1, axis2=2) / 2)
 
 
-def slow_vectors(sweep: Readings, speed: float) -> tuple[ComplexArray, FloatArray]:
-    """Mean of the vectors at or below a speed, rad/s, and its deviation in either part as they scatter, (C,).
-
-    Raises
-    ------
-    ValueError
-        For a sensor without a vector there.
-    """
-    slow, words = sweep.vectors[sweep.speeds <= speed], sweep.labels.speed_words
-    count = (~np.isnan(slow)).sum(axis=0)
-    if not count.all():
-        raise ValueError(
-            f"--slow-roll: sensor {sweep.sensors[int(count.argmin())]!r} has no vector at or below "
-            f"{words(speed)}; the lowest speed is {words(float(sweep.speeds.min()))}"
-        )
-    free = np.where(count > 1, 2.0 * (count - 1), np.nan)
-    return np.nanmean(slow, axis=0), np.nanstd(slow, axis=0) / np.sqrt(free)
-
-
 def vectors_when_passing(
     sweep: Readings, speeds: FloatArray, modes: FittedModes | None = None
 ) -> tuple[ComplexArray, FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -121,23 +121,23 @@ def figure_modes(modes: FittedModes) -> Figure:
     return figure
 
 
-def bode_plot(sweeps: Sequence[Readings], roll: ComplexArray, fit: FittedModes | None) -> Figure:
-    """Amplitude and phase over speed less the slow roll (C,), and the fit of the first sweep."""
-    figure, labels = new_figure(6.6), sweeps[0].labels
+def bode_plot(sweep: Readings, roll: ComplexArray, fit: FittedModes | None) -> Figure:
+    """Amplitude and phase over speed less the slow roll (C,), and the fit."""
+    figure, labels = new_figure(6.6), sweep.labels
     above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     dots: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 1)), "zorder": 3}
-    for k, (sweep, c) in enumerate([(s, c) for s in sweeps for c in range(len(s.sensors))][:CURVES]):
-        omega, run = np.sort(sweep.speeds), f", run {sweep.run}" if len(sweeps) > 1 else ""
-        vectors = sweep.vectors[np.argsort(sweep.speeds, kind="stable"), c]
-        lines = [(vectors, {"lw": 1.6, "label": f"{sweep.sensors[c]}{run}", **look(k)})]
-        if fit is not None and sweep is sweeps[0]:
-            lines.append((fit.curve(omega)[:, c], {"label": f"fit{run}", **dots}))
+    order = np.argsort(sweep.speeds, kind="stable")
+    omega = sweep.speeds[order]
+    for c, name in enumerate(sweep.sensors[:CURVES]):
+        lines = [(sweep.vectors[order, c], {"lw": 1.6, "label": name, **look(c)})]
+        if fit is not None:
+            lines.append((fit.curve(omega)[:, c], {"label": f"fit, run {sweep.run}", **dots}))
         for z, style in lines:
             size, phase = labels.vibration(z - roll[c])
             phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
             above.plot(RPM * omega, size, **style)
             below.plot(RPM * omega, phase, **style)
-    above.set(ylabel=f"amplitude, {_unit(sweeps[0])}", ylim=(0.0, None))
+    above.set(ylabel=f"amplitude, {_unit(sweep)}", ylim=(0.0, None))
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees", yticks=range(0, 361, 90))
     if labels.phase == "lag":
         below.invert_yaxis()  # through a critical speed the curve falls, as everywhere

@@ -258,9 +258,13 @@ class StabilityCost(Answered):
         """Both stabilities, and how far apart the thresholds are."""
         apart = "" if self.relative_difference is None else f" ({100 * self.relative_difference:+.3g} %)"
         disagree = "" if self.full.status == self.small.status else "The models DISAGREE. "
+        if self.full.threshold is not None and self.small.threshold is not None:
+            ends = rpm_text(self.full.threshold), rpm_text(self.small.threshold)
+            words = f"Stable up to {ends[0]}, the {len(self.nodes)}-mass model up to {ends[1]}{apart}."
+            return Answer(words, warnings=self.warnings)
         words = (
             f"{disagree}Full rotor: {self.full.sentence()}.\n{len(self.nodes)}-mass model: "
-            f"{self.small.sentence()}{apart}."
+            f"{self.small.sentence()}."
         )
         return Answer(words, warnings=self.warnings)
 

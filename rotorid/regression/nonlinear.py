@@ -168,7 +168,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
         raise ValueError("the residuals at the starting values are not finite: choose other starting values")
     if prior is not None and len(prior):
         if loss != "linear":
-            raise ValueError("a prior or a ridge needs --loss linear: a robust loss would discount it, too")
+            raise ValueError("a prior or a ridge needs the loss linear: a robust loss would discount it, too")
         residual, jacobian = prior.beside(residual, jacobian)
     search = Search(labels, residual, jacobian, lower, upper, sigma_stated)
     x, ended, left = first, near and loss == "linear", False

@@ -44,10 +44,8 @@ def checked(given: object, kind: type[_T]) -> _T:
 
 
 def changed(options: DataclassInstance) -> dict[str, object]:
-    """Options that differ from their defaults, without the files that a terminal's command writes."""
-    writes = getattr(options, "writes", ())
-    fields = [field for field in dataclasses.fields(options) if field.name not in writes]
-    given = {field: getattr(options, field.name) for field in fields}
+    """Options that differ from their defaults."""
+    given = {field: getattr(options, field.name) for field in dataclasses.fields(options)}
     return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
 
 
@@ -94,15 +92,12 @@ def _of_python(value: object, what: str = "") -> object:
     return value
 
 
-def rotor_source(given: Rotor | Path | str) -> tuple[Rotor, tuple[Path, ...]]:
-    """A rotor, and the files that it was read from."""
+def rotor_of(given: Rotor | Path | str) -> Rotor:
+    """A rotor, or that of a file."""
     from fem import Rotor
-    from rotorid.tables import read_rotor, rotor_files
+    from rotorid.tables import read_rotor
 
-    if isinstance(given, Rotor):
-        return given, ()
-    file = file_of(given, "a rotor")
-    return read_rotor(file), rotor_files(file)
+    return given if isinstance(given, Rotor) else read_rotor(file_of(given, "a rotor"))
 
 
 def job_source(given: Job | Path | str, phase: str | None = None, angles: str | None = None) -> Job:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-USUAL = ("plot", "output", "table", "json")
+WITHOUT_FILE = ("plot", "table", "json")
+USUAL = ("output", *WITHOUT_FILE)
 WITH_REPORT = ("report", *USUAL)
 EQUATIONS = ("show",)
 """Fields of `app.Destination` that a command has."""
@@ -49,12 +50,14 @@ class Outcome(Answered):
         What `more` shows, in words; empty: the names of its tables.
     short
         Whether the first table is a short form of the first of `more`, which then stands for it.
+    to_mount
+        Whether the first table is what to mount, which is shown whole.
     file
         What `--output` writes and `to_frame` gives.
     lacking
         Why there is no such file and no picture; empty: there are.
     files
-        What makes other files: by the ending of their name where it is that of `--output`, else by option.
+        What makes other files of `--output`, by the ending of their name.
     keys
         The JSON document without its version and provenance.
     pictures
@@ -66,17 +69,19 @@ class Outcome(Answered):
     solved
         What was solved, in symbols and in numbers; None: nothing that could be shown.
     provenance
-        Program version, input files with their hashes, date, and every option that differs from its default.
+        Program version, input files with their hashes, date, and every option that differs from its default;
+        of a command it follows from what that has read.
     """
 
     result: Any
     sentences: tuple[str, ...]
     keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
-    provenance: Mapping[str, Any]
+    provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
     short: bool = False
+    to_mount: bool = False
     file: Table | Callable[[], Table]
     lacking: str = ""
     files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
@@ -102,6 +107,7 @@ class Outcome(Answered):
             ),
             self.beyond or listing(names, "and"),
             self.short,
+            self.to_mount,
         )
 
     @property
@@ -127,9 +133,9 @@ class Outcome(Answered):
         """The main table."""
         return frame(self.table())
 
-    def written(self, path: Path, option: str = "") -> Written:
-        """What `--output`, or another option, writes to a file of this name."""
-        build = self.files.get(option or path.suffix.lower())
+    def written(self, path: Path) -> Written:
+        """What `--output` writes to a file of this name."""
+        build = self.files.get(path.suffix.lower())
         if build is not None:
             return build(path)
         if path.suffix.lower() != ".xlsx":
@@ -176,7 +182,7 @@ def _aligned(table: Table | str) -> str:
 
 def outcome_of(
     result: Any,  # noqa: ANN401 - any result that tells its answer
-    provenance: Mapping[str, Any],
+    provenance: Mapping[str, Any] | None = None,
     *,
     answer: Answer | None = None,
     **more: Any,  # noqa: ANN401 - fields of an outcome
@@ -191,11 +197,12 @@ def outcome_of(
         "beyond": told.more,
         "warnings": told.warnings,
         "notes": told.notes,
+        "to_mount": told.to_mount,
         "file": lambda: table_of(result.to_frame()),
         "pictures": {} if draw is None else {"": draw},
         "keys": getattr(result, "to_dict", None),
     }
-    return Outcome(result=result, provenance=provenance, **given | more)
+    return Outcome(result=result, provenance=provenance or {}, **given | more)
 
 
 def table_of(data: pd.DataFrame, name: str = "result") -> Table:
@@ -221,7 +228,10 @@ def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:
 
 
 def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Check its options first; while it works each file is read once: its hash is that of what was read."""
+    """Check its options first; while it works each file is read once: its hash is that of what was read.
+
+    Its outcome gets the provenance of these files, with texts among its arguments that are no file.
+    """
     signature, kind = inspect.signature(function), options_of(function)
     needed = signature.parameters["options"].default is inspect.Parameter.empty
 
@@ -232,9 +242,14 @@ def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
         given = signature.bind(*args, **kwargs)
         options = given.arguments.get("options")
         if options is not None or needed:
-            given.arguments["options"] = checked(options, kind)
-        with each_file_once():
-            return function(*given.args, **given.kwargs)
+            given.arguments["options"] = options = checked(options, kind)
+        with each_file_once() as files:
+            made = function(*given.args, **given.kwargs)
+            if not isinstance(made, Outcome) or made.provenance:
+                return made
+            names = [*map(str, files)]
+            texts = {key: x for key, x in given.arguments.items() if isinstance(x, str) and x not in names}
+            return dataclasses.replace(made, provenance=provenance(files, options or kind(), **texts))
 
     return wrapper
 

@@ -14,7 +14,6 @@ from balancing.trial_weight import (
     GRAVITY,
     expected_lag,
     opposing_angle,
-    plane_load,
     trial_from_coefficients,
     trial_from_force,
 )
@@ -26,16 +25,12 @@ GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 
 
 def test_amount_makes_a_tenth_of_the_load():
-    load = plane_load(500, None)
-    assert load == pytest.approx(500 * 9.80665)
+    load = 500 * GRAVITY
     found = trial_from_force("A", RPM3000, 0.2, load)
     assert found.load == load
     # 490.3325 N / (0.2 m · 98696.04 s⁻²)
     assert found.amount == pytest.approx(0.02484054, rel=1e-6)
     assert found.amount * 0.2 * RPM3000**2 == pytest.approx(0.1 * load)
-    assert plane_load(500, None, 2) == pytest.approx(load / 2)
-    assert plane_load(None, 2500) == 2500
-    assert plane_load(None, None) is None
     assert trial_from_force("A", RPM3000, 0.2, 2500, fraction=0.05).amount == pytest.approx(125 / 19739.2088)
 
 
@@ -51,20 +46,6 @@ def test_amount_makes_a_tenth_of_the_load():
 def test_impossible_forces(speed, radius, load, fraction, words):
     with pytest.raises(ValueError, match=words):
         trial_from_force("A", speed, radius, load, fraction=fraction)
-
-
-@pytest.mark.parametrize(
-    ("loads", "words"),
-    [
-        ((-1, None), "mass of the rotor must be"),
-        ((None, inf), "load of the bearing must be"),
-        ((1, 1), "one of them"),
-        ((1, None, 0), "number of planes must be"),
-    ],
-)
-def test_impossible_loads(loads, words):
-    with pytest.raises(ValueError, match=words):
-        plane_load(*loads)
 
 
 def simulated_phase(heavy, eta, zeta, sensor, key, quantity):

@@ -30,7 +30,7 @@ def test_every_command_of_the_readme_runs(workplace, cli, command):
         pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
         cli("fleet", "add", "fans", "sample_data/fleet")
     assert cli(*words).code == 0
-    for option in ("--plot", "--output", "--report", "--model", "--state-space", "--template"):
+    for option in ("--plot", "--output", "--report", "--template"):
         if option in words:
             assert (workplace / words[words.index(option) + 1]).stat().st_size > 0
 

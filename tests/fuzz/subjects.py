@@ -47,7 +47,7 @@ def _influence(folder):
     from fuzz.judging import answer
 
     found = answer(
-        ["balance", str(folder / "job.toml"), "--save-influence", str(folder / "influence.csv")], check=False
+        ["balance", str(folder / "job.toml"), "--output", str(folder / "influence.json")], check=False
     )
     assert found.status == 0, found
     lines = (folder / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)

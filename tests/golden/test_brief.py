@@ -25,8 +25,7 @@ NAMES = [n for n, case in CASES.items() if case.group not in ("usage", "demos", 
 NO_ANSWER = ("schema", "demo")
 """What they print is no answer."""
 MOST, WITH_PIECES, TALL = 12, 18, 24
-"""Lines of an answer, of one with pieces, and of equations, records and what is long beside a sample."""
-LONG = ("simulate", "reduce", "identify")
+"""Lines that are not blank of an answer, of one with pieces, and of equations."""
 FORBIDDEN = (
     r"\b1(\.0+)? times as much|with any weights|\(proven|\(and \d+ more of this kind\)"
     r"|would leave \S+ times|\brms [^.;]* \(with"
@@ -58,12 +57,9 @@ def printed():
 def complaints(words, output):
     lines = output.rstrip("\n").splitlines()
     most = WITH_PIECES if "--split" in words or " in hole" in output else MOST
-    most = (
-        TALL
-        if "--show" in words or words[0] in LONG
-        else most + sum(line.startswith("written: ") for line in lines)
-    )
-    found = [f"{len(lines)} lines"] if len(lines) > most and "--table" not in words else []
+    most = TALL if "--show" in words else most
+    count = sum(bool(line) and not line.startswith("written: ") for line in lines)
+    found = [f"{count} lines"] if count > most and "--table" not in words else []
     found += [f"says {match[0]!r}" for match in re.finditer(FORBIDDEN, " ".join(output.split()))]
     found += [f"{len(line)} columns: {line}" for line in lines if len(line) > COLUMNS]
     found += [f"a token for a unit: {line}" for line in lines if re.search(r"\d (g_mm|um_pp)", line)]

@@ -39,9 +39,8 @@ COMMANDS = {
     "influence": "influence compressor/rotor.toml --planes impeller_1,impeller_5 "
     "--sensors probe_DE:45,probe_NDE:45 --speeds 4000:6000:1000rpm",
     "reduce": "reduce rotor23.csv --nodes 7,12,18 --modes 2",
-    "reduce rank": "reduce rotor23.csv --rank",
-    "identify": "identify identify/task_5_1/model.toml identify/task_5_1/data.csv --amplitude-error 2 "
-    "--phase-error 1",
+    "reduce rank": "reduce rotor23.csv --place compromise",
+    "identify": "identify identify/task_5_1/model.toml identify/task_5_1/data.csv --errors 2,1",
     "fit": "fit fit/run_down/model.toml fit/run_down/record.csv",
 }
 """Command lines by what they draw; files in the sample data, _ for a blank in a name."""

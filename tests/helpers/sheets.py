@@ -29,13 +29,12 @@ COMMANDS = {
     "critical": "critical compressor/rotor.toml -n 4 --map --operating 4000:6500rpm",
     "critical table": "critical rotor23.csv -n 5",
     "response": COMPRESSOR + " --sensors probe_DE:45,probe_NDE:45",
-    "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --rank --response auto "
+    "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --response auto "
     "--stability 0:9000rpm --errors compliance=1,shapes=1",
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
     "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv",
-    "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --amplitude-error 2 "
-    "--phase-error 1",
+    "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --errors 2,1",
     "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",
     "identify singular": "identify identify/task_4_1/model.toml identify/task_4_1/data.csv",
 }

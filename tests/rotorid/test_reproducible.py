@@ -20,9 +20,9 @@ COMMANDS = (
     "balance --template form.xlsx",
     f"critical {ROTOR} -n 3 --output modes.xlsx --plot modes.pdf --report rotor.html",
     f"influence {ROTOR} --planes 7,12,18 --sensors 2 --speeds 100,150 --output w.csv --plot w.png --json",
-    *(f"{SMALL} --model {name}.toml --state-space {name}.{name}" for name in ("json", "npz", "mat")),
+    *(f"{SMALL} --output small.{name}" for name in ("toml", "json", "npz", "mat")),
     "identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv "
-    "--amplitude-error 2 --phase-error 1 --json",
+    "--errors 2,1 --json",
     "fit sample_data/fit/run_down/model.toml sample_data/fit/run_down/record.csv --plot fit.png --json",
 )
 PROGRAM = """

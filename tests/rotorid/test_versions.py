@@ -38,9 +38,9 @@ def test_a_document_and_the_sheet_of_it(cli, tmp_path):
 
 def test_models_and_rotors_in_files(cli, tmp_path):
     model, moving, rotor = (tmp_path / f"{name}.toml" for name in ("model", "moving", "rotor"))
-    assert cli("reduce", ROTOR, *NODES, "--model", model).code == 0
+    assert cli("reduce", ROTOR, *NODES, "--output", model).code == 0
     damping = ("--damping", "0.5,0.5,0.5", "--keep-supports")
-    assert cli("reduce", MOVING, *NODES[:2], *damping, "--model", moving).code == 0
+    assert cli("reduce", MOVING, *NODES[:2], *damping, "--output", moving).code == 0
     rotorid.write_rotor(rotor, rotorid.read_rotor(MOVING))
     for path in (model, moving, rotor):
         text = path.read_text(encoding="utf-8")
@@ -67,7 +67,7 @@ def test_what_is_no_version_is_refused(tmp_path, said):
 @pytest.mark.parametrize("ending", [".json", ".npz", ".mat"])
 def test_state_spaces(cli, tmp_path, ending):
     path = tmp_path / f"small{ending}"
-    assert cli("reduce", ROTOR, *NODES, "--state-space", path).code == 0
+    assert cli("reduce", ROTOR, *NODES, "--output", path).code == 0
     read = {".json": lambda: json.loads(path.read_text()), ".npz": lambda: np.load(path)}
     assert read.get(ending, lambda: loadmat(path))()["schema_version"] == SCHEMA_VERSION
 

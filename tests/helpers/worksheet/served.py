@@ -37,7 +37,7 @@ class Served:
 
     def __init__(self, job, *options):
         self.job = job
-        command = [sys.executable, "-m", "rotorid", "worksheet", str(job), "--no-browser", *options]
+        command = [sys.executable, "-m", "rotorid", "worksheet", str(job), *options]
         self.begun = time.perf_counter()
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         line = self.process.stdout.readline()

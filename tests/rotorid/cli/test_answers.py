@@ -92,14 +92,20 @@ def test_a_long_name_hides_no_plane_where_material_is_removed(cli, tmp_path):
 
 def test_half_a_table_of_weights_is_never_shown():
     block = "\n".join(f"  plane {p}  {p} g" for p in range(8))
-    told = Answer("Fail.\n" * 9, f"Largest: 1\nand 2\n\n{block}", ("a warning " * 30,)).brief()
+    told = Answer("Fail.\n" * 9, f"Largest: 1\nand 2\n\n{block}", ("a warning " * 30,), to_mount=True).brief()
     assert "Largest: 1\nand 2\n\n" in told
     assert "plane" not in told
     assert "8 more lines: --table." in told
     assert len(told.splitlines()) <= 24
 
 
-def test_the_first_block_stands_whole_and_the_rest_is_counted():
-    told = Answer("Judged.\n" * 20, "one\ntwo\n\nthree\nfour").brief()
+def test_what_is_to_be_mounted_stands_whole_and_the_rest_is_counted():
+    told = Answer("Judged.\n" * 20, "one\ntwo\n\nthree\nfour", to_mount=True).brief()
     assert "one\ntwo" in told
     assert "2 more lines: --table." in told
+
+
+def test_another_table_is_cut_by_rows():
+    told = Answer("Judged.", "\n".join(map(str, range(20)))).brief()
+    assert len(told.split()) - len(["10", "more", "lines:", "--table."]) == 11
+    assert told.endswith("9\n\n10 more lines: --table.")

@@ -12,7 +12,9 @@ import pytest
 from tables_data import write_csv
 from workbook_jobs import as_workbook
 
+from rotorid.commands import BalanceOptions, balance
 from rotorid.samples import sample_data
+from rotorid.tables import write_influence
 
 RNG = np.random.default_rng(15)
 SPEEDS, SENSORS, PLANES = (1200, 1800), ("A", "B"), ("left", "right")
@@ -105,7 +107,7 @@ def test_each_word_that_is_missing_is_named(cli, tmp_path, given, assumed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("errors", [(), ("--amplitude-error", 2, "--phase-error", 1.15)])
+@pytest.mark.parametrize("errors", [(), ("--errors", "2,1.15")])
 def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
     """Stated or assumed, phase or angles: the first warning names it, with both χ²."""
     files = shop(tmp_path, TELLING, "lag", "with", noise=0.02, seed=seed)
@@ -192,7 +194,8 @@ def test_stored_coefficients(cli, tmp_path):
     """A table that states its phase keeps it; the readings of the day are what may be otherwise."""
     files = shop(tmp_path, OFF_AXIS, "lag")
     stored = tmp_path / "stored.csv"
-    assert cli("balance", *files, *said("lag", "with"), "--save-influence", stored).code == 0
+    given = BalanceOptions(phase="lag", angles="with rotation")
+    write_influence(stored, balance(files, given).influence)
     assert "phase_lag_deg" in stored.read_text(encoding="utf-8")
     document = cli("balance", files[0], "--influence", stored, "--json")
     assert document.code == 2  # three runs that differ, and no weights
@@ -204,7 +207,7 @@ def test_stored_coefficients(cli, tmp_path):
     expected = cli("balance", day, "--influence", stored, "--phase", "lead", "--json").json["corrections"]
     for row, other in zip(expected, document["other_readings"], strict=True):
         assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
-    assert cli("balance", *shop(tmp_path, OFF_AXIS), "--save-influence", stored).code == 0
+    write_influence(stored, balance(shop(tmp_path, OFF_AXIS)).influence)
     assert "phase_lead_deg" in stored.read_text(encoding="utf-8")
     assert cli("balance", shop(tmp_path, [{}])[0], "--influence", stored).code == 0
 

@@ -84,7 +84,7 @@ def test_pieces_that_were_mounted_as_proposed_are_done(cli, options):
 def test_weighted_readings_and_a_largest_weight_have_the_best_place(cli):
     """About 167°, where χ² is least; a loop of fixed steps ended at 184°."""
     folder = JOBS / "weighted_limit"
-    errors = ("--amplitude-error", "10", "--phase-error", "0.3", "--max-mass", "2.1007779985187103g")
+    errors = ("--errors", "10,0.3", "--max-mass", "2.1007779985187103g")
     job = (folder / "runs.csv", folder / "weights.csv", "--method", "weighted", *errors)
     found = cli("balance", *job, "--json").json
     assert found["chi_square"] < 33

@@ -153,7 +153,7 @@ def test_nothing_to_balance(cli, tmp_path):
     effects = [EFFECT[:, 0], EFFECT[:, 1]]
     rows, weights = runs([0 * BASE, *effects], ("a", "b"))
     for method in METHODS:
-        message = refused(cli, tmp_path, (rows, weights), "--method", method, "--amplitude-error", "2")
+        message = refused(cli, tmp_path, (rows, weights), "--method", method, "--errors", "2,0")
         assert "nothing to balance" in message
 
 

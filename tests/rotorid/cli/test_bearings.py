@@ -49,19 +49,6 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
-def test_gravity_turns_everything_with_it(cli):
-    down, aside = (
-        cli("bearings", ROTOR, *SPEEDS, "--gravity-direction", angle, "--json").json for angle in (-90, 0)
-    )
-    for key in ("eccentricity", "attitude_deg"):
-        here, there = ([row[key] for row in one["bearings"]] for one in (down, aside))
-        assert here == pytest.approx(there, rel=1e-8)
-    assert down["bearings"][0]["kyy_N_per_m"] == pytest.approx(aside["bearings"][0]["kxx_N_per_m"], rel=1e-7)
-    assert down["stability"]["threshold_rad_s"] == pytest.approx(
-        aside["stability"]["threshold_rad_s"], rel=1e-6
-    )
-
-
 def test_other_forces_are_listed_and_explained():
     forces = [
         SqueezeFilm(1, "", **BEARING, centring_stiffness=1e7),
@@ -106,7 +93,6 @@ def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
     ("options", "words"),
     [
         (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
-        ((*SPEEDS, "--gravity-direction", "400"), "--gravity-direction: '400.0' is no angle"),
         (("--speeds", "3000rpm", "--output", "linear.toml"), "needs two speeds at least (--speeds)"),
         ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
     ],

@@ -54,17 +54,15 @@ def test_balance_gives_the_weights_of_the_function(cli):
 def test_stated_errors_on_the_command_line_give_intervals(cli):
     without = cli("balance", BK / "runs.csv", BK / "weights.csv", "--json").json
     assert without["errors"]["source"] == "assumed"
-    with_errors = cli(
-        "balance", BK / "runs.csv", BK / "weights.csv", "--amplitude-error", 2, "--phase-error", 1, "--json"
-    ).json
+    with_errors = cli("balance", BK / "runs.csv", BK / "weights.csv", "--errors", "2,1", "--json").json
     assert with_errors["errors"]["source"] == "stated"
     assert 0.01 < with_errors["corrections"][0]["mass_std"] < without["corrections"][0]["mass_std"] < 0.5
     assert with_errors["corrections"][0]["mass"] == pytest.approx(without["corrections"][0]["mass"])
 
 
 def test_saved_coefficients_balance_from_a_single_run(cli, tmp_path):
-    saved = tmp_path / "influence.csv"
-    full = cli("balance", BK / "job.toml", "--save-influence", saved, "--json").json
+    saved = tmp_path / "influence.json"
+    full = cli("balance", BK / "job.toml", "--output", saved, "--json").json
     rows = (BK / "runs.csv").read_text(encoding="utf-8").splitlines()
     header = next(r for r in rows if r.startswith("run,"))
     baseline = tmp_path / "baseline.csv"

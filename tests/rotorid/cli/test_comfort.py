@@ -64,10 +64,6 @@ def test_usage_with_the_nearest_name(cli, args, message):
             ["influence", COMPRESSOR / "rotor.toml", "--planes=8", "--sensors=prob DE", "--speeds=500"],
             "no station is called 'prob DE' (did you mean 'probe DE'?)",
         ),
-        (
-            ["identify", TASK / "model.toml", TASK / "data.csv", "--loss", "hubr"],
-            "'hubr' is not known (did you mean 'huber'?)",
-        ),
     ],
 )  # fmt: skip
 def test_values_with_the_nearest_name(cli, args, message):

@@ -1,10 +1,7 @@
 """`rotorid demo`: the main job runs, says what to type, and writes what it promises."""
 
-import shlex
-
 import pytest
 
-from rotorid.cli.demo import STEPS
 from rotorid.samples import sample_data
 
 PICTURES = ("modes.png", "balance.png", "reduction.png")
@@ -24,17 +21,6 @@ def test_the_main_job_runs_and_writes_its_pictures(cli, tmp_path, monkeypatch):
     assert (tmp_path / "d" / "turbo_job" / "job.toml").is_file()
     assert not [path for path in (tmp_path / "d").rglob("*") if "make_" in path.name]
     assert cli("demo", "d").code == 0  # once more in the same folder
-
-
-def test_json_is_one_document_with_all_results(cli, tmp_path):
-    document = cli("demo", tmp_path / "my d", "--json").json
-    assert document["folder"] == str(tmp_path / "my d")
-    assert [path.rpartition("/")[2] for path in document["pictures"]] == list(PICTURES)
-    for key, typed in zip(STEPS, document["commands"], strict=True):
-        alone = cli(*shlex.split(typed)[1:], "--json").json
-        for each in (alone, document[key]):
-            each["provenance"].pop("date")
-        assert document[key] == alone
 
 
 @pytest.mark.parametrize("name", ["rotor23.csv", "turbo_job/job.toml", "modes.png"])

@@ -24,29 +24,21 @@ def job(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("option", ["--output", "--save-influence"])
 @pytest.mark.parametrize("name", ["runs.csv", "weights.csv", "./../{folder}/runs.csv", "link.csv"])
-def test_inputs_are_never_overwritten(cli, job, option, name):
+def test_inputs_are_never_overwritten(cli, job, name):
     (job / "link.csv").symlink_to(job / "runs.csv")
     before = {path: path.read_bytes() for path in job.iterdir()}
     target = job / name.format(folder=job.name)
     for files in (("job.toml",), ("runs.csv", "weights.csv")):
-        outcome = cli("balance", *(job / f for f in files), option, target)
+        outcome = cli("balance", *(job / f for f in files), "--output", target)
         assert outcome.code == 2
         assert f"{target}: this is an input of the command" in outcome.err
         assert {path: path.read_bytes() for path in job.iterdir()} == before
 
 
-def test_two_results_need_two_files(cli, job):
-    outcome = cli("balance", job / "job.toml", "--output", job / "s.csv", "--save-influence", job / "s.csv")
-    assert outcome.code == 2
-    assert f"{job / 's.csv'}: two results cannot go into one file" in outcome.err
-    assert not (job / "s.csv").exists()
-
-
-@pytest.mark.parametrize("option", ["--output", "--save-influence", "--plot"])
+@pytest.mark.parametrize("option", ["--output", "--report", "--plot"])
 def test_all_results_or_none(cli, job, option):
-    others = {"--output": job / "o.csv", "--save-influence": job / "i.csv", "--plot": job / "p.png"}
+    others = {"--output": job / "o.csv", "--report": job / "i.html", "--plot": job / "p.png"}
     folder = job / f"folder{others[option].suffix}"
     folder.mkdir()
     others[option] = folder
@@ -64,15 +56,15 @@ def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, mon
     opened = Path.open
 
     def full(path, mode="r", *rest, **options):
-        if "x" in mode and ".i.csv" in path.name:
+        if "x" in mode and ".i.html" in path.name:
             raise OSError(28, "No space left on device", str(path))
         return opened(path, mode, *rest, **options)
 
     monkeypatch.setattr(Path, "open", full)
     before = sorted(job.iterdir())
-    outcome = cli("balance", job / "job.toml", "--output", job / "o.csv", "--save-influence", job / "i.csv")
+    outcome = cli("balance", job / "job.toml", "--output", job / "o.csv", "--report", job / "i.html")
     assert outcome.code == 2
-    assert outcome.err == f"rotorid: {job / 'i.csv'}: expected a file that can be written (No space left on device)\n"  # fmt: skip  # noqa: E501
+    assert outcome.err == f"rotorid: {job / 'i.html'}: expected a file that can be written (No space left on device)\n"  # fmt: skip  # noqa: E501
     assert sorted(job.iterdir()) == before
 
 
@@ -177,7 +169,7 @@ def test_dependent_planes_end_with_status_2(cli, tmp_path):
         "run,plane,mass_g,angle_deg\nt1,L,5,0\nt2,R,5,0\n", encoding="utf-8"
     )
     files = tmp_path / "runs.csv", tmp_path / "weights.csv"
-    for options in ((), ("--amplitude-error", 1, "--phase-error", 1)):
+    for options in ((), ("--errors", "1,1")):
         outcome = cli("balance", *files, *options, "--json")
         assert (outcome.code, outcome.out) == (2, "")
         assert "planes 'L' and 'R' act alike at every sensor and speed" in outcome.err

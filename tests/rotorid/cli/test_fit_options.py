@@ -70,8 +70,6 @@ def test_starting_values_and_iterations(cli):
         (("--sigma", "much"), "--sigma: x = much is no number above 0"),
         (("--sigma", "1,2"), "'1' is no NAME=VALUE; use y1=0.01,y2=0.02"),
         (("--integrator", "euler"), "--integrator 'euler' is not known"),
-        (("--loss", "square"), "--loss 'square' is not known"),
-        (("--method", "gauss-newton", "--loss", "huber"), "robust loss"),
         (("--tolerance", "1e-3"), "--tolerance belongs to --method gauss-newton or quasilinearization"),
         (("--tolerance", "-2", "--method", "gauss-newton"), "a number above 0, not -2"),
     ],

@@ -41,8 +41,9 @@ def test_measured_modes_of_a_rotor_are_used_and_compared(cli):
 @pytest.mark.parametrize("ending", ["json", "npz", "mat"])
 def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, ending):
     space, model = tmp_path / f"space.{ending}", tmp_path / "model.toml"
-    outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", "--state-space", space, "--model", model)
-    assert outcome.code == 0, outcome.err
+    for path in (space, model):
+        outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", "--output", path)
+        assert outcome.code == 0, outcome.err
     if ending == "json":
         found = {key: np.array(value) for key, value in json.loads(space.read_text()).items()}
     else:
@@ -69,8 +70,8 @@ def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, en
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=-1"), "from 0 to 100 percent"),
         ((ROTOR, "--nodes", "7,12,18", "--stability", "100"), "--stability '100' is not a range"),
         ((ROTOR, "--nodes", "7,12", "--compliance", BOOK / "compliance.csv"), "takes the place of a rotor"),
-        ((ROTOR, "--nodes", "7,12", "--state-space", "x.csv"), "cannot write this kind of file"),
-        ((*book("", 2)[1:], "--rank"), "--rank needs a rotor"),
+        ((ROTOR, "--nodes", "7,12", "--output", "x.txt"), "cannot write this kind of file"),
+        ((*book("", 2)[1:], "--place", "mac"), "--place needs a rotor"),
         ((*book("", 2)[1:], "--seals", "9=1e6"), "no mass stands at '9'"),
         ((*book("", 4)[1:],), "can use 1 … 3 modes"),
     ],
@@ -128,8 +129,7 @@ def test_measured_shapes_are_compared_with_the_rotor():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (("--masses", 4), "--masses does nothing without --rank or --place"),
-        (("--force", "7"), "--force does nothing without --model"),
+        (("--masses", 4), "--masses does nothing without --place"),
         (("--measured", BOOK / "modes.csv", "--methods"), "--methods compares with the computed rotor"),
         (("--response", "1:2"), "--response '1:2' is not a range"),
     ],
@@ -164,7 +164,7 @@ def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeyp
 def test_bearings_over_speed_stand_beside_a_small_model_that_moves(cli, tmp_path, kept):
     """The compressor's tables go with it, whether or not its masses are found on rigid supports."""
     path = tmp_path / "small.toml"
-    assert cli("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--model", path, *kept).code == 0
+    assert cli("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--output", path, *kept).code == 0
     assert {each.suffix for each in tmp_path.iterdir()} == {".toml", ".csv"}
     model = read_small_model(path)
     assert all(support.speeds for support in model.supports if support.kind == "bearing")
@@ -178,7 +178,7 @@ def test_bearings_over_speed_stand_beside_a_small_model_that_moves(cli, tmp_path
 def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
     """The same file as `motion` reads: a damper at each mass is estimated."""
     path = tmp_path / "small.toml"
-    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--output", path).code == 0
     model = read_ode_model(path)
     assert [*model.parameters] == ["d_x7", "d_x12", "d_x18"]
     assert cli("motion", path, "--speed", "3000rpm", "--time", "0.1s", "--displaced", "12=5um").code == 0
@@ -194,7 +194,7 @@ def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
 def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equations_gives(cli, tmp_path):
     """The sample's matrices are those of this reduction; there the mass in the middle is estimated, too."""
     path, sample = tmp_path / "small.toml", sample_data() / "fit" / "run_down"
-    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--model", path).code == 0
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--output", path).code == 0
     text = path.read_text(encoding="utf-8").replace(
         "[equations.estimate]", "[equations.estimate]\nblow = 0.04"
     )
@@ -241,8 +241,8 @@ def test_what_is_not_linear_is_not_fitted(cli):
             "--stability asks for the rotor on",
         ),
         (
-            (ROTOR, "--nodes", "7", "--keep-supports", "--state-space", "m.npz"),
-            "--state-space asks for the rotor on",
+            (ROTOR, "--nodes", "7,12,18", "--keep-supports", "--output", "m.npz"),
+            "m.npz: with --keep-supports the small model is for motion",
         ),
         (("--compliance", ROTOR, "--measured", ROTOR, "--keep-supports"), "--keep-supports needs a rotor"),
     ],
@@ -258,9 +258,9 @@ def test_kept_supports_are_refused(cli, tmp_path, monkeypatch, arguments, messag
 def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
     for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
         assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
-    few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
+    few = cli("reduce", ROTOR, "--place", "compromise", "--candidates", "7,12,18,20", "--json").json
     assert few["placement"]["considered"] == 4
-    document = cli("reduce", ROTOR, "--rank", "--json").json
+    document = cli("reduce", ROTOR, "--place", "compromise", "--json").json
     assert document["nodes"] == [4, 10, 16]
     assert document["placement"]["best_by_frequency"]["nodes"] == [3, 11, 14]
     assert document["placement"]["book_rule"]["nodes"] == [7, 12, 18]
@@ -271,10 +271,11 @@ def test_kept_supports_in_the_document_and_in_places(cli, tmp_path):
     document = cli("reduce", MOTION / "rotor.toml", *kept, "--json").json
     assert document["small_model"]["nodes"] == sorted([2, 22, *document["nodes"]])
     assert sum(document["small_model"]["weight_N"]) == pytest.approx(9.80665 * 558.5346506833)
-    ranked = cli("reduce", MOTION / "rotor.toml", "--rank", "--masses", 2, "--keep-supports", "--json").json
+    words = ("--place", "compromise", "--masses", 2, "--keep-supports", "--json")
+    ranked = cli("reduce", MOTION / "rotor.toml", *words).json
     assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
     path = tmp_path / "small.toml"
-    cli("reduce", ROTOR, *kept, "--model", path, "--report", tmp_path / "page.html")
+    cli("reduce", ROTOR, *kept, "--output", path, "--report", tmp_path / "page.html")
     model = read_small_model(path)
     assert model.supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
 

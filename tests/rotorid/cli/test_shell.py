@@ -163,26 +163,20 @@ OPTIONS = {
     ("influence", ROTOR, "--planes", "3", "--sensors", "5"): {"--speeds": SPEEDS},
     ("critical", ROTOR): {"-n": EXTREME, "--operating": ("1:1e308", "1e308:1e309", "1e300rpm:1e301rpm")},
     ("balance", BK / "job.toml"): {
-        "--amplitude-error": EXTREME,
-        "--phase-error": EXTREME,
-        "--run-error": EXTREME,
+        "--errors": (*EXTREME, *(f"{each},{each}" for each in EXTREME)),
         "--ridge": EXTREME,
         "--max-mass": (*EXTREME, "1e30g", "1e-300g"),
         "--speeds": SPEEDS,
     },
     ("tolerance", "--mass", "500kg", "--grade", "G2.5"): {"--speed": (*SPEEDS, "1e-300rpm", "1e-9")},
-    ("split", "3g@120", "--drill", "8mm", "--radius", "100mm"): {"--density": (*EXTREME, "1e-308", "1e-30")},
-    ("trial-weight", "--rotor-mass", "500kg", "--radius", "200mm", "--speed", "3000rpm"): {
-        "--fraction": EXTREME,
-        "--damping": EXTREME,
-        "--critical": SPEEDS,
+    ("split", "3g@120", "--radius", "100mm"): {"--drill": ("1e-300mm", "1e300mm")},
+    ("trial-weight", "--load", "500kg", "--radius", "200mm", "--speed", "3000rpm"): {
+        "--share": EXTREME,
     },
     ("reduce", ROTOR, "--nodes", "7,12,18"): {"--response": ("1e-308", "1e-320", "1e308", "nan")},
     ("fit", FIT / "model.toml", FIT / "record.csv"): {
         "--sigma": ("1e-308", "1e-320", "1e308", "nan", "-1"),
-        "--starts": ("9" * 9, "-1", "1e308"),
-        "--max-seconds": ("inf", "nan", "1e-320"),
-        "--rtol": ("inf", "1e-308", "0"),
+        "--tolerance": ("inf", "1e-308", "0"),
     },
 }
 

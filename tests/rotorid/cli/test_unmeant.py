@@ -6,7 +6,7 @@ from pathlib import Path
 from cases import each_of
 
 JOBS = Path(__file__).parents[2] / "data/unmeant"
-STATED = ("--amplitude-error", "2", "--phase-error", "2")
+STATED = ("--errors", "2,2")
 
 
 def balance(cli, name, *options):

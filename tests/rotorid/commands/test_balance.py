@@ -27,10 +27,10 @@ UM_PP = 0.5e-6
         ),
         pytest.param(
             TABLES,
-            "--angles|against rotation|--amplitude-error 2 --speeds 1220rpm --planes left,right",
+            "--angles|against rotation|--errors 2,0 --speeds 1220rpm --planes left,right",
             {
                 "angles": "against rotation",
-                "amplitude_error": 2.0,
+                "errors": "2,0",
                 "speeds": [1220 * RPM],
                 "planes": ["left", "right"],
             },

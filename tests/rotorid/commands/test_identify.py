@@ -10,8 +10,8 @@ from rotorid.tables import read_harmonic_model, read_measurements
 
 FOLDER = sample_data() / "identify" / "task_5_1"
 FILES = FOLDER / "model.toml", FOLDER / "data.csv"
-WORDS = ("--loss", "huber", "--amplitude-error", "2", "--phase-error", "1")
-OPTIONS = {"loss": "huber", "amplitude_error": 2.0, "phase_error": 1.0}
+WORDS = ("--errors", "2,1")
+OPTIONS = {"errors": "2,1"}
 
 
 def plain(document):

@@ -36,13 +36,13 @@ def test_cells_of_the_other_kind_are_blank_in_files(cli, tmp_path, ending):
 def test_masses_from_tables_alone_make_no_model(cli, tmp_path):
     tables = ("--compliance", BOOK / "compliance.csv", "--measured", BOOK / "modes.csv")
     path = tmp_path / "m.toml"
-    refused = cli("reduce", *tables, "--model", path)
+    refused = cli("reduce", *tables, "--output", path)
     assert (refused.code, "say nothing of bearings" in refused.err, path.exists()) == (2, True, False)
 
 
 def test_forces_stand_at_masses(cli, tmp_path):
     path = tmp_path / "m.toml"
-    words = ("reduce", ROTOR, "--nodes", "7,12,18", "--model", path, "--force")
+    words = ("reduce", ROTOR, "--nodes", "7,12,18", "--output", path, "--force")
     assert cli(*words, "12").code == 0
     assert '"f_x12"' in path.read_text()
     path.unlink()

@@ -79,10 +79,6 @@ def test_acceleration_may_be_an_option(cli, rotor_and_sweep, tmp_path):
     [
         (("--acceleration", "50rpm/s"), "--acceleration: the table has times"),
         (("--acceleration", "50"), "a speed a second is needed"),
-        (("--run", "run-upp"), "--run 'run-upp' is not known (did you mean 'run-up'?)"),
-        (("--sensors", "C"), "--sensors: of run 'run-up', 'C' is not known"),
-        (("--slow-roll", "100"), "no vector at or below 100 rpm"),
-        (("--slow-roll", "no.csv"), "no.csv"),
     ],
 )
 def test_options_that_cannot_be(cli, vectors, monkeypatch, tmp_path, words, message):
@@ -92,18 +88,12 @@ def test_options_that_cannot_be(cli, vectors, monkeypatch, tmp_path, words, mess
     assert message in found.err
 
 
-def test_of_several_runs_one_is_chosen(cli, rotor_and_sweep, tmp_path):
+def test_several_runs_are_refused(cli, rotor_and_sweep, tmp_path):
     _, sweep = rotor_and_sweep
-    both = [replace(sweep, run="A"), replace(sweep, run="B", vectors=sweep.vectors * 1.3j)]
-    path = table(tmp_path / "both.csv", both, lag=True)
-    found = cli("runup", path, "--phase", "lag")
+    path = table(tmp_path / "both.csv", [replace(sweep, run="A"), replace(sweep, run="B")])
+    found = cli("runup", path)
     assert found.code == 2
-    assert "say with --run whose modes to fit, A or B" in found.err
-    one, other = (
-        cli("runup", path, "--phase", "lag", "--run", run, "--sensors", "B", "--json").json for run in "AB"
-    )
-    assert (one["run"], other["run"]) == ("A", "B")
-    assert [row["sensor"] for row in one["slow_roll"]] == ["B"]
+    assert "one run is needed, not 2: A or B" in found.err
 
 
 def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
@@ -117,18 +107,6 @@ def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
     assert modes.nodes == (7, 18)
     reduced = cli("reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json")
     assert reduced.code == 0
-
-
-def test_slow_roll_of_a_speed_and_of_a_file(cli, vectors, tmp_path):
-    found = cli("runup", vectors, "--slow-roll", "450", "--json").json
-    assert found["slow_roll_from"] == "mean of the vectors at or below 450 rpm"
-    file = tmp_path / "slow.csv"
-    file.write_text("run,speed_rpm,sensor,amplitude_um_pp,phase_deg\ns,200,A,8,10\ns,200,B,6,20\n")
-    document = cli("runup", vectors, "--slow-roll", file, "--json").json
-    assert [row["amplitude_um_pp"] for row in document["slow_roll"]] == pytest.approx([8, 6])
-    assert len(document["provenance"]["inputs"]) == 2
-    for one, other in zip(document["modes"], found["modes"], strict=True):
-        assert one["frequency_rad_s"] == other["frequency_rad_s"]  # the fit has its own
 
 
 def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
@@ -145,7 +123,7 @@ def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
 
 def test_vectors_of_python(rotor_and_sweep):
     rotor, sweep = rotor_and_sweep
-    found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])], slow_roll=47.0))
+    found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])]))
     assert len(found.document["modes"]) == 1
     assert json.dumps(found.document)
 

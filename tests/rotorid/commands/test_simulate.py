@@ -131,8 +131,8 @@ def test_the_same_seed_is_the_same_table_and_another_is_not():
         options = {"parameters": "c=1000,alpha=10", "frequencies": [10.0], "inputs": {"F": 10.0}, **more}
         return simulate(task("task_5_1"), SimulateOptions(**options)).to_frame()["X_im"][0]
 
-    one = table(amplitude_error=2.0)
-    assert one == table(amplitude_error=2.0, seed=0) != table(amplitude_error=2.0, seed=1)
+    one = table(errors=(2.0, 0.0))
+    assert one == table(errors=(2.0, 0.0), seed=0) != table(errors=(2.0, 0.0), seed=1)
     assert abs(one + 0.1) > 1e-6
     assert table() == -0.1
 
@@ -186,10 +186,10 @@ WAYS = "one of --frequencies, --modes or --times"
         ([*EXACT, "--frequencies", "10"], "nothing excites the model: give the amplitude of F"),
         ([*USUAL, "--modes"], "--inputs: 'F' is no input"),
         ([*USUAL, "--frequencies", "10", "--sigma", "1"], "--sigma does not go with --frequencies"),
-        ([*EXACT, "--modes", "--amplitude-error", "1"], "--amplitude-error does not go with --modes"),
+        ([*EXACT, "--modes", "--errors", "1,1"], "--errors does not go with --modes"),
         ([*EXACT, "--frequencies", "10", "--inputs", "F=x"], "'x' is no amplitude"),
         ([*USUAL, "--frequencies", "ten"], "--frequencies 'ten' is not a range"),
-        ([*USUAL, "--frequencies", "10", "--amplitude-error", "-1"], "--amplitude-error takes a number from"),
+        ([*USUAL, "--frequencies", "10", "--errors", "-1,0"], "--errors '-1,0': percent"),
     ],
 )
 def test_misuse_is_one_message(cli, words, said):

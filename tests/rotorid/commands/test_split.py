@@ -29,7 +29,6 @@ def test_arrays_are_lists():
         ("--holes 0,40,75,200", SplitOptions(holes=[0, 40, 75, 200])),
         ("--two 20g,30g --angles againstrotation", SplitOptions(two=[0.02, 0.03], angles="against rotation")),
         ("--drill 16mm --radius 100mm", SplitOptions(drill=0.016, radius=0.1)),
-        ("--mounted 10g@0 --holes 12", SplitOptions(mounted=0.01, holes=12)),
     ],
 )
 def test_from_python_as_from_the_command_line(cli, args, options):

@@ -17,13 +17,13 @@ BK = sample_data() / "bk_two_plane" / "job.toml"
     ("args", "options"),
     [
         (
-            "--rotor-mass 500kg --carried-by 2 --speed 3000rpm --radius 0.2m --fraction 8",
-            {"rotor_mass": 500.0, "carried_by": 2, "speed": RPM3000, "radius": 0.2, "fraction": 8},
+            "--load 500N --speed 3000rpm --radius 0.2m --share 8",
+            {"load": 500.0, "speed": RPM3000, "radius": 0.2, "share": 8},
         ),
         (
-            "--bearing-load 9kN --speed 50Hz --radius 200mm --reading-phase 9 --lag below --sensor-angle 30 "
+            "--load 9kN --speed 50Hz --radius 200mm --reading-phase 9 --lag below --sensor-angle 30 "
             "--phase lag",
-            {"bearing_load": 9e3, "speed": RPM3000, "radius": 0.2, "reading_phase": 9, "lag": "below"}
+            {"load": 9e3, "speed": RPM3000, "radius": 0.2, "reading_phase": 9, "lag": "below"}
             | {"sensor_angle": 30, "phase": "lag"},
         ),
     ],
@@ -41,11 +41,11 @@ def test_from_a_job(cli):
         "1",
         "--radius",
         "100mm",
-        "--rotor-mass",
-        "9kg",
+        "--load",
+        "9N",
     )
     printed = cli("trial-weight", BK, *args, "--share", "30", "--angles", "with rotation", "--json").json
-    options = {"plane": ["1"], "radius": 0.1, "rotor_mass": 9, "share": 30}
+    options = {"plane": ["1"], "radius": 0.1, "load": 9, "share": 30}
     found = trial_weight(BK, TrialWeightOptions(angles="with rotation", **options))
     same(found.document, printed)
     assert found.provenance["inputs"] == printed["provenance"]["inputs"]

@@ -68,7 +68,7 @@ def test_without_states_the_outputs_are_functions_of_time(tmp_path):
     ("old", "new", "said"),
     [
         ("-k*x - c*v + u", "-k*x - c*v + w", "state v: .*w is not defined here"),
-        ("-k*x - c*v + u", "-kk*x - c*v + u", "kk is not defined here \(did you mean .k"),
+        ("-k*x - c*v + u", "-kk*x - c*v + u", r"kk is not defined here \(did you mean .k"),
         ("-k*x - c*v + u", "-k*x - (c*v", "state v: .*parenthesis is never closed"),
         ("-k*x - c*v + u", "__import__('os')", "state v: .*_ cannot stand here"),
         ("[outputs]", "[output]", r"key output: .*did you mean 'outputs'"),

@@ -106,13 +106,13 @@ def test_few_degrees_of_freedom_are_told(cli):
 
 
 def test_stated_errors(identify):
-    found = identify("task_5_1", "--amplitude-error", 2, "--phase-error", 1)
+    found = identify("task_5_1", "--errors", "2,1")
     assert found["method"] == "output-error"
     for name, truth in {"c": 1000.0, "alpha": 10.0}.items():
         low, high = found["parameters"][name]["ci95"]
         assert low < truth < high
         assert high - low < 0.1 * truth
-    assert found["provenance"]["options"]["amplitude_error"] == 2
+    assert found["provenance"]["options"]["errors"] == "2,1"
     assert found["correlation"]["c"]["c"] == pytest.approx(1)
 
 
@@ -124,9 +124,7 @@ def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_tho
     equations = harmonic_model(["(m*p**2 + alpha*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "alpha"])
     values = {"F": 10.0, "X": [-0.1j, -3.3e-3 - 2.2e-4j, -1.2e-3 - 4.7e-5j]}
     for options, percent, degrees in (
-        (("--amplitude-error", 2, "--phase-error", 1), 2, 1),
-        (("--amplitude-error", 2), 2, 3),
-        (("--phase-error", 1), 5, 1),
+        (("--errors", "2,1"), 2, 1),
         ((), 5, 3),
     ):
         found = cli("identify", model, folder / "data.csv", *options, "--json").json["parameters"]
@@ -134,7 +132,7 @@ def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_tho
         expected = identify_model(equations, experiments(equations, [10, 20, 30], values, errors=errors))
         for k, name in enumerate(("c", "alpha")):
             assert found[name]["std"] == pytest.approx(expected.std[k], rel=1e-9)
-    bare = cli("identify", folder / "model.toml", folder / "data.csv", "--amplitude-error", 2, "--json").json
+    bare = cli("identify", folder / "model.toml", folder / "data.csv", "--errors", "2,0", "--json").json
     expected = identify_model(
         equations, experiments(equations, [10, 20, 30], values, errors=AmplitudeErrors(0.02, 0.0))
     )
@@ -144,11 +142,9 @@ def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_tho
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (("--loss", "none"), "soft_l1"),
-        (("--amplitude-error", "-1"), "from 0 to 1000"),
-        (("--phase-error", "-1"), "from 0 to 360"),
-        (("--phase-error", "nan"), "takes a number up to"),
-        (("--amplitude-error", "0"), "greater than zero"),
+        (("--errors", "-1,1"), "percent of an amplitude"),
+        (("--errors", "1,nan"), "percent of an amplitude"),
+        (("--errors", "0,0"), "greater than zero"),
         (("--plot", "x.gif"), ".png, .svg, .pdf"),
     ],
 )

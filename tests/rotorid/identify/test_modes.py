@@ -283,10 +283,10 @@ def test_a_table_of_modes_needs_the_names_of_the_model(tmp_path, cli):
 
 def test_one_stated_error_needs_the_other(cli):
     outcome = cli(
-        "modes", sample_data() / "modes" / "amplitudes.csv", "--excitation", "force", "--phase-error", "1"
+        "modes", sample_data() / "modes" / "amplitudes.csv", "--excitation", "force", "--errors", "1"
     )
     assert outcome.code == 2
-    assert "belong together" in outcome.err
+    assert "percent of an amplitude and degrees" in outcome.err
 
 
 def test_one_wild_reading_of_a_sweep_is_no_mode():

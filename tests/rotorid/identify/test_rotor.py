@@ -61,7 +61,7 @@ def test_sample_has_the_matrices_of_the_reduction():
 
 def test_model_with_a_negative_mass_is_not_written(cli, tmp_path):
     path = tmp_path / "bad.toml"
-    outcome = cli("reduce", ROTOR, "--nodes", "2,3,23", "--modes", "2", "--model", path)
+    outcome = cli("reduce", ROTOR, "--nodes", "2,3,23", "--modes", "2", "--output", path)
     assert outcome.code == 2
     assert "not positive" in outcome.err
     assert not path.exists()

@@ -11,7 +11,6 @@ from rotorid.base.rpm import RPM
 from rotorid.identify.modes import (
     constant_vectors,
     fit_sweep,
-    slow_vectors,
     vectors_when_passing,
 )
 from rotorid.identify.modes_result import Readings
@@ -70,16 +69,6 @@ def test_a_band_chooses_a_mode():
     modes = fit_sweep(sweep, bands=[band])
     value, std = found(modes)[0], modes.fit.std[0]
     assert abs(value - rotor.omega[0]) < 4 * std + 1e-3 * value
-
-
-def test_slow_roll_is_a_mean_with_its_error():
-    rotor, sweep = drawn()
-    vectors, std = slow_vectors(sweep, 450 / RPM)
-    low = sweep.vectors[sweep.speeds <= 450 / RPM]
-    assert np.abs(vectors - rotor.run_out).max() < 3e-6
-    np.testing.assert_allclose(std, np.sqrt(np.var(low, axis=0, ddof=1) / 2 / len(low)), rtol=1e-9)
-    with pytest.raises(ValueError, match=r"no vector at or below 100 rpm; the lowest speed is 300 rpm"):
-        slow_vectors(sweep, 100 / RPM)
 
 
 def test_a_speed_that_is_not_passed_is_refused():

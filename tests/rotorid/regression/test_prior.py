@@ -7,8 +7,6 @@ import pytest
 
 from rotorid.commands.fit import FitOptions
 from rotorid.commands.fit import fit as work
-from rotorid.commands.identify import IdentifyOptions
-from rotorid.commands.identify import identify as work_harmonic
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.fit_records import fit
@@ -273,12 +271,6 @@ def test_the_other_outputs_tell_of_a_prior(tmp_path):
     assert "% from the data" in sheet.partition("<script")[0]
     assert any("rows of [prior]" in note for note in found.equations.notes)
     assert not work(folder / "model.toml", folder / "record_noisy.csv").equations.notes
-
-
-def test_without_data_options_are_refused_that_nothing_would_look_at():
-    harmonic = sample_data() / "identify" / "task_5_1" / "model.toml"
-    with pytest.raises(ValueError, match="--loss belongs to DATA"):
-        work_harmonic(harmonic, None, IdentifyOptions(loss="huber"))
 
 
 MODEL = """outputs = { y = "a + b*t" }

@@ -169,7 +169,7 @@ def test_symbols_with_numbers_put_in_are_the_matrix_that_gives_the_estimate(task
 def test_stated_errors_do_not_weight_the_rows():
     """K and Y are those of the lesson; the answer, which starts from them, is another."""
     model, data = files("task_5_1")
-    found = identify(model, data, IdentifyOptions(amplitude_error=2.0, phase_error=1.0))
+    found = identify(model, data, IdentifyOptions(errors=(2.0, 1.0)))
     shown, plain = found.equations, identify(model, data).equations
     np.testing.assert_array_equal(shown.matrix, plain.matrix)
     solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]

@@ -207,7 +207,7 @@ def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
     code = "import sys; sys.modules['uvicorn'] = None; from rotorid.cli import main; main()"
-    words = [sys.executable, "-c", code, "worksheet", str(tmp_path), "--no-browser"]
+    words = [sys.executable, "-c", code, "worksheet", str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "rotorid: the worksheet needs uvicorn: pip install starlette uvicorn tomlkit\n"
