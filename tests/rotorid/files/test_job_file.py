@@ -207,8 +207,9 @@ def test_errors_that_are_all_zero(job):
 def test_problems_of_all_files_at_once(job, folder):
     write_csv(folder / "runs.csv", replaced(RUNS, 2, "phase_deg", "x"))
     write_csv(folder / "weights.csv", replaced(WEIGHTS, 2, "mass_g", 0))
-    found = complaints(job, JOB.replace('phase = "lag"', 'phase = "lagg"'))
-    assert [p.file.rpartition("/")[2] for p in found] == ["job.toml", "runs.csv", "weights.csv"]
+    assert [p.file.rpartition("/")[2] for p in complaints(job)] == ["runs.csv", "weights.csv"]
+    found = complaints(job, JOB.replace('phase = "lag"', 'phase = "lagg"').replace("= 3", '= "x"'))
+    assert [p.column for p in found] == ["phase", "errors.phase_deg"]
 
 
 def test_missing_files_of_a_job(job, folder):
