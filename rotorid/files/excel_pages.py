@@ -12,9 +12,6 @@ from rotorid.base.tables import workbook_bytes
 from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.files.cells import BadCell, Cell, Shown
 
-LONGEST_TEXT = 32767
-MOST_ROWS = 1048576
-_LONGEST_LIST = 255
 _NARROWEST = 12
 
 Line = tuple[Cell | None, ...]
@@ -43,7 +40,7 @@ def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  #
     Raises
     ------
     ValueError
-        For what no workbook holds: control characters, cells and sheets that are too long.
+        For what no workbook holds: control characters, sheets that are too long.
     """
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
@@ -88,11 +85,6 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
     from openpyxl.styles import Font, PatternFill
     from openpyxl.utils import get_column_letter
 
-    if len(page.lines) > MOST_ROWS:
-        raise ValueError(
-            f"the sheet {page.title!r} would have {len(page.lines)} rows, and a workbook holds {MOST_ROWS}: "
-            "keep this job in CSV files"
-        )
     top = header_row(page.lines)
     header = page.lines[top - 1] if top else ()
     for number, cells in enumerate(page.lines, start=1):
@@ -120,11 +112,6 @@ def put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
         if isinstance(value, Shown):
             cell.number_format = _number_format(value.text)
     elif isinstance(value, str):
-        if len(value) > LONGEST_TEXT:
-            raise ValueError(
-                f"the sheet {title!r} would have a cell of {len(value)} characters, and one holds "
-                f"{LONGEST_TEXT}: keep this job in files"
-            )
         if re.search(r"[\x00-\x08\x0b-\x1f\x7f]", value):
             raise ValueError(f"text with control characters cannot be written to a workbook: {value[:60]!r}")
         cell.value, cell.data_type = value, "s"  # never a formula

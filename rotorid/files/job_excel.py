@@ -9,12 +9,12 @@ import re
 import tomllib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from balancing import Influence
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import LONGEST_TITLE
 from rotorid.base.text import listing
@@ -70,13 +70,10 @@ class WrittenJob:
     def read(self, problems: Problems) -> JobSettings:
         """All settings; a file that is named in place of a sheet is a problem."""
         source = "" if self.path is None else str(self.path)
-        if not self.tables and self.settings.keys().isdisjoint(TABLES):
+        if not self.tables and "runs" not in self.settings:
             problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
             problems.stop()
-        read = read_settings(JobSettings, self.settings, source, problems, self.where)
-        settings = problems.need(read)
-        if not self.tables and "runs" not in self.settings:
-            settings.complain(problems, "runs", 'the runs table, runs = "runs.csv"')
+        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
         for key in TABLES if self.tables and self.path else ():
             if settings.has(key) and (key in self.tables or key in TABLES[:2]):
                 expected = f"the table in the sheet {key!r} of this workbook, not a file"
@@ -132,7 +129,7 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         if grid is not None and name in TABLES:
             job.tables[name] = grid
         elif grid is not None:
-            (_read_settings if name == "settings" else _read_named)(grid, name, job, problems)
+            _read_rows(grid, name, job, problems)
     if "runs" not in titles:
         shown = listing((repr(title) for title in sheets), "and")
         problems.add(str(path), None, None, None, f"a sheet 'runs' with readings; the sheets are {shown}")
@@ -158,51 +155,53 @@ def _value(key: str, cell: Cell) -> Cell | bool:
     return cell
 
 
-def _read_settings(grid: Grid, _: str, job: WrittenJob, problems: Problems) -> None:
-    """Rows of key and value; a dotted key stands for a table (`errors.phase_deg`)."""
-    folded = [name.casefold() for name in grid.header]
-    if [name for name in folded if not _is_remark(name)] not in (["key", "value"], ["setting", "value"]):
+def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
+    """Rows of a setting each, or of a plane or sensor with settings as columns; a blank cell states nothing.
+
+    A dotted key stands for a table (`errors.phase_deg`).
+    """
+    named = sheet in NAMED
+    first = NAMED[sheet][0] if named else "key"
+    heads = [name if named else name.casefold() for name in grid.header]
+    columns = {i: name for i, name in enumerate(heads) if name != first and not _is_remark(name)}
+    if first not in heads or not (named or [*columns.values()] == ["value"]):
         found = listing(filter(None, grid.header), "and")
-        problems.add(grid.source, grid.header_row, None, found, "the columns key and value")
+        expected = f"a column {first}; the columns are {found}" if named else "the columns key and value"
+        problems.add(grid.source, grid.header_row, first, None, expected)
         return
-    at, to = (
-        next(i for i, name in enumerate(folded) if name in pair) for pair in (("key", "setting"), ("value",))
-    )
+    at = heads.index(first)
     for row, cells in grid.rows:
         key = show(cells[at])
-        parts = key_parts(key)
-        name, place = ".".join(parts), (grid.source, row, grid.header[to])
-        value = _value(parts[-1], cells[to])
-        wrong, expected = at, ""
-        if isinstance(cells[at], BadCell) or not key:
-            expected = getattr(cells[at], "expected", "the name of a setting")
-        elif value == "" and OPTIONAL in grid.header:
+        parts = [sheet, key] if named else key_parts(key)
+        name = ".".join(parts)
+        if isinstance(cells[at], BadCell) or not key or name in job.where:
+            again = f"each {first} once (row {job.where[name][1]} has it too)" if name in job.where else ""
+            expected = again or getattr(cells[at], "expected", f"the name of a {first}")
+            problems.add(grid.source, row, grid.header[at], key, expected)
             continue
-        elif isinstance(value, BadCell) or value == "":
-            wrong, expected = to, getattr(value, "expected", f"a value for {key}")
-        elif name in job.where:
-            expected = f"each setting once (row {job.where[name][1]} has it too)"
-        else:
-            job.where[name] = place
-            if not _put(job, parts, value, place):
+        if named:
+            _put(job, parts, {}, (grid.source, row, first))
+        for i, column in columns.items():
+            at_column = [*parts, column] if named else parts
+            value, place = _value(at_column[-1], cells[i]), (grid.source, row, grid.header[i])
+            if isinstance(value, BadCell):
+                problems.add(*place, value.value, value.expected)
+            elif value != "" and not _put(job, at_column, value, place):
                 expected = f"no parts of {name.rpartition('.')[0]}, which has a value of its own"
-        if expected:
-            problems.add(grid.source, row, grid.header[wrong], show(cells[wrong]), expected)
+                problems.add(grid.source, row, grid.header[at], key, expected)
 
 
 def key_parts(key: str) -> list[str]:
     """Parts of a dotted key; as in a job file, one in quotes may hold points itself."""
+    parts = key.split(".")
     if '"' in key or "'" in key:
-        try:
+        with suppress(tomllib.TOMLDecodeError):
             inner: Any = tomllib.loads(f"{key} = 0")
-        except tomllib.TOMLDecodeError:
-            return key.split(".")
-        parts = []
-        while isinstance(inner, dict) and len(inner) == 1:
-            [(part, inner)] = inner.items()
-            parts.append(part)
-        return parts
-    return key.split(".")
+            parts = []
+            while isinstance(inner, dict) and len(inner) == 1:
+                [(part, inner)] = inner.items()
+                parts.append(part)
+    return parts
 
 
 def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str, int, str]) -> bool:
@@ -213,41 +212,9 @@ def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str,
         inner = inner.setdefault(part, {})
         if not isinstance(inner, dict):
             return False
+    job.where[".".join(parts)] = place
     inner[parts[-1]] = value
     return True
-
-
-def _read_named(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
-    """Rows of one plane or sensor each; a blank cell leaves the setting out."""
-    key = NAMED[sheet][0]
-    if key not in grid.header:
-        expected = f"a column {key}; the columns are {listing(filter(None, grid.header), 'and')}"
-        problems.add(grid.source, grid.header_row, key, None, expected)
-        return
-    at = grid.header.index(key)
-    columns = {i: name for i, name in enumerate(grid.header) if i != at and not _is_remark(name)}
-    for row, cells in grid.rows:
-        item, expected = show(cells[at]), ""
-        name = f"{sheet}.{item}"
-        if isinstance(cells[at], BadCell) or not item:
-            expected = getattr(cells[at], "expected", f"the name of a {key}")
-        elif name in job.where:
-            expected = f"each {key} once (row {job.where[name][1]} has it too)"
-        if expected:
-            problems.add(grid.source, row, key, item, expected)
-            continue
-        job.where[name] = (grid.source, row, key)
-        section = job.settings.setdefault(sheet, {})
-        if not isinstance(section, dict):  # a setting of this name; the job refuses it
-            return
-        section = section.setdefault(item, {})
-        for i, column in columns.items():
-            value = _value(column, cells[i])
-            job.where[f"{name}.{column}"] = (grid.source, row, column)
-            if isinstance(value, BadCell):
-                problems.add(grid.source, row, column, value.value, value.expected)
-            elif value != "":
-                section[column] = value
 
 
 def number_cell(cell: Cell, separator: str, *, comma: bool) -> Cell:
@@ -300,18 +267,7 @@ def template_bytes() -> bytes:
     return Path(__file__).with_name("template.xlsx").read_bytes()
 
 
-class Results(Protocol):
-    """What `rotorid balance` has found."""
-
-    @property
-    def influence(self) -> Influence:
-        """The influence coefficients."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document of `--json`, without its provenance."""
-
-
-def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapping[str, Any]) -> bytes:
+def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[str, Any]) -> bytes:  # noqa: ANN401
     """A workbook with the results of a job, for reading; its sheets of results are not read back.
 
     Parameters
@@ -320,7 +276,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
         What the job was read from: of a workbook all sheets but those of older results are kept, with their
         formats and formulas, without pictures and charts.
     results
-        What was found.
+        What `rotorid balance` has found: its `influence`, and `to_dict`, the document of `--json`.
     provenance
         Program version, input files, date and options.
 
