@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +22,6 @@ from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import (
     ROTATIONS,
     Conventions,
-    StatedErrors,
     as_angles,
     as_phase,
     check_angles,
@@ -30,7 +30,16 @@ from rotorid.files.conventions import (
 from rotorid.files.influence import fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_limits import make_holes, make_limits, row_weights, with_taken
-from rotorid.files.job_models import READINGS, TABLES, WEIGHTS, JobSettings, Plane, Sensor, named_tables
+from rotorid.files.job_models import (
+    READINGS,
+    TABLES,
+    WEIGHTS,
+    Errors,
+    JobSettings,
+    Plane,
+    Sensor,
+    named_tables,
+)
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
@@ -70,7 +79,7 @@ class Overrides:
             check_angles(self.angles)
         self.on(None)
 
-    def on(self, stated: StatedErrors | None) -> StatedErrors | None:
+    def on(self, stated: Errors | None) -> Errors | None:
         """The errors of a job with those that the caller states."""
         given = {
             "amplitude_percent": self.amplitude_error_percent,
@@ -78,7 +87,10 @@ class Overrides:
             "run_percent": self.run_error_percent,
         }
         ours = {key: value for key, value in given.items() if value is not None}
-        return replace(stated or StatedErrors(), **ours) if ours else stated
+        for key, value in ours.items():
+            if not 0 <= value < math.inf:
+                raise ValueError(f"{key} must be finite and not negative, not {value!r}")
+        return (stated or Errors.model_construct()).model_copy(update=ours) if ours else stated
 
 
 @dataclass(frozen=True)
@@ -354,7 +366,7 @@ class _Readings(NamedTuple):
     trials: Trials
     influence: Influence | None
     conventions: Conventions
-    errors: StatedErrors | None
+    errors: Errors | None
     slow_roll: SlowRoll | None
 
 
@@ -375,7 +387,7 @@ def _readings(
     if "runs" not in tables:
         return None
     before = len(problems)
-    errors = overrides.on(settings.errors.stated if settings.errors else None)
+    errors = overrides.on(settings.errors)
     if (overrides.phase or settings.phase) is None:
         overrides = replace(overrides, phase=stated_phase(tables["runs"], settings.columns))
     stored, name = None, ""
@@ -634,7 +646,7 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
     Raises
     ------
     ValueError
-        For a weight that does not convert to those of the job, and one that the holes cannot keep to.
+        For a weight that does not convert to those of the job.
     """
     if not weights and not amplitudes:
         return job
@@ -651,10 +663,5 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
         most[planes.index(plane)] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {}
-    for name, its in job.holes.items():
-        try:
-            holes[name] = replace(its, max_weight=float(most[planes.index(name)]))
-        except ValueError as error:
-            raise ValueError(f"{weights[name].key}: plane {name!r}: {error}") from None
+    holes = {p: replace(its, max_weight=float(most[planes.index(p)])) for p, its in job.holes.items()}
     return replace(job, limits=Limits(most, residual, old.forbidden), holes=holes)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from math import radians
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
+from balancing import Placement, ReadingErrors, RunScatter, Trials
 from rotorid.base.text import listing
 from rotorid.base.words import Angles, Phase, Rotation, View
 from rotorid.files import units
-from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS, StatedErrors
+from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
 from rotorid.files.settings import (
     Date,
     Label,
@@ -279,10 +282,20 @@ class Errors(Settings):
         "how far readings drift from the first run to the last, percent", default=None
     )
 
-    @property
-    def stated(self) -> StatedErrors:
-        """What is written, with what is not left to `StatedErrors`."""
-        return StatedErrors(**{name: value for name, value in self if value is not None})
+    def stated_in(self, trials: Trials) -> Trials:
+        """The runs with these errors: relative, in rad, and in the unit of the readings inside."""
+        scale, reading, between = trials.labels.vibration_scale, None, None
+        if self.amplitude_percent or self.phase_deg or self.floor:
+            reading = ReadingErrors(
+                (self.amplitude_percent or 0.0) / 100.0,
+                radians(self.phase_deg or 0.0),
+                (self.floor or 0.0) / scale,
+            )
+        if self.run_percent is not None or self.run_floor is not None:
+            between = RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / scale)
+        placement = Placement((self.placement_percent or 0.0) / 100.0, radians(self.placement_deg or 0.0))
+        drift = (self.drift_percent or 0.0) / 100.0
+        return replace(trials, errors=reading, run_errors=between, placement=placement, drift=drift)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Nothing above 0."""

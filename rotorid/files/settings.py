@@ -182,6 +182,7 @@ class _Wrong(ValueError):
     """What is wrong with a table and those in it."""
 
     def __init__(self, problems: list[Problem]) -> None:
+        super().__init__(*problems)
         self.problems = problems
 
 

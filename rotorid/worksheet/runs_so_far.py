@@ -206,10 +206,8 @@ def _channels(
     from rotorid.files.runs import make_trials
     from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 
-    stated = None if settings.errors is None else settings.errors.stated
-
     def read(part: Grid) -> Trials | None:
-        trials = make_trials(part, None, conventions, stated, Problems())
+        trials = make_trials(part, None, conventions, settings.errors, Problems())
         if trials is None:
             return None
         trials = replace(trials, labels=conventions.on(trials.labels))
