@@ -165,31 +165,41 @@ def csv(table: Table) -> bytes:
     return csv_bytes([table.note] if table.note else [], table.headings, table.rows)
 
 
-def excel(*tables: Table) -> bytes:
-    """A workbook (.xlsx) with a sheet for each table."""
+def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
+    """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there."""
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
     from openpyxl.styles import Font
+    from openpyxl.utils import get_column_letter
 
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    book.properties.creator = "rotorid"
-    book.properties.created = book.properties.modified = now().replace(tzinfo=None)
-    book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
+    if book is None:
+        book = openpyxl.Workbook()
+        book.remove(book.active)
+        book.properties.creator = "rotorid"
+        book.properties.created = now().replace(tzinfo=None)
+        book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
+    book.properties.modified = now().replace(tzinfo=None)
+    for sheet in book.worksheets:
+        sheet.sheet_view.tabSelected = False
+    first = len(book.sheetnames)
     for table in tables:
         sheet = book.create_sheet(table.name[:LONGEST_TITLE])
-        above = [(f"# {table.note}",)] if table.note else []
+        above = [(f"# {line}",) for line in table.note.splitlines()]
         for number, row in enumerate([*above, table.headings, *table.rows], start=1):
             for place, value in enumerate(row, start=1):
                 written = sheet.cell(number, place)
                 if isinstance(value, str):
                     written.value = one_line(value)
                     written.data_type = "s"  # never a formula
+                elif isinstance(value, float):  # of which openpyxl would keep 16 digits
+                    written.value, written.data_type = repr(value), "n"
                 else:
                     written.value = value
-        for written in sheet[len(above) + 1]:
-            written.font = Font(bold=True)
+        for place, heading in enumerate(table.headings, start=1):
+            sheet.cell(len(above) + 1, place).font = Font(bold=True)
+            sheet.column_dimensions[get_column_letter(place)].width = max(12, len(heading) + 2)
         sheet.freeze_panes = f"A{len(above) + 2}"
+    book.active = first
     return workbook_bytes(book)
 
 

@@ -15,13 +15,14 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.json import cell
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.tables import LONGEST_TITLE
+from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, Row, Shown, make_grid, read_bytes, show
 from rotorid.files.columns import REMARKS, Source, sheet_source
 from rotorid.files.decimal_numbers import parse_number
-from rotorid.files.excel_pages import Line, Page, book_bytes
+from rotorid.files.excel_pages import keep_cells
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.job_models import READINGS, TABLES, JobSettings, Plane, Sensor
 from rotorid.files.layout import rows_from_header
@@ -287,7 +288,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
     """
     from rotorid.files.influence import influence_frame
 
-    own = None
+    book = None
     if len(files) == 1 and is_workbook(files[0]):
         import openpyxl
 
@@ -295,46 +296,50 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
         data = problems.need(read_bytes(files[0], problems))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about parts that are not kept
-            own = openpyxl.load_workbook(io.BytesIO(data))
-        for title in own.sheetnames:
+            book = openpyxl.load_workbook(io.BytesIO(data))
+        for title in book.sheetnames:
             if title.strip().casefold().startswith(RESULTS):
-                del own[title]
-    sheets: dict[str, list[Line]] = {}
+                del book[title]
+        keep_cells(book)
+    sheets: dict[str, list[dict[str, Any]]] = {}
     document = results.to_dict()
-    summary = list(_sorted({**document, "provenance": provenance}, (), sheets))
-    coefficients = influence_frame(results.influence)
-    cells = coefficients.astype(object).where(coefficients.notna(), None).itertuples(index=False)
-    sheets["influence"] = [tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
-    notes = [(f"# warning: {text}",) for text in document.get("warnings", ())]
-    lines = {"": [*notes, *sheets.pop("corrections")], "summary": [("result", "value"), *summary], **sheets}
-    head = ("# computed from the other sheets; not read back",)
-    pages = [Page(f"{RESULTS} {name}".strip()[:LONGEST_TITLE], [head, *rows]) for name, rows in lines.items()]
-    return book_bytes(pages, RESULTS, own)
+    single = [*_single({**document, "provenance": provenance}, (), sheets)]
+    frame = influence_frame(results.influence)
+    tables = {
+        "": sheets.pop("corrections"),
+        "summary": single,
+        **sheets,
+        "influence": frame.to_dict("records"),
+    }
+    warned = "".join(f"\nwarning: {text}" for text in document.get("warnings", ()))
+    return excel(*(_table(name, rows, "" if name else warned) for name, rows in tables.items()), book=book)
 
 
-def _sorted(
-    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[Line]]
-) -> Iterator[Line]:
-    """Single values of a document by their dotted names, and lists of words; of tables `sheets` are made."""
+def _table(name: str, rows: Sequence[Mapping[str, Any]], more: str) -> Table:
+    """Of lists, such as covariances, a sheet has nothing: they are left to `--json`."""
+    heads = [head for head, value in rows[0].items() if not isinstance(value, (list, Mapping))]
+    columns = (Column(head, [_cell(row.get(head)) for row in rows]) for head in heads)
+    return Table(
+        f"{RESULTS} {name}".strip(), tuple(columns), f"computed from the other sheets; not read back{more}"
+    )
+
+
+def _single(
+    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[dict[str, Any]]]
+) -> Iterator[dict[str, Any]]:
+    """Single values of a document by their dotted names, and lists of words; its tables go to `sheets`."""
     for key, value in document.items():
         name = (*above, key)
         if isinstance(value, Mapping):
-            yield from _sorted(value, name, sheets)
+            yield from _single(value, name, sheets)
         elif not isinstance(value, list) or any(not isinstance(one, Mapping) for one in value):
             values = value if isinstance(value, list) else [value]
-            yield from ((".".join(name), _cell(one)) for one in values if one is not None)
+            yield from ({"result": ".".join(name), "value": one} for one in values if one is not None)
         elif value:
-            # lists in it, such as covariances, are left to `--json`
-            heads = [head for head, one in value[0].items() if not isinstance(one, (list, Mapping))]
-            rows = [tuple(_cell(row.get(head)) for head in heads) for row in value]
-            sheets[" ".join(name).replace("_", " ")] = [tuple(heads), *rows]
+            sheets[" ".join(name).replace("_", " ")] = value
 
 
-def _cell(value: Any) -> Cell:  # noqa: ANN401  what a table or a document holds
-    item = getattr(value, "item", None)
-    value = item() if callable(item) else value
-    if value is None:
-        return ""
+def _cell(value: Any) -> Value:  # noqa: ANN401  what a table or a document holds
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return value if isinstance(value, (int, float)) and math.isfinite(value) else str(value)
+    return str(value) if isinstance(value, (list, Mapping)) else cell(value)
