@@ -305,7 +305,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
     document = results.to_dict()
     single = [*_single({**document, "provenance": provenance}, (), sheets)]
     frame = influence_frame(results.influence)
-    tables = {
+    tables: dict[str, Any] = {
         "": sheets.pop("corrections"),
         "summary": single,
         **sheets,
