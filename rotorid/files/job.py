@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import counted, listing
-from rotorid.files import units
+from rotorid.base.text import counted
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import (
     ROTATIONS,
@@ -29,7 +27,6 @@ from rotorid.files.conventions import (
 )
 from rotorid.files.influence import fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
-from rotorid.files.job_limits import make_holes, make_limits, row_weights, with_taken
 from rotorid.files.job_models import (
     READINGS,
     TABLES,
@@ -40,10 +37,20 @@ from rotorid.files.job_models import (
     Sensor,
     named_tables,
 )
+from rotorid.files.job_planes import (
+    Readings,
+    check_runs,
+    in_model,
+    make_holes,
+    make_limits,
+    planes_of,
+    row_weights,
+    with_taken,
+)
 from rotorid.files.layout import files_of_runs, stated_phase
-from rotorid.files.problems import InputError, Problems
-from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
-from rotorid.files.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials
+from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 from rotorid.files.units import Quantity
 from rotorid.files.weights_with_units import in_job_units
 
@@ -308,13 +315,13 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             tables[key], records = grid, (*records, *read)
             overrides = replace(overrides, phase=phase)
     readings = _readings(settings, tables, overrides, problems)
-    settings, rotor, model_files = _in_model(settings, written.folder, problems)
+    settings, rotor, model_files = in_model(settings, written.folder, problems)
     readings = problems.need(readings)
-    trials, planes = _planes(settings, readings, rotor, problems)
+    trials, planes = planes_of(settings, readings.trials, readings.influence, rotor, problems)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)
     holes = make_holes(planes, trials.labels, limits, problems)
-    check = _check(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
+    check = check_runs(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
     mounted = tables.get("check_weights")
     if check is not None and mounted is not None:
         holes = with_taken(holes, mounted, check, readings.conventions)
@@ -360,19 +367,9 @@ def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Sou
     return tables, tuple(files)
 
 
-class _Readings(NamedTuple):
-    """What the tables of a job say, with its conventions settled and slow roll subtracted."""
-
-    trials: Trials
-    influence: Influence | None
-    conventions: Conventions
-    errors: Errors | None
-    slow_roll: SlowRoll | None
-
-
 def _readings(
     settings: JobSettings, tables: Mapping[str, Source], overrides: Overrides, problems: Problems
-) -> _Readings | None:
+) -> Readings | None:
     """Trial runs and stored coefficients, or None and problems."""
     given = {*tables, *(key for key in (*TABLES, "rotor", "machine_type") if settings.has(key))}
     if "check_weights" in given and "check" not in given:
@@ -415,7 +412,7 @@ def _readings(
     roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
     if roll is not None:
         trials = subtract_slow_roll(trials, roll)
-    return _Readings(trials, influence, conventions, errors, roll)
+    return Readings(trials, influence, conventions, errors, roll)
 
 
 def conventions_of(
@@ -464,137 +461,6 @@ def _notes(conventions: Conventions, name: str) -> tuple[str, ...]:
         f"nothing states the conventions of the readings: those of {name} are used for them too, "
         f"{' and '.join(adopted)}",
     )
-
-
-def _in_model(
-    settings: JobSettings, folder: Path, problems: Problems
-) -> tuple[JobSettings, Rotor | None, tuple[Path, ...]]:
-    """The settings with stations as nodes, the rotor model, and its files."""
-    rotor: Rotor | None = None
-    files: tuple[Path, ...] = ()
-    if settings.rotor is not None:
-        from rotorid.files.rotor import read_rotor, rotor_files
-
-        path = folder / settings.rotor
-        try:
-            rotor, files = read_rotor(path), rotor_files(path)
-        except InputError as error:
-            problems.extend(error.problems)
-            return settings, None, ()
-    placed = {
-        kind: {name: _placed(part, rotor, problems) for name, part in getattr(settings, kind).items()}
-        for kind in ("planes", "sensors")
-    }
-    return settings.model_copy(update=placed), rotor, files
-
-
-def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Plane | Sensor:
-    """A plane or sensor with its station as a node."""
-    key = "node" if part.station is None else "station"
-    if part.node is None and part.station is None:
-        return part
-    if rotor is None:
-        part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
-        return part
-    node = part.node if part.station is None else rotor.stations.get(part.station)
-    if node is None:
-        known = listing(map(repr, rotor.stations), "and") or "none"
-        hint = did_you_mean(str(part.station), rotor.stations)
-        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
-    elif node > rotor.n_nodes:
-        part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
-    return part.model_copy(update={"node": node})
-
-
-def _planes(
-    settings: JobSettings, readings: _Readings, rotor: Rotor | None, problems: Problems
-) -> tuple[Trials, dict[str, Plane]]:
-    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone."""
-    trials, stated = readings.trials, settings.planes
-    measured = trials.planes if readings.influence is None else readings.influence.planes
-    every = rotor is None and not measured  # or what a type knows
-    more = [name for name, plane in stated.items() if every or plane.node is not None]
-    planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
-    if not measured:
-        masses = rotor is None or all(plane.radius is not None for plane in planes.values())
-        unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
-        labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
-        trials = replace(trials, labels=labels)
-    if planes and not any(plane.use for plane in planes.values()):
-        settings.complain(problems, "planes", "at least one plane without use = false")
-    for noun, parts, known in (
-        ("plane", stated, tuple(planes)),
-        ("sensor", settings.sensors, trials.sensors),
-    ):
-        for name, part in parts.items():
-            if known and name not in known:
-                expected = f"one of the job's {noun}s, {listing(known, 'and')}{did_you_mean(name, known)}"
-                if noun == "plane":
-                    expected += (
-                        f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
-                    )
-                problems.extend([replace(part.problem("", expected), value=name)])
-    # what acts is the unbalance, mass × radius: a mass m at the radius r counts as m r / R at R
-    factors = np.ones(len(trials.planes))
-    for k, name in enumerate(() if trials.labels.unbalances else trials.planes):
-        plane = planes.get(name, Plane())
-        if plane.trial_radius is not None and plane.radius is not None:
-            factors[k] = plane.trial_radius / plane.radius
-        elif plane.trial_radius is not None:
-            expected = "the correction radius too, radius_mm, to which the trial weights are converted"
-            plane.complain(problems, "trial_radius", expected)
-    return replace(trials, weights=trials.weights * factors), planes
-
-
-def _check(
-    tables: Mapping[str, Source],
-    readings: _Readings,
-    trials: Trials,
-    planes: tuple[str, ...],
-    problems: Problems,
-) -> Trials | None:
-    """Check runs, fitted to the speeds, units and names of the job, or None and problems."""
-    runs, weights, labels = tables["check"], tables.get("check_weights"), trials.labels
-    check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
-    if check is None:
-        return None
-    before, mounting = len(problems), runs if weights is None else weights
-    for table, column, kinds in (
-        (runs, "amplitude", [units.vibration(one.labels.vibration_unit) for one in (check, trials)]),
-        (weights, "weight", [units.weight(one.labels.weight_unit) for one in (check, trials)]),
-    ):
-        if table is not None and kinds[0].kind != kinds[1].kind:
-            expected = (
-                f"{column}s in {kinds[1].name or 'no unit'}, as the job has, or in one that converts to it"
-            )
-            problems.add(source_name(table), None, column, kinds[0].name or "no unit", expected)
-    for table, noun, names, known in (
-        (runs, "sensor", check.sensors, trials.sensors),
-        (mounting, "plane", check.planes, planes),
-    ):
-        for name in (name for name in names if name not in known):
-            expected = f"a {noun} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
-            problems.add(source_name(table), None, noun, name, expected)
-    unit, speeds = units.SPEED[check.labels.speed_unit], list[float]()
-    for speed in check.speeds.tolist():
-        near = nearest_speed(trials.speeds, speed, readings.conventions.speed_tolerance_percent)
-        if near is None or float(trials.speeds[near]) in speeds:
-            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
-            problems.add(source_name(runs), None, "speed", show_speed(speed, unit), expected)
-        else:
-            speeds.append(float(trials.speeds[near]))
-    if len(problems) > before:
-        return None
-    shown, mounted = check.planes, check.weights
-    if weights is not None:
-        # all planes of the job: a weights table without rows says that nothing was mounted
-        shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
-        mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(check, speeds=np.array(speeds), labels=labels, planes=shown, weights=mounted)
-    if readings.slow_roll is None:
-        return check
-    check = subtract_slow_roll(check, readings.slow_roll)
-    return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))
 
 
 def _with_assumed(job: Job) -> Job:

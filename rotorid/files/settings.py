@@ -172,7 +172,7 @@ def _table_names(node: object, name: str = "") -> dict[int, str]:
         inside = ((f"{name}.{key}".strip("."), value) for key, value in node.items())
     elif isinstance(node, list):
         inside = ((f"{name}[{number}]", value) for number, value in enumerate(node, start=1))
-    out = {id(node): name}
+    out = {id(node): name} if inside else {}
     for inner, value in inside:
         out |= _table_names(value, inner)
     return out
