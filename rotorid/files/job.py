@@ -25,7 +25,7 @@ from rotorid.files.conventions import (
     check_angles,
     resolve_angles,
 )
-from rotorid.files.influence import fit_to_readings, load_influence
+from rotorid.files.influence import Stored, fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_models import (
     READINGS,
@@ -406,7 +406,7 @@ def _readings(
     labels = conventions.on(trials.labels if influence is None else influence.labels)
     if influence is not None:
         influence = replace(influence, labels=labels)
-    notes = _notes(conventions, name)
+    notes = _notes(conventions, stored, name)
     trials = replace(trials, labels=labels, warnings=notes + trials.warnings)
     vectors = tables.get("slow_roll", settings.slow_roll)
     roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
@@ -447,20 +447,26 @@ def conventions_of(
     )
 
 
-def _notes(conventions: Conventions, name: str) -> tuple[str, ...]:
-    """What the user should know about conventions that the coefficients alone state."""
+def _notes(conventions: Conventions, stored: Stored | None, name: str) -> tuple[str, ...]:
+    """What the user should know about conventions that the coefficients state, or state otherwise."""
     phase, angles, unstated = conventions.labels.phase, conventions.labels.angles, conventions.unstated
     adopted = []
     if "phase" in unstated and phase != "lead":
         adopted.append(f"phase = {phase}")
     if "angles" in unstated and angles != "with rotation":
         adopted.append(f"angles {angles}")
-    if not adopted:
-        return ()
-    return (
-        f"nothing states the conventions of the readings: those of {name} are used for them too, "
-        f"{' and '.join(adopted)}",
-    )
+    notes = []
+    if adopted:
+        notes.append(
+            f"nothing states the conventions of the readings: those of {name} are used for them too, "
+            f"{' and '.join(adopted)}"
+        )
+    if stored is not None and stored.said.get("phase", phase) != phase:
+        notes.append(
+            f"the readings are taken with phase = {phase}, as stated, and the coefficients with "
+            f"phase = {stored.said['phase']}, as {name} says"
+        )
+    return tuple(notes)
 
 
 def _with_assumed(job: Job) -> Job:
