@@ -1,4 +1,4 @@
-"""Tables of results, told once: named columns, and one writer each for terminal, CSV, HTML and pandas.
+"""Tables of results, told once: named columns, one writer each for terminal, CSV, Excel, HTML and pandas.
 
 >>> speeds = Table(
 ...     "critical speeds",
@@ -162,6 +162,44 @@ def terminal(table: Table, width: int = WIDTH) -> str:
 def csv(table: Table) -> bytes:
     """A CSV file; a note stands in a line with # above the header."""
     return csv_bytes([table.note] if table.note else [], table.headings, table.rows)
+
+
+def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
+    """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there."""
+    import openpyxl
+    from openpyxl.packaging.custom import IntProperty
+    from openpyxl.styles import Font
+    from openpyxl.utils import get_column_letter
+
+    if book is None:
+        book = openpyxl.Workbook()
+        book.remove(book.active)
+        book.properties.creator = "rotorid"
+        book.properties.created = now().replace(tzinfo=None)
+        book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
+    book.properties.modified = now().replace(tzinfo=None)
+    for sheet in book.worksheets:
+        sheet.sheet_view.tabSelected = False
+    first = len(book.sheetnames)
+    for table in tables:
+        sheet = book.create_sheet(table.name[:LONGEST_TITLE])
+        above = [(f"# {line}",) for line in table.note.splitlines()]
+        for number, row in enumerate([*above, table.headings, *table.rows], start=1):
+            for place, value in enumerate(row, start=1):
+                written = sheet.cell(number, place)
+                if isinstance(value, str):
+                    written.value = one_line(value)
+                    written.data_type = "s"  # never a formula
+                elif isinstance(value, float):  # of which openpyxl would keep 16 digits
+                    written.value, written.data_type = repr(value), "n"
+                else:
+                    written.value = value
+        for place, heading in enumerate(table.headings, start=1):
+            sheet.cell(len(above) + 1, place).font = Font(bold=True)
+            sheet.column_dimensions[get_column_letter(place)].width = max(12, len(heading) + 2)
+        sheet.freeze_panes = f"A{len(above) + 2}"
+    book.active = first
+    return workbook_bytes(book)
 
 
 def workbook_bytes(book: Any) -> bytes:  # noqa: ANN401

@@ -74,9 +74,9 @@ def schema(
 
     Example: rotorid schema job
     """
+    from rotorid.files.schema import FILES
+    from rotorid.files.schema import schema as schema_of
     from rotorid.study.study_file import StudyKeys
-    from rotorid.tables.schema import FILES
-    from rotorid.tables.schema import schema as schema_of
 
     FILES["study"] = ("Study file of rotorid", StudyKeys)
 

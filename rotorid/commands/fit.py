@@ -106,8 +106,7 @@ def fit(
     ValueError
         For files, options or records that cannot be.
     """
-    from rotorid.base.tables import csv
-    from rotorid.files.excel_pages import tables_bytes
+    from rotorid.base.tables import csv, excel
     from rotorid.identify.fit_records import fit as estimate
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.plots_records import figure_fit
@@ -137,7 +136,7 @@ def fit(
     )
     iterations: dict[str, Callable[[Path], bytes]] = {
         ".csv": lambda _: csv(result.tables()[0]),
-        ".xlsx": lambda _: tables_bytes(*result.tables()),
+        ".xlsx": lambda _: excel(*result.tables()),
     }
 
     def solved() -> Equations:

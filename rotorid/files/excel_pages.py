@@ -1,78 +1,16 @@
-"""Excel pages for people: bold headers that stay in sight, names as text."""
+"""Cells of workbooks that are kept or changed: all digits, text never as a formula."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from rotorid.base.tables import LONGEST_TITLE, Table, workbook_bytes
-from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.files.cells import BadCell, Cell, Shown
-
-LONGEST_TEXT = 32767
-MOST_ROWS = 1048576
-_LONGEST_LIST = 255
-_NARROWEST = 12
 
 Line = tuple[Cell | None, ...]
 """A row of cells; `""` and None are blanks."""
-
-
-@dataclass(frozen=True)
-class Page:
-    """One sheet.
-
-    Attributes
-    ----------
-    title
-        Its name.
-    lines
-        Rows of cells; rows whose first cell begins with # stand above the header.
-    """
-
-    title: str
-    lines: Sequence[Line]
-
-
-def book_bytes(pages: Sequence[Page], shown: str, book: Any = None) -> bytes:  # noqa: ANN401
-    """A workbook (.xlsx) of these pages, behind those of `book`, opened at the one of the title `shown`.
-
-    Raises
-    ------
-    ValueError
-        For what no workbook holds: control characters, cells and sheets that are too long.
-    """
-    import openpyxl
-    from openpyxl.packaging.custom import IntProperty
-
-    if book is None:
-        book = openpyxl.Workbook()
-        book.remove(book.active)
-        book.properties.creator = "rotorid"
-        book.properties.created = now().replace(tzinfo=None)
-        book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
-    book.properties.modified = now().replace(tzinfo=None)
-    keep_cells(book)
-    for sheet in book.worksheets:
-        sheet.sheet_view.tabSelected = False
-    for page in pages:
-        sheet = book.create_sheet(page.title)
-        _write(sheet, page)
-        sheet.sheet_view.tabSelected = page.title == shown
-    book.active = book.sheetnames.index(shown)
-    return workbook_bytes(book)
-
-
-def tables_bytes(*tables: Table) -> bytes:
-    """A workbook (.xlsx) with a page for each table; a note stands above the header."""
-    pages = []
-    for table in tables:
-        notes = [(f"# {table.note}",)] if table.note else []
-        pages.append(Page(table.name[:LONGEST_TITLE], [*notes, tuple(table.headings), *table.rows]))
-    return book_bytes(pages, pages[0].title)
 
 
 def keep_cells(book: Any) -> None:  # noqa: ANN401
@@ -93,32 +31,6 @@ def header_row(lines: Sequence[Line]) -> int:
     return 0
 
 
-def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no types
-    from openpyxl.styles import Font, PatternFill
-    from openpyxl.utils import get_column_letter
-
-    if len(page.lines) > MOST_ROWS:
-        raise ValueError(
-            f"the sheet {page.title!r} would have {len(page.lines)} rows, and a workbook holds {MOST_ROWS}: "
-            "keep this job in CSV files"
-        )
-    top = header_row(page.lines)
-    header = page.lines[top - 1] if top else ()
-    for number, cells in enumerate(page.lines, start=1):
-        for place, value in enumerate(cells, start=1):
-            if value is not None and value != "":
-                cell = sheet.cell(number, place)
-                put(cell, value, page.title)
-                if isinstance(value, str):
-                    cell.number_format = "@"
-    for place, name in enumerate(header, start=1):
-        sheet.column_dimensions[get_column_letter(place)].width = max(_NARROWEST, len(str(name)) + 2)
-        cell = sheet.cell(top, place)
-        cell.font, cell.fill = Font(bold=True), PatternFill("solid", fgColor="FFE6E6E6")
-    if top:
-        sheet.freeze_panes = f"A{top + 1}"
-
-
 def put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
     """Give a cell a value: numbers with all digits, text never as a formula."""
     if isinstance(value, BadCell):
@@ -129,11 +41,6 @@ def put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
         if isinstance(value, Shown):
             cell.number_format = _number_format(value.text)
     elif isinstance(value, str):
-        if len(value) > LONGEST_TEXT:
-            raise ValueError(
-                f"the sheet {title!r} would have a cell of {len(value)} characters, and one holds "
-                f"{LONGEST_TEXT}: keep this job in files"
-            )
         if re.search(r"[\x00-\x08\x0b-\x1f\x7f]", value):
             raise ValueError(f"text with control characters cannot be written to a workbook: {value[:60]!r}")
         cell.value, cell.data_type = value, "s"  # never a formula

@@ -4,43 +4,55 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials, from_list
+from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import counted, listing
-from rotorid.files import units
+from rotorid.base.text import counted
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import (
-    ANGLES,
     ROTATIONS,
     Conventions,
-    StatedErrors,
     as_angles,
     as_phase,
     check_angles,
     resolve_angles,
 )
-from rotorid.files.decimal_numbers import parse_number
 from rotorid.files.influence import Stored, fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
-from rotorid.files.job_models import SAME_DEG, TABLES, WEIGHTS, JobSettings, Plane, Sensor, named_tables
+from rotorid.files.job_models import (
+    READINGS,
+    TABLES,
+    WEIGHTS,
+    Errors,
+    JobSettings,
+    Plane,
+    Sensor,
+    named_tables,
+)
+from rotorid.files.job_planes import (
+    Readings,
+    check_runs,
+    in_model,
+    make_holes,
+    make_limits,
+    planes_of,
+    row_weights,
+    with_taken,
+)
 from rotorid.files.layout import files_of_runs, stated_phase
-from rotorid.files.problems import InputError, Problem, Problems
-from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
-from rotorid.files.settings import Settings
-from rotorid.files.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
+from rotorid.files.problems import Problems
+from rotorid.files.runs import make_trials
+from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 from rotorid.files.units import Quantity
-from rotorid.files.weights import read_weights
-from rotorid.files.weights_with_units import in_job_units, other_kind
+from rotorid.files.weights_with_units import in_job_units
 
 if TYPE_CHECKING:
     from balancing import Mounted
@@ -74,7 +86,7 @@ class Overrides:
             check_angles(self.angles)
         self.on(None)
 
-    def on(self, stated: StatedErrors | None) -> StatedErrors | None:
+    def on(self, stated: Errors | None) -> Errors | None:
         """The errors of a job with those that the caller states."""
         given = {
             "amplitude_percent": self.amplitude_error_percent,
@@ -82,7 +94,10 @@ class Overrides:
             "run_percent": self.run_error_percent,
         }
         ours = {key: value for key, value in given.items() if value is not None}
-        return replace(stated or StatedErrors(), **ours) if ours else stated
+        for key, value in ours.items():
+            if not 0 <= value < math.inf:
+                raise ValueError(f"{key} must be finite and not negative, not {value!r}")
+        return (stated or Errors.model_construct()).model_copy(update=ours) if ours else stated
 
 
 @dataclass(frozen=True)
@@ -214,26 +229,16 @@ class Job:
         return self.limits.pick(range(len(self.trials.speeds)), [order.index(p) for p in planes])
 
 
-def read_job(
-    path: str | Path,
-    *,
-    phase: str | None = None,
-    angles: str | None = None,
-    amplitude_error_percent: float | None = None,
-    phase_error_deg: float | None = None,
-    run_error_percent: float | None = None,
-    waveforms: str | Path | None = None,
-) -> Job:
+def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
     """Read a job file (`.toml`) or a workbook (`.xlsx`, sheets runs, weights, planes, sensors, settings).
 
     Parameters
     ----------
     path
         The job; files that it names are found relative to it.
-    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
-        Replace what the job says.
-    waveforms
-        A waveforms file, in place of the runs table.
+    **overrides
+        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent: replace what the job says;
+        waveforms: a waveforms file, in place of the runs table.
 
     Returns
     -------
@@ -243,27 +248,19 @@ def read_job(
     Raises
     ------
     InputError
-        With all problems of all files of the job.
+        With all problems of the job, else with all problems of the files that it names.
     ValueError
         If an argument is none of the allowed values.
     """
-    overrides = Overrides(
-        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
-    )
-    problems = Problems()
-    return job_of(open_job(Path(path), problems), overrides, problems)
+    given, problems = Overrides(**overrides), Problems()
+    return job_of(open_job(Path(path), problems), given, problems)
 
 
 def job_from_files(
     files: Sequence[str | Path],
     *,
     influence: str | Path | None = None,
-    phase: str | None = None,
-    angles: str | None = None,
-    amplitude_error_percent: float | None = None,
-    phase_error_deg: float | None = None,
-    run_error_percent: float | None = None,
-    waveforms: str | Path | None = None,
+    **overrides: Any,  # noqa: ANN401
 ) -> Job:
     """A job without a job file: a runs table with a weights table, or with stored coefficients.
 
@@ -273,11 +270,9 @@ def job_from_files(
         Runs and weights; with `influence` the weights (mounted during the runs) may be left out.
     influence
         Influence table.
-    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
-        Conventions and stated errors; default: lead and with rotation, which the labels then call assumed;
-        none stated.
-    waveforms
-        As of `read_job`.
+    **overrides
+        Conventions, stated errors and waveforms as of `read_job`; default: lead and with rotation, which the
+        labels then call assumed; none stated.
 
     Returns
     -------
@@ -296,26 +291,22 @@ def job_from_files(
             "give a job (.toml or .xlsx), or a runs table and a weights table, or a runs table and "
             f"--influence with an influence table; got {counted(len(files), 'file')}"
         )
-    overrides = Overrides(
-        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent, waveforms
-    )
-    if angles is not None:
-        resolve_angles(angles, None)
     tables: dict[str, Source] = dict(zip(("runs", "weights"), map(Path, files), strict=False))
     if influence is not None:
         tables["influence"] = Path(influence)
-    return job_of(WrittenJob(None, tables=tables), overrides, Problems())
+    return job_of(WrittenJob(None, tables=tables), Overrides(**overrides), Problems())
 
 
 def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job:
     """The job of these settings and tables; raises `InputError` with all problems."""
     settings = written.read(problems)
+    problems.stop()
     tables, records = tables_of(written, settings)
     if overrides.waveforms is not None:
         tables["runs"] = Path(overrides.waveforms)
     # vectors know their sign, so that nothing is assumed: a job that says nothing writes lead
     phase = overrides.phase or settings.phase
-    for key in ("runs", "check", "slow_roll"):
+    for key in READINGS:
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
             from rotorid.files.waveforms import read_vectors_grid
@@ -323,58 +314,43 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
             tables[key], records = grid, (*records, *read)
             overrides = replace(overrides, phase=phase)
-    refused = len(problems) > 0
-    if not refused:
-        _need_rotation(settings, overrides.angles or settings.angles, problems)
-    elif "columns" in written.settings:  # by which the tables would be read
-        problems.stop()
     readings = _readings(settings, tables, overrides, problems)
-    if refused:
-        problems.stop()
-    settings, rotor, model_files = _in_model(settings, written.folder, problems)
+    settings, rotor, model_files = in_model(settings, written.folder, problems)
     readings = problems.need(readings)
-    trials, planes = _planes(settings, readings, rotor, problems)
-    sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
-    limits = _limits(settings, planes, trials, problems)
-    row_weights = _row_weights(settings, sensors, trials, problems)
-    holes = {
-        name: made
-        for k, (name, plane) in enumerate(planes.items())
-        if (made := _holes(plane, k, trials.labels, limits, problems)) is not None
-    }
-    check = _check(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
+    trials, planes = planes_of(settings, readings.trials, readings.influence, rotor, problems)
+    limits = make_limits(settings, planes, trials, problems)
+    weights = row_weights(settings, trials, problems)
+    holes = make_holes(planes, trials.labels, limits, problems)
+    check = check_runs(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
     mounted = tables.get("check_weights")
     if check is not None and mounted is not None:
-        holes = _taken(mounted, check, readings.conventions, holes)
+        holes = with_taken(holes, mounted, check, readings.conventions)
     problems.stop()
-    order = ("runs", "weights", "influence", "", "check", "check_weights", "slow_roll")
-    first, last = ([tables.get(key) for key in part] for part in (order[:3], order[4:]))
-    files = [written.path, *first, *model_files, *last]
-    labels = readings.conventions.labels
-    phasor = settings.key_phasor.angle if settings.key_phasor else 0.0
-    return _with_assumed(
-        Job(
-            trials=trials,
-            influence=readings.influence,
-            conventions=readings.conventions,
-            files=(*(file for file in files if isinstance(file, Path)), *records),
-            planes=planes,
-            sensors=sensors,
-            limits=limits,
-            row_weights=row_weights,
-            check=check,
-            check_mounted=check is not None and mounted is not None,
-            check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
-            rotor=rotor,
-            holes=holes,
-            slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
-            key_phasor=labels.with_rotation(phasor),
-            machine=settings.machine,
-            machine_type=settings.machine_type,
-            date=settings.date,
-            sheet=settings.sheet.model_dump(),
-        )
+    order = ("runs", "weights", "influence"), ("check", "check_weights", "slow_roll")
+    first, last = ([tables.get(key) for key in keys] for keys in order)
+    files = (written.path, *first, *model_files, *last, *records)
+    job = Job(
+        trials=trials,
+        influence=readings.influence,
+        conventions=readings.conventions,
+        files=tuple(file for file in files if isinstance(file, Path)),
+        planes=planes,
+        sensors={name: settings.sensors.get(name, Sensor()) for name in trials.sensors},
+        limits=limits,
+        row_weights=weights,
+        check=check,
+        check_mounted=check is not None and mounted is not None,
+        check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
+        rotor=rotor,
+        holes=holes,
+        slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
+        key_phasor=trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0),
+        machine=settings.machine,
+        machine_type=settings.machine_type,
+        date=settings.date,
+        sheet=settings.sheet.model_dump(),
     )
+    return _with_assumed(job)
 
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
@@ -391,29 +367,9 @@ def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Sou
     return tables, tuple(files)
 
 
-def _need_rotation(settings: JobSettings, angles: str | None, problems: Problems) -> None:
-    """Complain about directions without the rotation that they are seen against."""
-    seen = f"the {settings.view}" if settings.view else ""
-    if angles in ROTATIONS:
-        seen = f"the same end as the angles, which count {angles}"
-    if seen and settings.rotation is None:
-        expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from {seen}"
-        settings.complain(problems, "rotation", expected)
-
-
-class _Readings(NamedTuple):
-    """What the tables of a job say, with its conventions settled and slow roll subtracted."""
-
-    trials: Trials
-    influence: Influence | None
-    conventions: Conventions
-    errors: StatedErrors | None
-    slow_roll: SlowRoll | None
-
-
 def _readings(
     settings: JobSettings, tables: Mapping[str, Source], overrides: Overrides, problems: Problems
-) -> _Readings | None:
+) -> Readings | None:
     """Trial runs and stored coefficients, or None and problems."""
     given = {*tables, *(key for key in (*TABLES, "rotor", "machine_type") if settings.has(key))}
     if "check_weights" in given and "check" not in given:
@@ -428,7 +384,7 @@ def _readings(
     if "runs" not in tables:
         return None
     before = len(problems)
-    errors = overrides.on(settings.errors.stated if settings.errors else None)
+    errors = overrides.on(settings.errors)
     if (overrides.phase or settings.phase) is None:
         overrides = replace(overrides, phase=stated_phase(tables["runs"], settings.columns))
     stored, name = None, ""
@@ -456,7 +412,7 @@ def _readings(
     roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
     if roll is not None:
         trials = subtract_slow_roll(trials, roll)
-    return _Readings(trials, influence, conventions, errors, roll)
+    return Readings(trials, influence, conventions, errors, roll)
 
 
 def conventions_of(
@@ -467,7 +423,7 @@ def conventions_of(
     phase, angles = overrides.phase or settings.phase, overrides.angles or settings.angles
     clock = angles in ROTATIONS and rotation is not None
     if angles is not None:
-        angles = None if rotation is None and angles not in ANGLES else resolve_angles(angles, rotation)
+        angles = resolve_angles(angles, rotation)
     labels = Labels(
         phase=as_phase(phase or stored.get("phase", "lead")),
         angles=as_angles(angles or stored.get("angles", "with rotation")),
@@ -511,336 +467,6 @@ def _notes(conventions: Conventions, stored: Stored | None, name: str) -> tuple[
             f"phase = {stored.said['phase']}, as {name} says"
         )
     return tuple(notes)
-
-
-def _in_model(
-    settings: JobSettings, folder: Path, problems: Problems
-) -> tuple[JobSettings, Rotor | None, tuple[Path, ...]]:
-    """The settings with stations as nodes, the rotor model, and its files."""
-    rotor: Rotor | None = None
-    files: tuple[Path, ...] = ()
-    if settings.rotor is not None:
-        from rotorid.files.rotor import read_rotor, rotor_files
-
-        path = folder / settings.rotor
-        try:
-            rotor, files = read_rotor(path), rotor_files(path)
-        except InputError as error:
-            problems.extend(error.problems)
-            return settings, None, ()
-    placed = {
-        kind: {name: _placed(part, rotor, problems) for name, part in getattr(settings, kind).items()}
-        for kind in ("planes", "sensors")
-    }
-    return settings.model_copy(update=placed), rotor, files
-
-
-def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Plane | Sensor:
-    """A plane or sensor with its station as a node."""
-    key = "node" if part.station is None else "station"
-    if part.node is None and part.station is None:
-        return part
-    if rotor is None:
-        part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
-        return part
-    node = part.node if part.station is None else rotor.stations.get(part.station)
-    if node is None:
-        known = listing(map(repr, rotor.stations), "and") or "none"
-        hint = did_you_mean(str(part.station), rotor.stations)
-        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
-    elif node > rotor.n_nodes:
-        part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
-    return part.model_copy(update={"node": node})
-
-
-def _planes(
-    settings: JobSettings, readings: _Readings, rotor: Rotor | None, problems: Problems
-) -> tuple[Trials, dict[str, Plane]]:
-    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone."""
-    trials, stated = readings.trials, settings.planes
-    own = trials.planes if readings.influence is None else readings.influence.planes
-    every = rotor is None and not own  # or what a type knows
-    more = [name for name, plane in stated.items() if every or plane.node is not None]
-    planes = {name: stated.get(name, Plane()) for name in (*own, *more)}
-    if not own:
-        masses = rotor is None or all(plane.radius is not None for plane in planes.values())
-        unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
-        if rotor is not None:
-            _need_places(settings, trials.sensors, problems)
-        labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
-        trials = replace(trials, labels=labels)
-    if planes:
-        _known(settings, "planes", tuple(planes), problems)
-        if not any(plane.use for plane in planes.values()):
-            expected = "at least one plane without use = false"
-            problems.extend([_without_value(settings, "planes", expected)])
-    _known(settings, "sensors", trials.sensors, problems)
-    # what acts is the unbalance, mass × radius: a mass m at the radius r counts as m r / R at R
-    factors = np.ones(len(trials.planes))
-    if units.weight(trials.labels.weight_unit).kind == "mass":
-        for k, name in enumerate(trials.planes):
-            plane = planes.get(name, Plane())
-            if plane.trial_radius is not None and plane.radius is not None:
-                factors[k] = plane.trial_radius / plane.radius
-            elif plane.trial_radius is not None:
-                expected = "the correction radius too, radius_mm, to which the trial weights are converted"
-                plane.complain(problems, "trial_radius", expected)
-    return replace(trials, weights=trials.weights * factors), planes
-
-
-def _need_places(settings: JobSettings, sensors: Sequence[str], problems: Problems) -> None:
-    """A job without weights and coefficients rests on the model: every sensor and some plane need a node."""
-    if not any(plane.node is not None and plane.use for plane in settings.planes.values()):
-        expected = "a plane with a node of the rotor model ([planes.NAME], node = 3), or a weights table"
-        problems.extend([_without_value(settings, "planes", expected)])
-    for name in sensors:
-        if name not in settings.sensors or settings.sensors[name].node is None:
-            expected = f"a node of the rotor model for sensor {name!r} ([sensors.{name}], node = 3)"
-            problems.extend([_without_value(settings, "sensors", expected)])
-
-
-def _without_value(settings: Settings, key: str, expected: str) -> Problem:
-    return replace(settings.problem(key, expected), value=None)
-
-
-def _known(settings: JobSettings, key: str, known: Sequence[str], problems: Problems) -> None:
-    """Complain about planes or sensors that are in no table."""
-    for name, part in getattr(settings, key).items():
-        if name in known:
-            continue
-        hint = did_you_mean(name, known)
-        expected = f"one of the job's {key}, {listing(known, 'and')}{hint}"
-        if key == "planes":
-            expected += f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
-        problems.extend([replace(part.problem("", expected), value=name)])
-
-
-def _arc(labels: Labels, first: float, last: float, *, opposite: bool) -> Arc:
-    """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
-
-    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
-    is removed a job says where nothing can be taken away; the weight that would have to be added instead
-    stands `opposite`, and so does the arc of the correction.
-    """
-    start = (first if labels.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
-    return math.radians(start % 360.0), math.radians((last - first) % 360.0)
-
-
-def _limits(
-    settings: JobSettings, planes: Mapping[str, Plane], trials: Trials, problems: Problems
-) -> Limits | None:
-    """In SI with the rotation, in the order of speeds, sensors and planes; None: nothing limited."""
-    labels, most = trials.labels, np.full(len(planes), np.inf)
-    own = units.vibration(labels.vibration_unit)
-    for k, plane in enumerate(planes.values()):
-        if plane.max_weight is not None:
-            size = in_job_units(plane.max_weight, labels.weight_unit, plane.radius)
-            if size is None:
-                plane.complain(problems, "max_weight", other_kind("max", labels.weight_unit))
-            else:
-                most[k] = size[0]
-    arcs = tuple(
-        tuple(_arc(labels, *pair, opposite=plane.remove) for pair in plane.forbidden or ())
-        for plane in planes.values()
-    )
-    residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
-    for name, sensor in settings.sensors.items():
-        if name in trials.sensors and sensor.limit is not None:
-            rows = _at_speeds(settings, sensor, "limit", sensor.limit.value, trials, math.inf, problems)
-            unit = sensor.limit.unit if sensor.limit.unit.name else own
-            if unit.kind != own.kind:
-                expected = (
-                    f"an amplitude in {own.name or 'no unit'}, as the readings have, or converting to it"
-                )
-                sensor.complain(problems, "limit", expected)
-            residual[:, trials.sensors.index(name)] = rows / unit.scale
-    limits = Limits(most, residual, arcs)
-    return limits if limits.any else None
-
-
-def _row_weights(
-    settings: JobSettings, sensors: Mapping[str, Sensor], trials: Trials, problems: Problems
-) -> FloatArray | None:
-    """Of each reading, (S, C): that of its speed times that of its sensor; None: all 1."""
-    columns = np.array([sensor.weight for sensor in sensors.values()])
-    rows = _at_speeds(settings, settings, "speed_weights", settings.speed_weights, trials, 1.0, problems)
-    for key, weights in (("sensors", columns), ("speed_weights", rows)):
-        if not weights.any():
-            expected = f"at least one {key.split('_')[0].rstrip('s')} with a weight above 0"
-            problems.extend([_without_value(settings, key, expected)])
-    return None if (columns == 1.0).all() and (rows == 1.0).all() else np.asarray(rows[:, None] * columns)
-
-
-def _at_speeds(
-    settings: JobSettings,
-    part: Settings,
-    key: str,
-    numbers: Mapping[str, float],
-    trials: Trials,
-    default: float,
-    problems: Problems,
-) -> FloatArray:
-    """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    unit = units.SPEED[trials.labels.speed_unit]
-    out = np.full(len(trials.speeds), numbers.get("", default))
-    seen: dict[int, str] = {}
-    for word, number in numbers.items():
-        if not word:
-            continue
-        speed = unit.to_si(parse_number(word, comma="," in word))
-        near = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
-        if near is None:
-            known = show_speeds(trials.speeds, unit)
-            expected = f"speeds of the runs table, not {word}: there are {known}"
-            part.complain(problems, key, expected)
-        elif near in seen:
-            expected = f"each speed once; {seen[near]} and {word} count as one"
-            part.complain(problems, key, expected)
-        else:
-            seen[near] = word
-            out[near] = number
-    return out
-
-
-def _holes(plane: Plane, k: int, labels: Labels, limits: Limits | None, problems: Problems) -> Holes | None:
-    """Holes of a plane, as the job's weights are (kg or kg·m); those inside a forbidden arc are left out.
-
-    Where material is removed a hole drilled at the angle φ acts like a weight added at φ + 180°: `Holes` has
-    the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is the correction.
-    """
-    at = plane.hole_angles()
-    if not at:
-        return None
-    arcs, largest = ((), math.inf) if limits is None else (limits.forbidden[k], float(limits.max_weight[k]))
-    sizes: dict[str, tuple[float, ...]] = {}
-    for field_, quantity in (("available", plane.available), ("step", plane.step)):
-        made = () if quantity is None else in_job_units(quantity, labels.weight_unit, plane.radius)
-        if made is None:
-            expected = other_kind(plane.written(field_), labels.weight_unit)
-            plane.complain(problems, field_, expected)
-            return None
-        sizes[field_] = made
-    turn = 180.0 if plane.remove else 0.0
-    angles = {name: math.radians((labels.with_rotation(angle) + turn) % 360.0) for name, angle in at.items()}
-    taken = {name: plane.taken.get(name, 0.0) / labels.weight_scale for name in at}
-    kept = [name for name, angle in angles.items() if taken[name] > 0 or not _inside(angle, arcs)]
-    key = "holes" if plane.holes is not None else "holes_at"
-    if not any(taken[name] == 0 for name in kept):
-        plane.complain(problems, key, "at least one free hole outside the angles of forbidden_deg")
-        return None
-    try:
-        return from_list(
-            [angles[name] for name in kept],
-            sizes["available"],
-            per_hole=plane.per_hole,
-            step=(sizes["step"] or (0.0,))[0],
-            taken=[taken[name] for name in kept],
-            stock=None if plane.stock is None else np.array(plane.stock),
-            names=kept,
-            max_weight=largest,
-        )
-    except ValueError as error:
-        plane.complain(problems, key, f"holes in which something can be mounted: {error}")
-        return None
-
-
-def _inside(angle: float, arcs: Iterable[Arc]) -> bool:
-    """Whether an angle lies strictly inside one of the arcs; their ends, to within rounding, do not count."""
-    near = math.radians(SAME_DEG)
-    return any(near < (angle - start) % (2 * math.pi) < width - near for start, width in arcs)
-
-
-def _check(
-    tables: Mapping[str, Source],
-    readings: _Readings,
-    trials: Trials,
-    planes: tuple[str, ...],
-    problems: Problems,
-) -> Trials | None:
-    """Check runs, fitted to the speeds, units and names of the job, or None and problems."""
-    runs, weights = tables["check"], tables.get("check_weights")
-    check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
-    if check is None:
-        return None
-    before = len(problems)
-    _check_units(check, trials.labels, runs, weights, problems)
-    for found, known, what, table in (
-        (check.sensors, trials.sensors, "sensor", runs),
-        (check.planes, planes, "plane", runs if weights is None else weights),
-    ):
-        for name in found:
-            if name not in known:
-                expected = (
-                    f"a {what} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
-                )
-                problems.add(source_name(table), None, what, name, expected)
-    tolerance = readings.conventions.speed_tolerance_percent
-    speeds = list(_check_speeds(check, trials, tolerance, source_name(runs), problems))
-    if len(problems) > before:
-        return None
-    shown, mounted = check.planes, check.weights
-    if weights is not None:
-        # all planes of the job: a weights table without rows says that nothing was mounted
-        shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
-        mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(check, speeds=np.array(speeds), labels=trials.labels, planes=shown, weights=mounted)
-    if readings.slow_roll is None:
-        return check
-    check = subtract_slow_roll(check, readings.slow_roll)
-    return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))
-
-
-def _check_speeds(
-    check: Trials, trials: Trials, tolerance_percent: float, source: str, problems: Problems
-) -> Iterator[float]:
-    """The speeds of the job that those of the check runs are."""
-    unit, seen = units.SPEED[check.labels.speed_unit], set[int]()
-    for speed in check.speeds.tolist():
-        near = nearest_speed(trials.speeds, speed, tolerance_percent)
-        if near is None or near in seen:
-            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
-            problems.add(source, None, "speed", show_speed(speed, unit), expected)
-            continue
-        seen.add(near)
-        yield float(trials.speeds[near])
-
-
-def _check_units(
-    check: Trials, ours: Labels, runs: Source, weights: Source | None, problems: Problems
-) -> None:
-    """Complain about what does not convert into the units of the job."""
-    for table, column, name, unit in (
-        (runs, "amplitude", "vibration_unit", units.vibration),
-        (weights, "weight", "weight_unit", units.weight),
-    ):
-        own, other = getattr(ours, name), getattr(check.labels, name)
-        if table is not None and unit(own).kind != unit(other).kind:
-            expected = f"{column}s in {own or 'no unit'}, as the job has, or in a unit that converts to it"
-            problems.add(source_name(table), None, column, other or "no unit", expected)
-
-
-def _taken(
-    weights: Source, check: Trials, conventions: Conventions, holes: Mapping[str, Holes]
-) -> dict[str, Holes]:
-    """The holes with what stands in them since the last check run, where the job does not say what is taken.
-
-    A plane whose weights are not all in its holes, or fill all of them, stays as it is.
-    """
-    read = read_weights(weights, check.runs, conventions, Problems())
-    rows = () if read is None else read.rows
-    out = dict(holes)
-    for plane, free in holes.items():
-        mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
-        if not len(mounted) or free.taken.any():
-            continue
-        unit = np.exp(1j * free.angles)
-        hole = np.argmax((unit.conj() * mounted[:, None]).real, axis=1)
-        taken = np.zeros(len(unit))
-        np.add.at(taken, hole, np.abs(mounted))
-        off = np.abs(mounted - np.abs(mounted) * unit[hole])
-        if (off <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
-            out[plane] = replace(free, taken=taken)
-    return out
 
 
 def _with_assumed(job: Job) -> Job:
@@ -892,27 +518,22 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
     Raises
     ------
     ValueError
-        For a weight that does not convert to those of the job, and one that the holes cannot keep to.
+        For a weight that does not convert to those of the job.
     """
     if not weights and not amplitudes:
         return job
-    trials, own, planes = job.trials, job.trials.labels.weight_unit, list(job.planes)
+    trials, unit, planes = job.trials, job.trials.labels.weight_unit, list(job.planes)
     old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(planes))
     most, residual = old.max_weight.copy(), old.residual.copy()
     for plane, weight in weights.items():
-        size = in_job_units(weight, own, job.planes[plane].radius)
+        size = in_job_units(weight, unit, job.planes[plane].radius)
         if size is None:
             raise ValueError(
-                f"{weight.key}: the weights of the job are in {own}, to which {weight.unit.name} converts "
+                f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
                 f"only with a radius_mm of plane {plane!r} in the job"
             )
         most[planes.index(plane)] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {}
-    for name, its in job.holes.items():
-        try:
-            holes[name] = replace(its, max_weight=float(most[planes.index(name)]))
-        except ValueError as error:
-            raise ValueError(f"{weights[name].key}: plane {name!r}: {error}") from None
+    holes = {p: replace(its, max_weight=float(most[planes.index(p)])) for p, its in job.holes.items()}
     return replace(job, limits=Limits(most, residual, old.forbidden), holes=holes)

@@ -9,19 +9,20 @@ import re
 import tomllib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from balancing import Influence
+from rotorid.base.json import cell
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.tables import LONGEST_TITLE
+from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, Row, Shown, make_grid, read_bytes, show
 from rotorid.files.columns import REMARKS, Source, sheet_source
 from rotorid.files.decimal_numbers import parse_number
-from rotorid.files.excel_pages import Line, Page, book_bytes
+from rotorid.files.excel_pages import keep_cells
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.job_models import READINGS, TABLES, JobSettings, Plane, Sensor
 from rotorid.files.layout import rows_from_header
@@ -70,13 +71,10 @@ class WrittenJob:
     def read(self, problems: Problems) -> JobSettings:
         """All settings; a file that is named in place of a sheet is a problem."""
         source = "" if self.path is None else str(self.path)
-        if not self.tables and self.settings.keys().isdisjoint(TABLES):
+        if not self.tables and "runs" not in self.settings:
             problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
             problems.stop()
-        read = read_settings(JobSettings, self.settings, source, problems, self.where)
-        settings = problems.need(read)
-        if not self.tables and "runs" not in self.settings:
-            settings.complain(problems, "runs", 'the runs table, runs = "runs.csv"')
+        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
         for key in TABLES if self.tables and self.path else ():
             if settings.has(key) and (key in self.tables or key in TABLES[:2]):
                 expected = f"the table in the sheet {key!r} of this workbook, not a file"
@@ -132,7 +130,7 @@ def job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pro
         if grid is not None and name in TABLES:
             job.tables[name] = grid
         elif grid is not None:
-            (_read_settings if name == "settings" else _read_named)(grid, name, job, problems)
+            _read_rows(grid, name, job, problems)
     if "runs" not in titles:
         shown = listing((repr(title) for title in sheets), "and")
         problems.add(str(path), None, None, None, f"a sheet 'runs' with readings; the sheets are {shown}")
@@ -158,51 +156,53 @@ def _value(key: str, cell: Cell) -> Cell | bool:
     return cell
 
 
-def _read_settings(grid: Grid, _: str, job: WrittenJob, problems: Problems) -> None:
-    """Rows of key and value; a dotted key stands for a table (`errors.phase_deg`)."""
-    folded = [name.casefold() for name in grid.header]
-    if [name for name in folded if not _is_remark(name)] not in (["key", "value"], ["setting", "value"]):
+def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
+    """Rows of a setting each, or of a plane or sensor with settings as columns; a blank cell states nothing.
+
+    A dotted key stands for a table (`errors.phase_deg`).
+    """
+    named = sheet in NAMED
+    first = NAMED[sheet][0] if named else "key"
+    heads = [name if named else name.casefold() for name in grid.header]
+    columns = {i: name for i, name in enumerate(heads) if name != first and not _is_remark(name)}
+    if first not in heads or not (named or [*columns.values()] == ["value"]):
         found = listing(filter(None, grid.header), "and")
-        problems.add(grid.source, grid.header_row, None, found, "the columns key and value")
+        expected = f"a column {first}; the columns are {found}" if named else "the columns key and value"
+        problems.add(grid.source, grid.header_row, first, None, expected)
         return
-    at, to = (
-        next(i for i, name in enumerate(folded) if name in pair) for pair in (("key", "setting"), ("value",))
-    )
+    at = heads.index(first)
     for row, cells in grid.rows:
         key = show(cells[at])
-        parts = key_parts(key)
-        name, place = ".".join(parts), (grid.source, row, grid.header[to])
-        value = _value(parts[-1], cells[to])
-        wrong, expected = at, ""
-        if isinstance(cells[at], BadCell) or not key:
-            expected = getattr(cells[at], "expected", "the name of a setting")
-        elif value == "" and OPTIONAL in grid.header:
+        parts = [sheet, key] if named else key_parts(key)
+        name = ".".join(parts)
+        if isinstance(cells[at], BadCell) or not key or name in job.where:
+            again = f"each {first} once (row {job.where[name][1]} has it too)" if name in job.where else ""
+            expected = again or getattr(cells[at], "expected", f"the name of a {first}")
+            problems.add(grid.source, row, grid.header[at], key, expected)
             continue
-        elif isinstance(value, BadCell) or value == "":
-            wrong, expected = to, getattr(value, "expected", f"a value for {key}")
-        elif name in job.where:
-            expected = f"each setting once (row {job.where[name][1]} has it too)"
-        else:
-            job.where[name] = place
-            if not _put(job, parts, value, place):
+        if named:
+            _put(job, parts, {}, (grid.source, row, first))
+        for i, column in columns.items():
+            at_column = [*parts, column] if named else parts
+            value, place = _value(at_column[-1], cells[i]), (grid.source, row, grid.header[i])
+            if isinstance(value, BadCell):
+                problems.add(*place, value.value, value.expected)
+            elif value != "" and not _put(job, at_column, value, place):
                 expected = f"no parts of {name.rpartition('.')[0]}, which has a value of its own"
-        if expected:
-            problems.add(grid.source, row, grid.header[wrong], show(cells[wrong]), expected)
+                problems.add(grid.source, row, grid.header[at], key, expected)
 
 
 def key_parts(key: str) -> list[str]:
     """Parts of a dotted key; as in a job file, one in quotes may hold points itself."""
+    parts = key.split(".")
     if '"' in key or "'" in key:
-        try:
+        with suppress(tomllib.TOMLDecodeError):
             inner: Any = tomllib.loads(f"{key} = 0")
-        except tomllib.TOMLDecodeError:
-            return key.split(".")
-        parts = []
-        while isinstance(inner, dict) and len(inner) == 1:
-            [(part, inner)] = inner.items()
-            parts.append(part)
-        return parts
-    return key.split(".")
+            parts = []
+            while isinstance(inner, dict) and len(inner) == 1:
+                [(part, inner)] = inner.items()
+                parts.append(part)
+    return parts
 
 
 def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str, int, str]) -> bool:
@@ -213,41 +213,9 @@ def _put(job: WrittenJob, parts: Sequence[str], value: object, place: tuple[str,
         inner = inner.setdefault(part, {})
         if not isinstance(inner, dict):
             return False
+    job.where[".".join(parts)] = place
     inner[parts[-1]] = value
     return True
-
-
-def _read_named(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> None:
-    """Rows of one plane or sensor each; a blank cell leaves the setting out."""
-    key = NAMED[sheet][0]
-    if key not in grid.header:
-        expected = f"a column {key}; the columns are {listing(filter(None, grid.header), 'and')}"
-        problems.add(grid.source, grid.header_row, key, None, expected)
-        return
-    at = grid.header.index(key)
-    columns = {i: name for i, name in enumerate(grid.header) if i != at and not _is_remark(name)}
-    for row, cells in grid.rows:
-        item, expected = show(cells[at]), ""
-        name = f"{sheet}.{item}"
-        if isinstance(cells[at], BadCell) or not item:
-            expected = getattr(cells[at], "expected", f"the name of a {key}")
-        elif name in job.where:
-            expected = f"each {key} once (row {job.where[name][1]} has it too)"
-        if expected:
-            problems.add(grid.source, row, key, item, expected)
-            continue
-        job.where[name] = (grid.source, row, key)
-        section = job.settings.setdefault(sheet, {})
-        if not isinstance(section, dict):  # a setting of this name; the job refuses it
-            return
-        section = section.setdefault(item, {})
-        for i, column in columns.items():
-            value = _value(column, cells[i])
-            job.where[f"{name}.{column}"] = (grid.source, row, column)
-            if isinstance(value, BadCell):
-                problems.add(grid.source, row, column, value.value, value.expected)
-            elif value != "":
-                section[column] = value
 
 
 def number_cell(cell: Cell, separator: str, *, comma: bool) -> Cell:
@@ -300,18 +268,7 @@ def template_bytes() -> bytes:
     return Path(__file__).with_name("template.xlsx").read_bytes()
 
 
-class Results(Protocol):
-    """What `rotorid balance` has found."""
-
-    @property
-    def influence(self) -> Influence:
-        """The influence coefficients."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document of `--json`, without its provenance."""
-
-
-def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapping[str, Any]) -> bytes:
+def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[str, Any]) -> bytes:  # noqa: ANN401
     """A workbook with the results of a job, for reading; its sheets of results are not read back.
 
     Parameters
@@ -320,7 +277,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
         What the job was read from: of a workbook all sheets but those of older results are kept, with their
         formats and formulas, without pictures and charts.
     results
-        What was found.
+        What `rotorid balance` has found: its `influence`, and `to_dict`, the document of `--json`.
     provenance
         Program version, input files, date and options.
 
@@ -331,7 +288,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
     """
     from rotorid.files.influence import influence_frame
 
-    own = None
+    book = None
     if len(files) == 1 and is_workbook(files[0]):
         import openpyxl
 
@@ -339,46 +296,50 @@ def job_workbook_bytes(files: Sequence[Path], results: Results, provenance: Mapp
         data = problems.need(read_bytes(files[0], problems))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about parts that are not kept
-            own = openpyxl.load_workbook(io.BytesIO(data))
-        for title in own.sheetnames:
+            book = openpyxl.load_workbook(io.BytesIO(data))
+        for title in book.sheetnames:
             if title.strip().casefold().startswith(RESULTS):
-                del own[title]
-    sheets: dict[str, list[Line]] = {}
+                del book[title]
+        keep_cells(book)
+    sheets: dict[str, list[dict[str, Any]]] = {}
     document = results.to_dict()
-    summary = list(_sorted({**document, "provenance": provenance}, (), sheets))
-    coefficients = influence_frame(results.influence)
-    cells = coefficients.astype(object).where(coefficients.notna(), None).itertuples(index=False)
-    sheets["influence"] = [tuple(coefficients.columns), *(tuple(map(_cell, row)) for row in cells)]
-    notes = [(f"# warning: {text}",) for text in document.get("warnings", ())]
-    lines = {"": [*notes, *sheets.pop("corrections")], "summary": [("result", "value"), *summary], **sheets}
-    head = ("# computed from the other sheets; not read back",)
-    pages = [Page(f"{RESULTS} {name}".strip()[:LONGEST_TITLE], [head, *rows]) for name, rows in lines.items()]
-    return book_bytes(pages, RESULTS, own)
+    single = [*_single({**document, "provenance": provenance}, (), sheets)]
+    frame = influence_frame(results.influence)
+    tables: dict[str, Any] = {
+        "": sheets.pop("corrections"),
+        "summary": single,
+        **sheets,
+        "influence": frame.to_dict("records"),
+    }
+    warned = "".join(f"\nwarning: {text}" for text in document.get("warnings", ()))
+    return excel(*(_table(name, rows, "" if name else warned) for name, rows in tables.items()), book=book)
 
 
-def _sorted(
-    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[Line]]
-) -> Iterator[Line]:
-    """Single values of a document by their dotted names, and lists of words; of tables `sheets` are made."""
+def _table(name: str, rows: Sequence[Mapping[str, Any]], more: str) -> Table:
+    """Of lists, such as covariances, a sheet has nothing: they are left to `--json`."""
+    heads = [head for head, value in rows[0].items() if not isinstance(value, (list, Mapping))]
+    columns = (Column(head, [_cell(row.get(head)) for row in rows]) for head in heads)
+    return Table(
+        f"{RESULTS} {name}".strip(), tuple(columns), f"computed from the other sheets; not read back{more}"
+    )
+
+
+def _single(
+    document: Mapping[str, Any], above: tuple[str, ...], sheets: dict[str, list[dict[str, Any]]]
+) -> Iterator[dict[str, Any]]:
+    """Single values of a document by their dotted names, and lists of words; its tables go to `sheets`."""
     for key, value in document.items():
         name = (*above, key)
         if isinstance(value, Mapping):
-            yield from _sorted(value, name, sheets)
+            yield from _single(value, name, sheets)
         elif not isinstance(value, list) or any(not isinstance(one, Mapping) for one in value):
             values = value if isinstance(value, list) else [value]
-            yield from ((".".join(name), _cell(one)) for one in values if one is not None)
+            yield from ({"result": ".".join(name), "value": one} for one in values if one is not None)
         elif value:
-            # lists in it, such as covariances, are left to `--json`
-            heads = [head for head, one in value[0].items() if not isinstance(one, (list, Mapping))]
-            rows = [tuple(_cell(row.get(head)) for head in heads) for row in value]
-            sheets[" ".join(name).replace("_", " ")] = [tuple(heads), *rows]
+            sheets[" ".join(name).replace("_", " ")] = value
 
 
-def _cell(value: Any) -> Cell:  # noqa: ANN401  what a table or a document holds
-    item = getattr(value, "item", None)
-    value = item() if callable(item) else value
-    if value is None:
-        return ""
+def _cell(value: Any) -> Value:  # noqa: ANN401  what a table or a document holds
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return value if isinstance(value, (int, float)) and math.isfinite(value) else str(value)
+    return str(value) if isinstance(value, (list, Mapping)) else cell(value)

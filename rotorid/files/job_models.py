@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from math import radians
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from rotorid.base.suggestions import did_you_mean
+from balancing import Placement, ReadingErrors, RunScatter, Trials
+from rotorid.base.text import listing
 from rotorid.base.words import Angles, Phase, Rotation, View
 from rotorid.files import units
-from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, StatedErrors
-from rotorid.files.decimal_numbers import NotANumber, parse_number
+from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
 from rotorid.files.settings import (
     Date,
     Label,
@@ -77,54 +78,16 @@ def _pairs(value: object) -> object:
     return [value] if flat and value else value
 
 
-def _free(arcs: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _different(arcs: tuple[Pair, ...]) -> tuple[Pair, ...]:
     if any((last - first) % 360.0 == 0.0 for first, last in arcs):
         raise ValueError("different angles (use = false leaves a plane out)")
-    if covers_circle(arcs):
-        raise ValueError("arcs that leave some angle free; use = false leaves a plane out")
     return arcs
-
-
-def covers_circle(pairs: Iterable[tuple[float, float]]) -> bool:
-    """Whether arcs (degrees, from → to) together leave no arc of the circle free."""
-    pairs = list(pairs)
-    edges = sorted({angle % 360.0 for pair in pairs for angle in pair})
-    for edge, following in zip(edges, [*edges[1:], edges[0] + 360.0], strict=True):
-        middle = (edge + following) / 2
-        if not any((middle - first) % 360.0 < (last - first) % 360.0 for first, last in pairs):
-            return False
-    return True
-
-
-def _ascending(degrees: tuple[float, ...]) -> tuple[float, ...]:
-    """Listed angles of holes: different, ascending (holes are numbered in this order), within one turn."""
-    steps = [after - before for before, after in pairwise(degrees)]
-    last = 360.0 - (degrees[-1] - degrees[0]) if steps else 360.0
-    if len(degrees) > MOST_HOLES or abs(degrees[0]) > 360.0 or min((*steps, last)) < SAME_DEG:
-        raise ValueError(
-            f"different angles in ascending order within one turn, at most {MOST_HOLES}; a list may begin "
-            "below zero, [-30, 0, 30], and hole_names gives holes other names"
-        )
-    return degrees
-
-
-def _by_speed(value: object) -> object:
-    """A table of numbers by speed, or a text of one."""
-    value = entries(value)
-    for speed in value if isinstance(value, dict) else ():
-        try:
-            good = parse_number(speed, comma="," in speed) > 0
-        except NotANumber:
-            good = False
-        if not good:
-            raise ValueError(f"speeds above 0, not {speed!r}")
-    return value
 
 
 def _or_one(value: object) -> object:
     """A number for all speeds, at the speed ""."""
     alone = not isinstance(value, dict) and ":" not in str(value)
-    return {"": value} if alone else _by_speed(value)
+    return {"": value} if alone else entries(value)
 
 
 def _kind(value: object) -> str:
@@ -136,7 +99,7 @@ _LIMITS = Annotated[dict[str, Positive], Field(min_length=1)]
 Arcs = Annotated[
     tuple[Pair, ...],
     BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | str),
-    AfterValidator(_free),
+    AfterValidator(_different),
     Field(min_length=1),
 ]
 Limits = Annotated[
@@ -146,7 +109,7 @@ Limits = Annotated[
 ]
 SpeedWeights = Annotated[
     dict[str, NotNegative],
-    BeforeValidator(_by_speed, json_schema_input_type=_NUMBERS | str),
+    BeforeValidator(entries, json_schema_input_type=_NUMBERS | str),
     Field(min_length=1),
 ]
 Weight = Annotated[Quantity, of(Positive)]
@@ -196,10 +159,10 @@ class Plane(_Placed):
     remove: bool = key(
         "whether material is taken away (drilled, ground) instead of added", default=False, example="false"
     )
-    forbidden: Arcs | None = key(
+    forbidden: Arcs = key(
         "arcs from … to … where nothing may be mounted",
         "forbidden_deg",
-        None,
+        (),
         expected=f"{_ARCS}, in a sheet 20-60; 300-340",
         example="[[20, 60], [300, 340]]",
     )
@@ -209,7 +172,7 @@ class Plane(_Placed):
         expected=f"the number of holes, equally spaced, a whole number from 1 to {MOST_HOLES}",
     )
     first_hole: Turn = key("angle of the first of them, default 0", "first_hole_deg", 0.0)
-    holes_at: listed(Number, _ascending) | None = key(  # type: ignore[valid-type]
+    holes_at: listed(Number) | None = key(  # type: ignore[valid-type]
         "or the angles of the holes",
         "holes_deg",
         None,
@@ -262,7 +225,7 @@ class Plane(_Placed):
             return
         if self.has("first_hole") and self.holes is None:
             yield "first_hole", "the number of equally spaced holes too, holes = 12"
-        names, sizes = tuple(self.hole_angles()), () if self.available is None else self.available.value
+        names = tuple(self.hole_angles())
         about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
         if not names:
             wanted = "the holes of the plane too, holes = 12 or holes_deg = [0, 30, 75]"
@@ -270,36 +233,12 @@ class Plane(_Placed):
             return
         count = self.holes or len(self.holes_at or ())
         if self.hole_names is not None and len(set(self.hole_names)) != count:
-            yield (
-                "hole_names",
-                f"a different name for each of the {count} holes",
-            )
+            yield "hole_names", f"a different name for each of the {count} holes"
             return
-        yield from self._wrong_weights(names, sizes)
-
-    def _wrong_weights(self, names: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[tuple[str, str]]:
-        if self.step is not None and sizes:
-            yield "step", f"either {self.written('available')}, single weights, or steps of any size"
-        if not sizes:
-            yield from (
-                (one, "the weights that are available too, available_g = [5, 10]")
-                for one in ("per_hole", "stock")
-                if self.has(one)
-            )
-        for name in self.taken:
-            if name not in names:
-                yield (
-                    "taken",
-                    f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}{did_you_mean(name, names)}",
-                )
-        if len(set(sizes)) < len(sizes):
-            yield "available", "each weight once (stock says how many of each there are)"
-        if all(name in self.taken for name in names):
-            yield "taken", "at least one hole that is free"
-        if sizes and self.stock and len(self.stock) != len(sizes):
-            yield "stock", f"one number for each of the {len(sizes)} available weights, not {len(self.stock)}"
-        elif self.stock and not any(self.stock):
-            yield "stock", "at least one weight"
+        if self.has("per_hole") and self.available is None:
+            yield "per_hole", "the weights that are available too, available_g = [5, 10]"
+        for name in self.taken.keys() - names:
+            yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
 
 
 class Sensor(_Placed):
@@ -343,10 +282,20 @@ class Errors(Settings):
         "how far readings drift from the first run to the last, percent", default=None
     )
 
-    @property
-    def stated(self) -> StatedErrors:
-        """What is written, with what is not left to `StatedErrors`."""
-        return StatedErrors(**{name: value for name, value in self if value is not None})
+    def stated_in(self, trials: Trials) -> Trials:
+        """The runs with these errors: relative, in rad, and in the unit of the readings inside."""
+        scale, reading, between = trials.labels.vibration_scale, None, None
+        if self.amplitude_percent or self.phase_deg or self.floor:
+            reading = ReadingErrors(
+                (self.amplitude_percent or 0.0) / 100.0,
+                radians(self.phase_deg or 0.0),
+                (self.floor or 0.0) / scale,
+            )
+        if self.run_percent is not None or self.run_floor is not None:
+            between = RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / scale)
+        placement = Placement((self.placement_percent or 0.0) / 100.0, radians(self.placement_deg or 0.0))
+        drift = (self.drift_percent or 0.0) / 100.0
+        return replace(trials, errors=reading, run_errors=between, placement=placement, drift=drift)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Nothing above 0."""
@@ -483,3 +432,8 @@ class JobSettings(Settings):
     machine_type: Label = key("its type, for the same", default="")
     date: Date | None = key("when it was balanced, for the same", default=None, example="2026-03-17")
     sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
+
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """A direction without the rotation that is seen against it."""
+        if self.rotation is None and (self.view or self.angles in ROTATIONS):
+            yield "rotation", f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end"

@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,14 @@ from rotorid.files.conventions import (
     Angles,
     Conventions,
     Phase,
-    StatedErrors,
 )
 from rotorid.files.layout import joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
+
+if TYPE_CHECKING:
+    from rotorid.files.job_models import Errors
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
@@ -83,7 +85,7 @@ def read_trials(
     phase: Phase | None = None,
     angles: Angles | None = None,
     speed_tolerance_percent: float = DEFAULT_TOLERANCE,
-    errors: StatedErrors | ReadingErrors | None = None,
+    errors: Errors | ReadingErrors | None = None,
 ) -> Trials:
     """Read a runs table and a weights table.
 
@@ -131,7 +133,7 @@ def make_trials(
     runs: Source,
     weights: Source | None,
     conventions: Conventions,
-    errors: StatedErrors | ReadingErrors | None,
+    errors: Errors | ReadingErrors | None,
     problems: Problems,
 ) -> Trials | None:
     """Put both tables together, or None and problems."""
@@ -139,10 +141,10 @@ def make_trials(
     mounted = None if weights is None else read_weights(weights, names, conventions, problems)
     if trials is None or (mounted is None and weights is not None) or len(problems):
         return None
-    if isinstance(errors, StatedErrors):
-        trials = errors.stated_in(trials)
-    elif errors is not None:
+    if isinstance(errors, ReadingErrors):
         trials = replace(trials, errors=errors)
+    elif errors is not None:
+        trials = errors.stated_in(trials)
     if mounted is None:
         return trials
     labels = replace(trials.labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)

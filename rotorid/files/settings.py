@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, Any, TypeVar
@@ -107,15 +106,12 @@ class Key:
         return out
 
     def read(self, name: str, value: object) -> object:
-        """A value at a name of this key: with its unit, or what is wrong with that, where it has one."""
+        """A value at a name of this key, with its unit where it has one; `UnitError` for another."""
         if self.units is None:
             return value
         if not callable(self.units):
             return Quantity(name, value, self.variants[name])
-        try:
-            return Quantity(name, value, self.units(name[len(self.names[0]) + 1 :]))
-        except UnitError as error:
-            return Quantity(name, value, Unit("", ""), str(error))
+        return Quantity(name, value, self.units(name[len(self.names[0]) + 1 :]))
 
 
 def key(
@@ -161,57 +157,33 @@ def key(
     )
 
 
-@dataclass(eq=False)
-class _Table:
-    """A table as it is written: its dotted name, keys and values, and each key by its usual name.
-
-    `where` is sheet, row and column of each setting of a workbook by its dotted name.
-    """
+@dataclass(frozen=True)
+class _File:
+    """A file of settings: the dotted name of each table in it, by identity, and the cells of a workbook."""
 
     source: str = ""
     where: Where = field(default_factory=dict)
-    name: str = ""
-    data: dict[str, Any] = field(default_factory=dict)
-    model: type[Settings] | None = None
-    written: dict[str, str] = field(default_factory=dict)
-
-    def __eq__(self, other: object) -> bool:
-        """Where settings stand makes no difference."""
-        return isinstance(other, _Table)
-
-    def problem(self, key: str, expected: str, value: object = None) -> Problem:
-        dotted = at = f"{self.name}.{key}".strip(".")
-        while at and at not in self.where:
-            at = at.rpartition(".")[0]
-        source, row, column = self.where.get(at, (self.source, None, dotted or None))
-        shown = str(value).lower() if isinstance(value, bool) else str(value)
-        shown = "a table" if isinstance(value, dict) else shown
-        return Problem(source, row, column, None if value is None else shown, expected)
-
-    def key(self, field: str) -> str:
-        """The key of a field as it is written, or would be."""
-        alias = (self.model.model_fields[field].alias if self.model and field else None) or field
-        return self.written.get(alias, alias)
+    names: Mapping[int, str] = field(default_factory=dict)
 
 
-def _tables(node: object, table: _Table) -> dict[int, _Table]:
-    """All tables in one, by their identity; its fields are those of the first."""
-    out = {}
+def _table_names(node: object, name: str = "") -> dict[int, str]:
+    inside: Iterable[tuple[str, object]] = ()
     if isinstance(node, dict):
-        out[id(node)] = replace(table, data=node, written={})
-        for name, value in node.items():
-            out |= _tables(value, replace(table, name=f"{table.name}.{name}".strip(".")))
+        inside = ((f"{name}.{key}".strip("."), value) for key, value in node.items())
     elif isinstance(node, list):
-        for number, value in enumerate(node, start=1):
-            out |= _tables(value, replace(table, name=f"{table.name}[{number}]"))
+        inside = ((f"{name}[{number}]", value) for number, value in enumerate(node, start=1))
+    out = {id(node): name} if inside else {}
+    for inner, value in inside:
+        out |= _table_names(value, inner)
     return out
 
 
-class _DoNotFit(ValueError):
-    """Fields that do not fit together, each with what is expected."""
+class _Wrong(ValueError):
+    """What is wrong with a table and those in it."""
 
-    def __init__(self, table: _Table, wrong: tuple[tuple[str, str], ...]) -> None:
-        self.table, self.wrong = table, wrong
+    def __init__(self, problems: list[Problem]) -> None:
+        super().__init__(*problems)
+        self.problems = problems
 
 
 class Settings(BaseModel):
@@ -220,7 +192,15 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True, allow_inf_nan=False
     )
-    _table: _Table = PrivateAttr(default_factory=_Table)
+    _file: _File = PrivateAttr(default_factory=_File)
+    _name: str = PrivateAttr("")
+    _data: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _keys: dict[str, str] = PrivateAttr(default_factory=dict)
+    """Each key as it is written, by its usual name."""
+
+    def __eq__(self, other: object) -> bool:
+        """Where settings stand makes no difference."""
+        return type(self) is type(other) and self.__dict__ == getattr(other, "__dict__", None)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Fields that are right by themselves and do not fit together, each with what is expected.
@@ -232,7 +212,9 @@ class Settings(BaseModel):
     def problem(self, field: str, expected: str) -> Problem:
         """A problem with a field: file, row, key as written, its value, what is expected."""
         key = self.written(field)
-        return self._table.problem(key, expected, self._table.data.get(key))
+        value = self._data.get(key)
+        value = None if isinstance(value, dict) else value
+        return _problem(self._file, f"{self._name}.{key}".strip("."), expected, value)
 
     def complain(self, problems: Problems, field: str, expected: str) -> None:
         """Note a problem with a field."""
@@ -240,11 +222,12 @@ class Settings(BaseModel):
 
     def written(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
-        return self._table.key(field) or field
+        alias = (type(self).model_fields[field].alias if field else None) or field
+        return self._keys.get(alias, alias)
 
     def has(self, field: str) -> bool:
         """Whether a field is written."""
-        return self.written(field) in self._table.data
+        return field in self.model_fields_set
 
     @classmethod
     @cache
@@ -272,34 +255,78 @@ class Settings(BaseModel):
     def _read(cls, data: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
         if not isinstance(data, dict):
             return handler(data)
-        table = (info.context or {}).get(id(data)) or _Table(data=data)
-        table.model, values = cls, dict[str, Any]()
-        for name, value in data.items():
-            usual = cls.usual(name)
-            key = cls.known_keys().get(usual)
-            read = value if key is None else key.read(name, value)
-            if usual in values and isinstance(read, Quantity):
-                read = replace(read, wrong=f"one key of them; {table.written[usual]} says it already")
-            values[usual], table.written[usual] = read, name
-        made = handler(values)
-        made._table = table
-        if wrong := tuple(made.wrong()):
-            raise _DoNotFit(table, wrong)
+        file = info.context or _File()
+        name, values, keys = file.names.get(id(data), ""), dict[str, Any](), dict[str, str]()
+        problems = list[Problem]()
+        for key, value in data.items():
+            usual, about = cls.usual(key), cls.known_keys().get(cls.usual(key), Key())
+            try:
+                if usual in keys:
+                    raise UnitError(f"one key of them; {keys[usual]} says it already")
+                values[usual] = about.read(key, value)
+            except UnitError as error:
+                problems.append(_problem(file, f"{name}.{key}".strip("."), str(error), value))
+            keys.setdefault(usual, key)
+        try:
+            made = handler(values)
+        except ValidationError as error:
+            for one in error.errors(include_url=False):
+                problems += cls._problems(one, file, name, data, keys)
+        if problems:
+            raise _Wrong(problems)
+        made._file, made._name, made._data, made._keys = file, name, data, keys
+        if wrong := [made.problem(*one) for one in made.wrong()]:
+            raise _Wrong(wrong)
         return made
+
+    @classmethod
+    def _problems(
+        cls, error: ErrorDetails, file: _File, table: str, data: dict[str, Any], keys: dict[str, str]
+    ) -> list[Problem]:
+        """What pydantic found wrong with a field, or with something in it, in our words."""
+        inner = error.get("ctx", {}).get("error")
+        if isinstance(inner, _Wrong):
+            return inner.problems
+        usual, *steps = error["loc"]
+        about, kind = cls.known_keys().get(str(usual), Key()), error["type"]
+        if kind == "missing":
+            if usual in keys:  # with a unit that is none
+                return []
+            expected = about.expected or f"a value: {about.about}"
+            return [_problem(file, f"{table}.{usual}".strip("."), expected)]
+        name, node = f"{table}.{keys[str(usual)]}".strip("."), data[keys[str(usual)]]
+        for step in steps:  # of lists, and of texts and unions, there are no names
+            if isinstance(node, dict) and step in node:
+                name, node = f"{name}.{step}", node[str(step)]
+        value = error["input"].value if isinstance(error["input"], Quantity) else error["input"]
+        if kind == "extra_forbidden":
+            known = [one for key in cls.known_keys().values() for one in key.names]
+            near = did_you_mean(str(usual), known)
+            expected = f"a known key{near}; known are {listing(known, 'and') or 'none yet'}"
+            # nothing is printed of a file of something else
+            return [_problem(file, name, expected, value if table or near or len(keys) > 1 else None)]
+        if kind == "value_error":
+            words = str(inner)
+        else:
+            words = next((words for begin, words in _WORDS.items() if kind.startswith(begin)), error["msg"])
+            words = words.format(**error.get("ctx", {}), name=name)
+        if kind == "literal_error":
+            words += did_you_mean(str(value), re.findall(r"'([^']*)'", words))
+        if about.expected not in words:
+            words += f": {about.expected}"
+        return [_problem(file, name, words, value)]
 
     @field_validator("*", mode="wrap")
     @classmethod
     def _in_si(cls, value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
-        if not isinstance(value, Quantity):
+        if not isinstance(value, Quantity) or "Quantity" in repr(
+            cls.model_fields[str(info.field_name)].annotation
+        ):
             return handler(value)
-        if value.wrong:
-            raise ValueError(value.wrong)
-        if "Quantity" in repr(cls.model_fields[str(info.field_name)].annotation):
-            return handler(value)
-        read, unit = handler(value.value), value.unit
+        read = handler(value.value)
         if isinstance(read, tuple):
-            return tuple(map(unit.to_si, read))
-        return unit.to_si(read) if isinstance(read, (int, float)) else read
+            return tuple(map(value.unit.to_si, read))
+        return value.unit.to_si(read) if isinstance(read, (int, float)) else read
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -344,75 +371,25 @@ def read_settings(
 
     Returns
     -------
-    The model; keys with a problem are left out of it, so that reading can go on and find more. None where
-    that leaves nothing. A caller that needs it right stops at `problems`.
+    The model, or None where there are problems.
     """
-    kept, first = _copy(data), True
-    while True:
-        tables = _tables(kept, _Table(source, where or {}))
-        try:
-            return model.model_validate(kept, context=tables)
-        except ValidationError as error:
-            errors = [_problems(one, tables, kept) for one in error.errors(include_url=False)]
-        if first:
-            problems.extend(problem for _, more in errors for problem in more)
-        first = False
-        if [table.pop(key) for wrong, _ in errors for table, key in wrong if key in table] == []:
-            return None
+    tables = dict(data)
+    try:
+        return model.model_validate(tables, context=_File(source, where or {}, _table_names(tables)))
+    except ValidationError as error:
+        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].problems)
+    return None
 
 
-def _problems(
-    error: ErrorDetails,
-    tables: dict[int, _Table],
-    node: Any,  # noqa: ANN401
-) -> tuple[list[tuple[dict[str, Any], str]], list[Problem]]:
-    """The keys that are wrong, each with the table that holds it, and the problems in our words."""
-    trail: list[tuple[_Table, str, Key]] = []
-    for step in error["loc"]:
-        table = tables.get(id(node), _Table())
-        name = table.written.get(str(step), step)
-        if name in table.data or (error["type"] == "missing" and table.model):
-            known = {str(step): trail[-1][2]} if table.model is None else table.model.known_keys()
-            trail.append((table, str(name), known.get(str(step), Key())))
-        with suppress(LookupError, TypeError):  # a text that stands for a list, the name of a union's member
-            node = node[name]
-    wrong = error.get("ctx", {}).get("error")
-    if isinstance(wrong, _DoNotFit):
-        table = wrong.table
-        fields = [(table.key(field), expected) for field, expected in wrong.wrong]
-        more = [table.problem(key, expected, table.data.get(key)) for key, expected in fields]
-        gone = [(table.data, key) for key, _ in fields if key in table.data]
-        return gone or [(outer.data, key) for outer, key, _ in trail[-1:]], more
-    table, name, key = trail[-1]
-    if error["type"] == "missing":
-        problem = table.problem(name, key.expected or f"a value: {key.about}")
-        return [(outer.data, inner) for outer, inner, _ in trail[-2:-1]], [problem]
-    expected, value = _expected(error, table, name, key), error["input"]
-    value = value.value if isinstance(value, Quantity) else value
-    if error["type"] == "extra_forbidden" and not (table.name or len(table.written) > 1 or "(" in expected):
-        value = None  # nothing is printed of a file of something else
-    return [(table.data, name)], [table.problem(name, expected, value)]
-
-
-def _expected(error: ErrorDetails, table: _Table, name: str, key: Key) -> str:
-    kind = error["type"]
-    if kind == "extra_forbidden" and table.model is not None:
-        known = [one for key in table.model.known_keys().values() for one in key.names]
-        return f"a known key{did_you_mean(name, known)}; known are {listing(known, 'and') or 'none yet'}"
-    if kind == "value_error":
-        words = str(error["ctx"]["error"])
-    else:
-        words = next((words for begin, words in _WORDS.items() if kind.startswith(begin)), error["msg"])
-        words = words.format(**error.get("ctx", {}), name=f"{table.name}.{name}".strip("."))
-    if kind == "literal_error":
-        words += did_you_mean(str(error["input"]), re.findall(r"'([^']*)'", words))
-    return f"{words}: {key.expected}" if key.expected and key.expected not in words else words
-
-
-def _copy(node: Any) -> Any:  # noqa: ANN401
-    if isinstance(node, Mapping):
-        return {name: _copy(value) for name, value in node.items()}
-    return [_copy(value) for value in node] if isinstance(node, list) else node
+def _problem(file: _File, name: str, expected: str, value: object = None) -> Problem:
+    """A problem with the key of this dotted name, in the cell of it or of the table that holds it."""
+    at = name
+    while at and at not in file.where:
+        at = at.rpartition(".")[0]
+    source, row, column = file.where.get(at, (file.source, None, name or None))
+    shown = "a table" if isinstance(value, dict) else str(value)
+    shown = shown.lower() if isinstance(value, bool) else shown
+    return Problem(source, row, column, None if value is None else shown, expected)
 
 
 def _plain(value: object) -> object:

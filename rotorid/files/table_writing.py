@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base import logs
-from rotorid.base.tables import Value, csv_bytes, one_line
-from rotorid.files.excel_pages import Page, book_bytes
+from rotorid.base.tables import Column, Table, Value, csv_bytes, excel
 from rotorid.files.problems import InputError, Problem
 
 if TYPE_CHECKING:
@@ -51,9 +50,8 @@ def table_bytes(path: str | Path, frame: pd.DataFrame, *, sheet: str = "table") 
     if kind == ".csv":
         return csv_bytes((), names, rows)
     if kind == ".xlsx":
-        lines: list[list[Value]] = [[*names], *rows]
-        page = [tuple(one_line(c) if isinstance(c, str) else c for c in line) for line in lines]
-        return book_bytes([Page(sheet, page)], sheet)
+        columns = (Column(name, [row[k] for row in rows]) for k, name in enumerate(names))
+        return excel(Table(sheet, tuple(columns)))
     raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 
 

@@ -49,8 +49,6 @@ class Quantity:
     key: str
     value: Any
     unit: Unit
-    wrong: str = ""
-    """What is expected of the unit where it is none."""
 
     @property
     def si(self) -> float:

@@ -30,12 +30,3 @@ def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[flo
     if radius is None:
         return None
     return tuple(size * radius if wanted == "unbalance" else size / radius for size in sizes)
-
-
-def other_kind(key: str, unit: str) -> str:
-    """What is expected of a weight that does not convert to this unit."""
-    stem = key.partition("_")[0]
-    names = (f"{stem}_g", f"{stem}_g_mm") if stem != "max" else ("max_mass_g", "max_unbalance_g_mm")
-    mass = units.weight(unit).kind == "mass"
-    name, are = (names[0], "masses") if mass else (names[1], "unbalances (mass × radius)")
-    return f"{name}, because the weights of the job are {are}, or radius_mm too, to convert"

@@ -140,9 +140,9 @@ class Outcome(Answered):
             return build(path)
         if path.suffix.lower() != ".xlsx":
             return csv(self.table())
-        from rotorid.files.excel_pages import tables_bytes
+        from rotorid.base.tables import excel
 
-        return tables_bytes(self.table())
+        return excel(self.table())
 
     def figure(self) -> Figure:
         """The main picture; ValueError where there is none."""

@@ -12,13 +12,13 @@ from rotorid.base.lazy_names import lazy_names
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions as Conventions
-    from rotorid.files.conventions import StatedErrors as StatedErrors
     from rotorid.files.influence import influence_frame as influence_frame
     from rotorid.files.influence import read_influence as read_influence
     from rotorid.files.influence import write_influence as write_influence
     from rotorid.files.job import Job as Job
     from rotorid.files.job import job_from_files as job_from_files
     from rotorid.files.job import read_job as read_job
+    from rotorid.files.job_models import Errors as Errors
     from rotorid.files.measurements import read_measurements as read_measurements
     from rotorid.files.model import HarmonicFile as HarmonicFile
     from rotorid.files.model import read_harmonic_model as read_harmonic_model
@@ -65,7 +65,7 @@ _HOME = {
     "read_influence": ".files.influence",
     "write_influence": ".files.influence",
     "Conventions": ".files.conventions",
-    "StatedErrors": ".files.conventions",
+    "Errors": ".files.job_models",
     "read_trials": ".files.runs",
 }
 

@@ -151,12 +151,11 @@ def runs_so_far(job: Path) -> RunsSoFar:
     if grid is None or table is None:
         problems.stop()
         return RunsSoFar(None, (), ())
-    stated = None if settings.errors is None else settings.errors.stated
     slow = sources.get("slow_roll", settings.slow_roll)
 
     def read(rows: Sequence[int]) -> Trials | None:
         part = replace(grid, rows=tuple(grid.rows[i] for i in rows))
-        trials = make_trials(part, None, conventions, stated, Problems())
+        trials = make_trials(part, None, conventions, settings.errors, Problems())
         if trials is None:
             return None
         trials = replace(trials, labels=conventions.on(trials.labels))

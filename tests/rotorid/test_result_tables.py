@@ -8,8 +8,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from rotorid.base.tables import Column, Table, csv, frame, html, terminal
-from rotorid.files.excel_pages import tables_bytes
+from rotorid.base.tables import Column, Table, csv, excel, frame, html, terminal
 
 SPEEDS = Table(
     "critical speeds",
@@ -43,7 +42,7 @@ def test_csv_keeps_all_digits_and_no_cell_is_a_formula():
 
 
 def test_a_workbook_has_a_sheet_for_each_table_and_no_formula():
-    book = openpyxl.load_workbook(io.BytesIO(tables_bytes(SPEEDS, Table("shapes", (Column("node", [1]),)))))
+    book = openpyxl.load_workbook(io.BytesIO(excel(SPEEDS, Table("shapes", (Column("node", [1]),)))))
     assert book.sheetnames == ["critical speeds", "shapes"]
     rows = list(book["critical speeds"].iter_rows(values_only=True))
     assert rows[0][0] == "# without damping"

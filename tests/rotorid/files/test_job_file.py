@@ -207,8 +207,9 @@ def test_errors_that_are_all_zero(job):
 def test_problems_of_all_files_at_once(job, folder):
     write_csv(folder / "runs.csv", replaced(RUNS, 2, "phase_deg", "x"))
     write_csv(folder / "weights.csv", replaced(WEIGHTS, 2, "mass_g", 0))
-    found = complaints(job, JOB.replace('phase = "lag"', 'phase = "lagg"'))
-    assert [p.file.rpartition("/")[2] for p in found] == ["job.toml", "runs.csv", "weights.csv"]
+    assert [p.file.rpartition("/")[2] for p in complaints(job)] == ["runs.csv", "weights.csv"]
+    found = complaints(job, JOB.replace('phase = "lag"', 'phase = "lagg"').replace("= 3", '= "x"'))
+    assert [p.column for p in found] == ["phase", "errors.phase_deg"]
 
 
 def test_missing_files_of_a_job(job, folder):
@@ -226,9 +227,8 @@ BAD_SETTINGS = [
     (2, "key", "phas", "lag", "did you mean 'phase'?"),
     (5, "key", "errors.amplitude", "2", "did you mean 'amplitude_percent'?"),
     (5, "value", -2, "-2", "0 or more"),
-    (5, "value", None, "", "a value for errors.amplitude_percent"),
-    (5, "key", None, "", "the name of a setting"),
-    (5, "key", "phase", "phase", "each setting once (row 2 has it too)"),
+    (5, "key", None, "", "the name of a key"),
+    (5, "key", "phase", "phase", "each key once (row 2 has it too)"),
     (5, "key", "phase.x", "phase.x", "no parts of phase"),
     (5, "key", "planes.1.holes_deg.x", "a table", "a number: angles of the holes"),
     (5, "key", "runs", "2", "a text in quotes"),
@@ -248,7 +248,7 @@ def test_bad_sheets_of_a_workbook(book, tmp_path):
         complaints(book, weightss=[["x"]]), "job.xlsx", None, None, "weightss", "did you mean 'weights'?"
     )
     found = complaints(book, settings=[["a", "b"], [1, 2]])
-    the_only(found, "job.xlsx", 1, None, "a and b", "the columns key and value")
+    the_only(found, "job.xlsx", 1, "key", None, "the columns key and value")
     found = complaints(book, planes=[["plane", "available_g"], ["1", 20]])
     the_only(found, "job.xlsx", 2, "available_g", "20", "the holes of the plane too")
     found = complaints(book, planes=[["plane"], ["1"], ["1"]])
@@ -259,4 +259,4 @@ def test_bad_sheets_of_a_workbook(book, tmp_path):
     path = write_book(tmp_path / "none.xlsx", {"weights": WEIGHTS})
     the_only(complaints(read_job, path), "none.xlsx", None, None, None, "a sheet 'runs'")
     found = complaints(book, settings=[["key", "value"], ["planes", 3]], planes=[["plane"], ["1"]])
-    the_only(found, "job.xlsx", 2, "value", "3", "a table, [planes]")
+    the_only(found, "job.xlsx", 2, "key", "planes", "each key once")

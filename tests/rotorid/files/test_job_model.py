@@ -78,10 +78,6 @@ def test_a_job_that_rests_on_its_model(job, folder):
     read = job(with_radii)
     assert read.radii == {"1": 0.1, "2": 0.05}
     assert read.trials.labels.weight_unit == "g"
-    found = complaints(job, text.replace("[sensors.B]\nstation", "[planes.3]\nstation"))
-    the_only(found, "job.toml", None, "sensors", None, "a node of the rotor model for sensor 'B'")
-    found = complaints(job, text.replace('[planes.1]\nstation = "disc"\n[planes.2]\nnode = 3\n', ""))
-    the_only(found, "job.toml", None, "planes", None, "a plane with a node of the rotor model")
 
 
 def test_a_plane_that_only_the_model_knows(job):

@@ -10,7 +10,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, UndeterminedError, estimate_influence
-from rotorid.tables import StatedErrors, read_trials
+from rotorid.tables import Errors, read_trials
 
 
 @pytest.fixture
@@ -70,12 +70,12 @@ def test_wrong_arguments(read):
         read(angles="clockwise")
     with pytest.raises(ValueError, match="speed_tolerance_percent"):
         read(speed_tolerance_percent=math.nan)
-    with pytest.raises(ValueError, match="phase_deg must be finite"):
-        StatedErrors(phase_deg=-1)
+    with pytest.raises(ValueError, match="phase_deg"):
+        Errors(phase_deg=-1)
 
 
 def test_errors_in_the_unit_of_the_readings(read):
-    errors = read(errors=StatedErrors(2.0, 90.0, 0.5)).errors
+    errors = read(errors=Errors(amplitude_percent=2.0, phase_deg=90.0, floor=0.5)).errors
     assert (errors.amplitude, errors.phase) == (0.02, math.pi / 2)
     assert errors.floor == pytest.approx(0.25e-6, rel=1e-15)
     given = ReadingErrors(0.1, 0.2, 3e-6)

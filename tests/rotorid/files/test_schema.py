@@ -10,8 +10,8 @@ from cases import each_of
 from jsonschema import Draft202012Validator
 
 from rotorid.files.job_models import JobSettings, Plane
+from rotorid.files.schema import FILES, schema
 from rotorid.samples import sample_data
-from rotorid.tables.schema import FILES, schema
 
 FILES_OF = {
     kind: sorted(p for p in sample_data().glob("*/*.toml") if key in tomllib.loads(p.read_text("utf-8")))
