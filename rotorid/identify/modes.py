@@ -26,11 +26,8 @@ ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
 NOISE = 5.0
 """Standard deviations of a vector that are no peak."""
-SAME = 1e-9
-"""So much beyond its ends a speed is still one of a sweep."""
-SLOWEST, NEIGHBOURS = 3, 7
-"""So many vectors of the slowest are the run-out, where peaks are looked for; so many around a speed lie on
-a parabola, but for what modes explain."""
+SLOWEST = 3
+"""So many vectors of the slowest are the run-out, where peaks are looked for."""
 Bands = Sequence[tuple[float, float]]
 
 
@@ -216,46 +213,3 @@ def constant_vectors(fit: FittedModes) -> tuple[ComplexArray, FloatArray]:
     k = len(fit.ends)
     vectors, covariances = fit.predicted(lambda q: np.eye(k + 2, dtype=complex)[-1:] * q[0] ** 2)
     return vectors[0], np.sqrt(np.trace(covariances[0], axis1=1, axis2=2) / 2)
-
-
-def vectors_when_passing(
-    sweep: Readings, speeds: FloatArray, modes: FittedModes | None = None
-) -> tuple[ComplexArray, FloatArray]:
-    """Vectors when the sweep passes speeds (M,), rad/s: (M, C), and covariances of their parts.
-
-    Of the modes, where these explain the sweep; else what they leave of the nearest vectors lies on a
-    parabola.
-
-    Raises
-    ------
-    ValueError
-        For a speed that the sweep does not pass, and for too few vectors near it.
-    """
-    low, high = float(sweep.speeds.min()), float(sweep.speeds.max())
-    if len(beyond := speeds[(speeds < low * (1 - SAME)) | (speeds > high * (1 + SAME))]):
-        first, last, other = (sweep.labels.speed_words(float(each)) for each in (low, high, beyond[0]))
-        raise ValueError(f"--speeds: run {sweep.run!r} goes from {first} to {last}, not to {other}")
-    vectors, rest = np.zeros((len(speeds), len(sweep.sensors)), dtype=complex), sweep.vectors
-    if modes is not None and modes.explains:
-        answers = modes.answers.at(speeds)
-        return modes.predicted(lambda q: answers.basis(q)[0])
-    if modes is not None:
-        vectors, rest = modes.curve(speeds), rest - modes.curve(sweep.speeds)
-    covariances = np.zeros((*vectors.shape, 2, 2))
-    for m, c in np.ndindex(vectors.shape):
-        seen, x = np.flatnonzero(~np.isnan(rest[:, c])), sweep.speeds - speeds[m]
-        rows = seen[np.argsort(np.abs(x[seen]), kind="stable")[:NEIGHBOURS]]
-        if len(rows) < NEIGHBOURS:
-            raise ValueError(
-                f"--speeds: run {sweep.run!r} has {len(rows)} vectors of sensor {sweep.sensors[c]!r}, and "
-                f"{NEIGHBOURS} are needed to find what lies between them"
-            )
-        parabola = np.vander(x[rows] / np.abs(x[rows]).max(), 3)
-        solve = np.linalg.pinv(parabola)
-        left = rest[rows, c] - parabola @ (solve @ rest[rows, c])
-        variance = np.vdot(left, left).real / (2 * NEIGHBOURS - 6)
-        if sweep.covariances is not None:
-            variance = max(variance, np.trace(sweep.covariances[rows, c], axis1=1, axis2=2).mean() / 2)
-        vectors[m, c] += solve[2] @ rest[rows, c]
-        covariances[m, c] = variance * (solve[2] @ solve[2]) * np.eye(2)
-    return vectors, covariances

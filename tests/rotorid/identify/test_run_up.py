@@ -7,11 +7,9 @@ import pytest
 from run_ups import drawn
 
 from balancing import Labels
-from rotorid.base.rpm import RPM
 from rotorid.identify.modes import (
     constant_vectors,
     fit_sweep,
-    vectors_when_passing,
 )
 from rotorid.identify.modes_result import Readings
 
@@ -69,15 +67,6 @@ def test_a_band_chooses_a_mode():
     modes = fit_sweep(sweep, bands=[band])
     value, std = found(modes)[0], modes.fit.std[0]
     assert abs(value - rotor.omega[0]) < 4 * std + 1e-3 * value
-
-
-def test_a_speed_that_is_not_passed_is_refused():
-    _, sweep = drawn()
-    with pytest.raises(ValueError, match=r"run 'run-up' goes from 300 rpm to .* rpm, not to 200 rpm"):
-        vectors_when_passing(sweep, np.array([200 / RPM]))
-    few = sweep.take(np.arange(5))
-    with pytest.raises(ValueError, match="has 5 vectors of sensor 'A', and 7 are needed"):
-        vectors_when_passing(few, few.speeds[2:3])
 
 
 def test_a_sweep_without_a_resonance_has_no_peak():
