@@ -255,6 +255,11 @@ class FittedModes:
                 )
         return tuple(f"{why}; or another mode is in the range (--bands)" for why in words)
 
+    @property
+    def explains(self) -> bool:
+        """Whether the modes are determined and leave no more than errors."""
+        return not (self.undetermined or self._misfit)
+
     @cached_property
     def _shapes(self) -> tuple[FloatArray, FloatArray, tuple[str, ...], tuple[str, ...]]:
         """Real shapes and relative standard deviations, independent from point to point; warnings, notes.
