@@ -258,11 +258,11 @@ def test_a_node_of_a_mode_stays_readable(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("frequency_Hz,X_amplitude\n1,2\n", "a column X_phase_deg"),
+        ("frequency_Hz,X_amplitude\n1,2\n", "columns X_amplitude and X_phase_deg"),
         ("frequency_Hz,F_re\n1,2\n", "amplitudes of points"),
         ("frequency_Hz,F_re,X_re\n1,0,1\n", "a force F that is not 0"),
         ("frequency_Hz,X_re\n0,1\n", "a frequency above 0"),
-        ("frequency_Hz,X_re,Y_re\n1,1,\n2,1,\n", "a number that is not 0 in at least one row"),
+        ("frequency_Hz,X_re,Y_re\n1,1,\n2,1,\n", "a number in at least one row"),
     ],
 )
 def test_tables_that_cannot_be_are_refused(tmp_path, cli, text, words):
