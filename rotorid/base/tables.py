@@ -203,11 +203,23 @@ def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
 
 
 def workbook_bytes(book: Any) -> bytes:  # noqa: ANN401
-    """A workbook as a file, the same bytes for the same cells and date."""
+    """A workbook as a file; no temporary files are made, which a full disk would break off."""
+    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
+    from openpyxl.worksheet._writer import WorksheetWriter
     from openpyxl.writer.excel import ExcelWriter
 
+    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
+        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
+            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
+            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
+            writer = WorksheetWriter(ws, part)
+            writer.write()
+            ws._rels = writer._rels
+            self._archive.writestr(ws.path[1:], part.getvalue())
+            self.manifest.append(ws)
+
     stream = io.BytesIO()
-    ExcelWriter(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
+    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
     return stream.getvalue()
 
 

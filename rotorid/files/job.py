@@ -236,7 +236,7 @@ def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
     ----------
     path
         The job; files that it names are found relative to it.
-    **overrides
+    overrides
         phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent: replace what the job says;
         waveforms: a waveforms file, in place of the runs table.
 
@@ -270,7 +270,7 @@ def job_from_files(
         Runs and weights; with `influence` the weights (mounted during the runs) may be left out.
     influence
         Influence table.
-    **overrides
+    overrides
         Conventions, stated errors and waveforms as of `read_job`; default: lead and with rotation, which the
         labels then call assumed; none stated.
 

@@ -200,7 +200,7 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
 
 
 def _columns(signals: Sequence[str], varying: Sequence[str]) -> tuple[Column, ...]:
-    readers = dict.fromkeys(varying, _model_or(units.SPEED))
+    readers = dict.fromkeys(varying, _model_or({**units.SPEED, "re": Unit("re", "model")}))
     vibration = _model_or(units.VIBRATION)
     for name in signals:
         readers |= {f"{name}_{part}": vibration for part in ("amplitude", "re", "im")}

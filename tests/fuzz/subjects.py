@@ -44,12 +44,10 @@ class Subject:
 
 
 def _influence(folder):
-    from fuzz.judging import answer
+    from rotorid.commands import balance
+    from rotorid.tables import write_influence
 
-    found = answer(
-        ["balance", str(folder / "job.toml"), "--output", str(folder / "influence.json")], check=False
-    )
-    assert found.status == 0, found
+    write_influence(folder / "influence.csv", balance(folder / "job.toml").influence)
     lines = (folder / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)
     first = [line for line in lines if line.startswith(("run,", "initial,"))]
     (folder / "first.csv").write_text("".join(first), encoding="utf-8")

@@ -78,7 +78,7 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     visits = [window.open(served.address)]
     type_job(window, sample, 120)
     window.wait(lambda: window.texts('[data-doc="answer"]'), "an answer")
-    for field, text in (("rotor_mass", "50"), ("speed", "3000"), ("radius", "120")):
+    for field, text in (("load", "25"), ("speed", "3000"), ("radius", "120")):
         window.type(f'[name="{field}"]', text)
     window.push("#propose")
     window.wait(lambda: window.texts("#trial-answer p"), "a trial weight")
@@ -154,10 +154,10 @@ def test_pieces_are_ticked_and_checked(tmp_path, serve, windows, removed):
 def test_fields_of_a_trial_weight_are_kept(shared, windows):
     window, served = windows[0], shared()
     window.open(served.address)
-    window.type('[name="rotor_mass"]', "50")
+    window.type('[name="load"]', "50")
     window.leave()
     window.open(served.address)
-    assert window.text('[name="rotor_mass"]') == "50"
+    assert window.text('[name="load"]') == "50"
 
 
 @pytest.mark.full

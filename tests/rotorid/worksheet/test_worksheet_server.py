@@ -177,7 +177,7 @@ def test_what_there_is_to_look_at_and_to_print(shared):
 
 def test_a_trial_weight_with_and_without_the_coefficients(shared):
     served = shared()
-    load = {"rotor_mass": "50kg", "carried_by": 2, "speed": "3000rpm", "radius": "100mm"}
+    load = {"load": "25kg", "speed": "3000rpm", "radius": "100mm"}
     status, answer = served.ask("/trial", {"options": load})
     assert status == 200, answer
     # 10 % of the static load: 0.1 · 25 kg · 9.81 m/s² / (ω² · 0.1 m)
