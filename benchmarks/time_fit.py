@@ -31,11 +31,11 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.timing import Row, best_of, once, relative_difference
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import OdeModel, ode_model
 from rotorid.identify.records import Record
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 F_OPTIMUM = np.array([0.13999975, 11.99998962, 28.00000273])
 ALLOWED = 2e-6

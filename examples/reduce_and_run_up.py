@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.commands import BearingsOptions, bearings
+from rotorid.files import read_rotor
 from rotorid.motion.equilibrium import at_rest, equilibrium
 from rotorid.motion.periodic import periodic_motion
 from rotorid.motion.run import run
 from rotorid.motion.steady import steady_end
 from rotorid.motion.system import rotor_system
 from rotorid.reduction import held_rigidly, keep_supports, reduce
-from rotorid.tables import read_rotor
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "motion" / "rotor.toml"
 RPM = np.pi / 30

@@ -10,6 +10,21 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False  # typing takes longer than all before the command line's answer to Ctrl-C
 if TYPE_CHECKING:
+    from rotorid.files import InputError as InputError
+    from rotorid.files import Job as Job
+    from rotorid.files import read_compliance as read_compliance
+    from rotorid.files import read_harmonic_model as read_harmonic_model
+    from rotorid.files import read_influence as read_influence
+    from rotorid.files import read_job as read_job
+    from rotorid.files import read_measurements as read_measurements
+    from rotorid.files import read_modes as read_modes
+    from rotorid.files import read_ode_model as read_ode_model
+    from rotorid.files import read_record as read_record
+    from rotorid.files import read_rotor as read_rotor
+    from rotorid.files import read_trials as read_trials
+    from rotorid.files import read_unbalance as read_unbalance
+    from rotorid.files import write_influence as write_influence
+    from rotorid.files import write_rotor as write_rotor
     from rotorid.identify import Experiments as Experiments
     from rotorid.identify import Fit as Fit
     from rotorid.identify import Identification as Identification
@@ -36,21 +51,6 @@ if TYPE_CHECKING:
     from rotorid.regression import unstretch as unstretch
     from rotorid.regression.estimate import Estimate as Estimate
     from rotorid.regression.undetermined_combinations import Combination as Combination
-    from rotorid.tables import InputError as InputError
-    from rotorid.tables import Job as Job
-    from rotorid.tables import read_compliance as read_compliance
-    from rotorid.tables import read_harmonic_model as read_harmonic_model
-    from rotorid.tables import read_influence as read_influence
-    from rotorid.tables import read_job as read_job
-    from rotorid.tables import read_measurements as read_measurements
-    from rotorid.tables import read_modes as read_modes
-    from rotorid.tables import read_ode_model as read_ode_model
-    from rotorid.tables import read_record as read_record
-    from rotorid.tables import read_rotor as read_rotor
-    from rotorid.tables import read_trials as read_trials
-    from rotorid.tables import read_unbalance as read_unbalance
-    from rotorid.tables import write_influence as write_influence
-    from rotorid.tables import write_rotor as write_rotor
 
 __version__ = "0.1.0"
 

@@ -23,7 +23,7 @@ def run_python(code):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("first", ["fem", "balancing", "rotorid", "rotorid.tables", "rotorid.cli"])
+@pytest.mark.parametrize("first", ["fem", "balancing", "rotorid", "rotorid.files", "rotorid.cli"])
 def test_any_package_can_be_imported_first(first):
     run_python(f"import {first}, fem, balancing, rotorid; [getattr(rotorid, n) for n in rotorid.__all__]")
 

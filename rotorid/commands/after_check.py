@@ -12,7 +12,7 @@ from rotorid.commands.coefficients import choose
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
     from rotorid.commands.balance_solution import BalanceOptions
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 
 def as_proposed(job: Job, correction: Correction, influence: Influence, runs: Trials | None) -> Job:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
     from rotorid.base.registry import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
+    from rotorid.files import Job
     from rotorid.files.job import JobSource
     from rotorid.fleet.type_coefficients import TypeKnowledge
-    from rotorid.tables import Job
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -136,8 +136,8 @@ class BalanceOptions:
 
 def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | None]:
     """The job with the limits of the options, and what it was read from; None: it had been read already."""
+    from rotorid.files import Job
     from rotorid.files.job import JobSource, Overrides
-    from rotorid.tables import Job
 
     stored = None if options.influence is None else Path(options.influence)
     errors = (None, None) if options.errors is None else percent_and_degrees(options.errors)
@@ -153,7 +153,7 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | Non
 
 def _read(source: JobSource, options: BalanceOptions) -> Job:
     """The job of these files, with the limits of the options."""
-    from rotorid.tables import job_from_files, read_job
+    from rotorid.files import job_from_files, read_job
 
     files, overrides = source.files, asdict(source.overrides)
     if len(files) == 1 and source.influence is None and files[0].suffix.lower() in (".toml", ".xlsx"):

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import BoolArray
     from rotorid.calibration import CalibratedRotor, RunReadings, Unknown
+    from rotorid.files import Job
     from rotorid.regression.estimate import Uncertain
-    from rotorid.tables import Job
 
 _ROWS = 5
 """Of the short table, with two numbers each."""
@@ -214,7 +214,7 @@ def prepared(
         As `calibrate`.
     """
     from rotorid.commands.unknown_numbers import unknowns
-    from rotorid.tables import read_job, rotor_files
+    from rotorid.files import read_job, rotor_files
 
     model = rotor_of(rotor)
     files = rotor_files(Path(rotor)) if isinstance(rotor, Path | str) else ()

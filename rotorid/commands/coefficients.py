@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from balancing import Influence, Trials
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 KINDS = ("measured", "computed", "combined")
 MODEL_ERROR = 20.0

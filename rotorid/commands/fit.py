@@ -107,10 +107,10 @@ def fit(
         For files, options or records that cannot be.
     """
     from rotorid.base.tables import csv, excel
+    from rotorid.files import read_ode_model
     from rotorid.identify.fit_records import fit as estimate
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.plots_records import figure_fit
-    from rotorid.tables import read_ode_model
 
     options = options or FitOptions()
     check_choices(options, choices())
@@ -169,9 +169,9 @@ def _read(
     allow_missing: bool,
 ) -> list[Record]:
     """All records, with standard deviations for all of them or for none."""
+    from rotorid.files import read_record
     from rotorid.files.records import STD
     from rotorid.identify.records import Record
-    from rotorid.tables import read_record
 
     records = [
         replace(one, sigma=one.sigma if sigma is None else sigma)

@@ -15,9 +15,9 @@ from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, out
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotorid.files import HarmonicFile
     from rotorid.identify import Experiments, HarmonicModel
     from rotorid.report.equations import Equations
-    from rotorid.tables import HarmonicFile
 
 _NO_DATA = "give a table of measured amplitudes after the model file (only --show equations does without)"
 
@@ -60,9 +60,9 @@ def identify(
     ValueError
         For files, options or data that cannot be.
     """
+    from rotorid.files import HarmonicFile, read_harmonic_model, read_measurements
     from rotorid.identify import Experiments, HarmonicModel
     from rotorid.identify import identify as estimate
-    from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
     if isinstance(model, HarmonicModel):

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from fem import Sensor
     from rotorid.base.words import Quantity
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 
 @dataclass(frozen=True)

@@ -85,9 +85,9 @@ def moving(
     ValueError
         For files that cannot be read.
     """
+    from rotorid.files import read_bow, read_small_model, read_unbalance
     from rotorid.files.small_model import is_small_model
     from rotorid.reduction import SmallModel
-    from rotorid.tables import read_bow, read_small_model, read_unbalance
 
     model: Rotor | SmallModel
     if isinstance(given, SmallModel):

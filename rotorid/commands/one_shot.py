@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray
     from rotorid.commands.model_places import ModelPlaces
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
 """Why its coefficients alone are not enough."""

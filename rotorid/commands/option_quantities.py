@@ -20,8 +20,8 @@ from rotorid.files.units import Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:
     from balancing import Labels
+    from rotorid.files import Job
     from rotorid.files.units import Quantity
-    from rotorid.tables import Job
 
 Amount = str | float
 """A number with its unit, or a number in SI."""

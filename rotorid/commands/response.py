@@ -407,7 +407,7 @@ def response(
     """
     import fem
     from rotorid.commands.operating_range import critical_peaks
-    from rotorid.tables import read_unbalance
+    from rotorid.files import read_unbalance
 
     model, operating = moving(rotor).model, band(options.operating)
     speeds = rising_speeds(options.speeds)

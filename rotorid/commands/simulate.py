@@ -30,9 +30,9 @@ from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from rotorid.base.arrays import FloatArray
+    from rotorid.files import HarmonicFile
     from rotorid.identify import HarmonicModel
     from rotorid.identify.ode import OdeModel
-    from rotorid.tables import HarmonicFile
 
 TABLES = (".csv", ".xlsx")
 BESIDE = 7
@@ -156,10 +156,10 @@ def simulate(
 
 def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     """A table of amplitudes, or of natural frequencies and shapes."""
+    from rotorid.files import HarmonicFile, read_harmonic_model
     from rotorid.files.measurements import measurement_columns
     from rotorid.identify import HarmonicModel
     from rotorid.identify.direct_problem import as_read, forced_vibration, free_vibration
-    from rotorid.tables import HarmonicFile, read_harmonic_model
 
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
@@ -202,11 +202,11 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     """A time record."""
     import numpy as np
 
+    from rotorid.files import read_ode_model, read_record
     from rotorid.files.records import record_columns
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
     from rotorid.identify.simulation import simulated_record
-    from rotorid.tables import read_ode_model, read_record
 
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     values, theta = _values(options.parameters, equations.parameters)

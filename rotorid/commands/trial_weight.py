@@ -21,7 +21,7 @@ from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, p
 if TYPE_CHECKING:
     from balancing import Lag, TrialWeight
     from rotorid.commands.option_quantities import Amount
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 _WITHOUT_JOB = ("reading_phase", "lag", "sensor_angle", "speed")
 

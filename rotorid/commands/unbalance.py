@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from balancing import Unbalance
     from fem import Rotor
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ def _table(known: KnownType, *scatter: tuple[FloatArray, FloatArray]) -> Table:
 
 def _odd(known: KnownType, tree: Path) -> list[dict[str, Any]]:
     """Machines that do not belong to the type, and what would make them fit, by their own runs."""
-    from rotorid.tables import read_job
+    from rotorid.files import read_job
 
     told = []
     for record, far in known.kind.odd:

@@ -23,17 +23,17 @@ import numpy as np
 
 from balancing import Labels, UndeterminedError, estimate_influence
 from rotorid.base.logs import progress
+from rotorid.files import InputError, read_job
 from rotorid.files.input_file import each_file_once, file_content
 from rotorid.files.problems import Problems
 from rotorid.files.toml_file import read_toml
 from rotorid.files.units import vibration
 from rotorid.fleet.machine_type import MachineRecord
-from rotorid.tables import InputError, read_job
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 OF_A_JOB = {"runs", "weights"}
 """Keys, and names of sheets, by which a file is known for a job."""

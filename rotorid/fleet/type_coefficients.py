@@ -18,7 +18,7 @@ from rotorid.fleet.types import Grid, KnownType, known_type
 
 if TYPE_CHECKING:
     from balancing import Correction
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""

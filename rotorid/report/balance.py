@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict
     from rotorid.base.answer import Answer
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
     Headings = Mapping[str, tuple[str, Callable[[Any], str]]]
     """Heading and text of each column, by the key of its values in rows of the document."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     from fem import Rotor
-    from rotorid.tables import Job
+    from rotorid.files import Job
 
 _T = TypeVar("_T", bound="DataclassInstance")
 
@@ -95,7 +95,7 @@ def _of_python(value: object, what: str = "") -> object:
 def rotor_of(given: Rotor | Path | str) -> Rotor:
     """A rotor, or that of a file."""
     from fem import Rotor
-    from rotorid.tables import read_rotor
+    from rotorid.files import read_rotor
 
     return given if isinstance(given, Rotor) else read_rotor(file_of(given, "a rotor"))
 
@@ -108,7 +108,7 @@ def job_source(given: Job | Path | str, phase: str | None = None, angles: str | 
     ValueError
         For these with a job that is read already.
     """
-    from rotorid.tables import Job, read_job
+    from rotorid.files import Job, read_job
 
     if not isinstance(given, Job):
         return read_job(file_of(given, "a job"), phase=phase, angles=angles)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.commands.balance import Balance
+    from rotorid.files import Job
     from rotorid.report.outcome import Outcome
-    from rotorid.tables import Job
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
 _kept: dict[str, tuple[Balance, list[str]]] = {}

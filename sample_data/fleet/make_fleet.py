@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing import correct, estimate_influence
-from rotorid.tables import read_job
+from rotorid.files import read_job
 
 HERE = Path(__file__).resolve().parent
 SEED = 132

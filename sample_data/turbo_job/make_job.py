@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem import Rotor, influence
-from rotorid.tables import read_rotor
+from rotorid.files import read_rotor
 
 ComplexArray = NDArray[np.complex128]
 

@@ -17,8 +17,8 @@ from balancing.trial_weight import (
     trial_from_coefficients,
     trial_from_force,
 )
+from rotorid.files import read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 RPM3000 = 100 * pi
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from balancing import correct, estimate_influence
-from rotorid.tables import read_job
+from rotorid.files import read_job
 
 JOB = Path(__file__).resolve().parents[2] / "sample_data" / "turbo_job"
 

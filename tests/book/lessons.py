@@ -13,12 +13,12 @@ import sympy
 
 import fem
 from book.printed import below, lines, parts, read
+from rotorid.files import read_harmonic_model, read_measurements
 from rotorid.identify import Experiments, harmonic_model
 from rotorid.identify.expressions import parse_equation
 from rotorid.identify.linear_start import build_rows, linear_fit
 from rotorid.identify.operator_model import natural_modes
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_measurements
 
 SINGULAR = ("2_3", "3_2", "3_3", "4_1", "4_2", "4_3")
 """Exercises whose unknowns the book counts; in most of them no data determine all."""

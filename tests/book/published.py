@@ -12,8 +12,8 @@ import numpy as np
 
 from balancing import Gaussian, Influence, Limits, Trials, correct, estimate_influence
 from book.printed import below, lines, read
+from rotorid.files import read_job
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 NOTE = "Brüel & Kjær, application note 17-227"
 FOILES = "Foiles, Allaire and Gunter 2000"

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from book.printed import below, read
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.quasilinearization import linear_solutions
@@ -17,7 +18,6 @@ from rotorid.identify.records import Record
 from rotorid.identify.simulation import simulate
 from rotorid.regression import solution
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 THETA = ("theta1", "theta2", "theta3")
 C = np.array([[1.0, 2.0], [2.0, 1.0]])

@@ -13,9 +13,9 @@ from fem_rotors import refined
 
 import fem
 from book.printed import below, parts, read
+from rotorid.files import read_rotor
 from rotorid.reduction import equivalent_masses, natural_frequencies
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 NODES = (7, 12, 18)
 SUPPORTS = (2, 22)

@@ -32,7 +32,7 @@ from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
-from rotorid.tables import Conventions, Job
+from rotorid.files import Conventions, Job
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
+from rotorid.files import read_harmonic_model, read_measurements
 from rotorid.identify import identify
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_measurements
 
 FOLDER = sample_data() / "identify"
 TRUTHS = {

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from balancing import Holes, Limits, Mounted, ReadingErrors, Trials, UndeterminedError, equal_holes, from_list
 from balancing.influence import Whitening
 from rotorid.commands.balance import BalanceOptions, balance
+from rotorid.files import Job
 from rotorid.files.conventions import Conventions
-from rotorid.tables import Job
 
 ComplexArray = NDArray[np.complex128]
 

@@ -29,7 +29,7 @@ PACKAGES = (
     "rotorid.identify",
     "rotorid.reduction",
     "rotorid.calibration",
-    "rotorid.tables",
+    "rotorid.files",
     "rotorid.commands",
 )
 EXTERNAL = re.compile(

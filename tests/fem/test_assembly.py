@@ -16,8 +16,8 @@ import fem
 from fem import state_space
 from fem.assembly import WholeBand, assemble, both_planes, project, supported
 from fem.forces import law, tables
+from rotorid.files import read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 
 @pytest.fixture(scope="module")

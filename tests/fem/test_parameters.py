@@ -23,8 +23,8 @@ from fem.parameters import (
     with_changes,
     with_parameters,
 )
+from rotorid.files import read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 PLAIN = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "tilting_stiffness")
 STAND = ("mass", "stiffness_x", "stiffness_y", "damping_x", "damping_y")

@@ -45,7 +45,7 @@ class Subject:
 
 def _influence(folder):
     from rotorid.commands import balance
-    from rotorid.tables import write_influence
+    from rotorid.files import write_influence
 
     write_influence(folder / "influence.csv", balance(folder / "job.toml").influence)
     lines = (folder / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)

@@ -23,7 +23,7 @@ CEILINGS = (  # places, units, issue whose end puts it in force; only an issue t
     ("rotorid/reduction rotorid/motion", 33_500, "25b"),
     ("rotorid/calibration rotorid/waveforms", 12_500, "25c"),
     ("rotorid/cli rotorid/commands rotorid/report", 48_000, "26"),
-    ("rotorid/tables rotorid/files", 47_500, "27"),
+    ("rotorid/files", 47_500, "27"),
     ("rotorid/worksheet", 12_500, "28"),
     ("rotorid/fleet rotorid/study", 7_000, "28"),
     ("rotorid/base rotorid/regression rotorid/validation", 11_500, "28"),

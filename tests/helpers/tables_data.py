@@ -9,7 +9,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from rotorid.tables import InputError, TableWarning
+from rotorid.files import InputError, TableWarning
 
 RUNS = [
     ["run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"],

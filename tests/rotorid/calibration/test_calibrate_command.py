@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rotorid.files import read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 ROTOR23 = sample_data() / "rotor23.csv"
 COMPRESSOR = sample_data() / "compressor" / "rotor.toml"

@@ -8,8 +8,8 @@ from helpers.calibration.jobs import machine
 
 import fem
 from rotorid.commands.unknown_numbers import unknowns
+from rotorid.files import read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 COEFFICIENTS = ("kxx", "kxy", "kyx", "kyy", "cxx", "cyy")
 

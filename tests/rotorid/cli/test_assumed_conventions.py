@@ -13,8 +13,8 @@ from tables_data import write_csv
 from workbook_jobs import as_workbook
 
 from rotorid.commands import BalanceOptions, balance
+from rotorid.files import write_influence
 from rotorid.samples import sample_data
-from rotorid.tables import write_influence
 
 RNG = np.random.default_rng(15)
 SPEEDS, SENSORS, PLANES = (1200, 1800), ("A", "B"), ("left", "right")

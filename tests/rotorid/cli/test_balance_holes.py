@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from balancing import correct, estimate_influence, mount
+from rotorid.files import read_job
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 TURBO = sample_data() / "turbo_job"
 HOLES = TURBO / "holes.toml"

@@ -7,9 +7,9 @@ import pytest
 import fem
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
 from rotorid.commands import BearingsOptions, bearings
+from rotorid.files import read_rotor, write_rotor
 from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor, write_rotor
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 SPEEDS = ("--speeds", "1000:9000:1000rpm")

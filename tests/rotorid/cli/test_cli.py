@@ -11,8 +11,8 @@ import pytest
 
 import fem
 from balancing import correct, estimate_influence
+from rotorid.files import read_job, read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_job, read_rotor
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"

@@ -8,9 +8,9 @@ import pytest
 from book.records import intact_record
 from cases import each_of
 
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 FOLDER = sample_data() / "fit"
 DECAY = '[states]\nx = "-a*x"\n[initial]\nx = "x0"\n[estimate]\na = 0.5\nx0 = 0.8\n[bounds]\na = [0, 5]\n'

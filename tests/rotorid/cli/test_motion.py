@@ -11,11 +11,11 @@ import fem
 from fem import JournalBearing, MuszynskaSeal
 from rotorid.commands import MotionOptions, motion
 from rotorid.commands.moving import moving
+from rotorid.files import read_rotor, write_rotor
 from rotorid.motion.run import run
 from rotorid.motion.steady import begin
 from rotorid.motion.system import reduced_system
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor, write_rotor
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 SHORT = ("--speed", "4000rpm", "--time", "0.3s")

@@ -12,8 +12,8 @@ from timedomain_cases import state_space_of
 import fem
 from rotorid import read_ode_model, read_rotor, small_model
 from rotorid import reduce as reduce_rotor
+from rotorid.files import read_small_model
 from rotorid.samples import sample_data
-from rotorid.tables import read_small_model
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"

@@ -7,7 +7,7 @@ import pytest
 from tables_data import write_csv
 
 import fem
-from rotorid.tables import read_rotor
+from rotorid.files import read_rotor
 
 PLAIN = [["length_mm", "diameter_mm"], [250, 40], [250, 40], [250, 40], [250, 40]]
 SEAL = [

@@ -7,8 +7,8 @@ import openpyxl
 import pandas as pd
 import pytest
 
+from rotorid.files import read_influence
 from rotorid.samples import sample_data
-from rotorid.tables import read_influence
 
 DATA = sample_data()
 TURBO = DATA / "turbo_job"

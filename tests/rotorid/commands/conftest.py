@@ -8,8 +8,8 @@ from tables_data import write_csv
 
 import fem
 from rotorid import read_rotor
+from rotorid.files import write_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import write_rotor
 
 MOUNTED = [["plane", "unbalance_g_mm", "angle_deg"], ["wheel", 500, 0], ["3", 100, 90]]
 NAMES = ("bearing[1].stiffness", "bearing.stiffness.scale", "material.density")

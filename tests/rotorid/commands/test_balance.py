@@ -6,8 +6,8 @@ import pytest
 from documents import same
 
 from rotorid.commands import Balance, BalanceOptions, balance
+from rotorid.files import job_from_files, read_job
 from rotorid.samples import sample_data
-from rotorid.tables import job_from_files, read_job
 
 TURBO = sample_data() / "turbo_job"
 TABLES = [TURBO / "runs.csv", TURBO / "weights.csv"]

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from rotorid.commands.fit import FitOptions, choices, fit
+from rotorid.files import read_ode_model, read_record
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 FOLDER = sample_data() / "fit" / "quasilinearization"
 FILES = FOLDER / "model.toml", FOLDER / "record_noisy.csv"

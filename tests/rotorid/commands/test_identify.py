@@ -5,8 +5,8 @@ import json
 import pytest
 
 from rotorid.commands.identify import IdentifyOptions, identify
+from rotorid.files import read_harmonic_model, read_measurements
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_measurements
 
 FOLDER = sample_data() / "identify" / "task_5_1"
 FILES = FOLDER / "model.toml", FOLDER / "data.csv"

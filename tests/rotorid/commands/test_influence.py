@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 import fem
-from rotorid.tables import read_influence
+from rotorid.files import read_influence
 
 
 def test_influence_with_angles_feeds_balance(cli, files, model, tmp_path):

@@ -5,9 +5,9 @@ import pytest
 
 from fem import JournalBearing, Rotor
 from rotorid.commands.moving import moving
+from rotorid.files import InputError
 from rotorid.files.small_model import small_model_files
 from rotorid.reduction import SmallModel
-from rotorid.tables import InputError
 
 FILM = {"length": 0.02, "diameter": 0.05, "clearance": 5e-5, "viscosity": 0.02}
 ROTOR = Rotor(

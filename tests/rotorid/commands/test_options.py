@@ -34,10 +34,10 @@ from rotorid.commands import (
     trial_weight,
     unbalance,
 )
+from rotorid.files import read_job
 from rotorid.files.input_file import each_file_once
 from rotorid.report.options import changed, checked, plain
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 SAMPLES = sample_data()
 ROTOR = SAMPLES / "rotor23.csv"

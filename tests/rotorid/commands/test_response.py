@@ -13,10 +13,10 @@ import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands import ResponseOptions, response
+from rotorid.files import read_unbalance
 from rotorid.files.small_model import small_model_files
 from rotorid.reduction import small_model
 from rotorid.samples import sample_data
-from rotorid.tables import read_unbalance
 
 RPM = np.pi / 30
 OK_SPEEDS = ("--speeds", "100:200:50")

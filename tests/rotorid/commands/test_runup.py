@@ -9,8 +9,8 @@ from run_ups import drawn, table
 
 from rotorid.base.rpm import RPM
 from rotorid.commands import RunUpOptions, runup
+from rotorid.files import read_modes, read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_modes, read_rotor
 
 
 @pytest.fixture(scope="module")

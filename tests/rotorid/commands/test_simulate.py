@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rotorid.commands import SimulateOptions, simulate
+from rotorid.files import read_measurements, read_ode_model, read_record
 from rotorid.identify import AmplitudeErrors, harmonic_model
 from rotorid.samples import sample_data
-from rotorid.tables import read_measurements, read_ode_model, read_record
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 TRUTH = {
@@ -56,7 +56,7 @@ def test_amplitudes_are_those_of_the_equations_typed_apart(cli, tmp_path, name):
 
 
 def read_harmonic(name):
-    from rotorid.tables import read_harmonic_model
+    from rotorid.files import read_harmonic_model
 
     return read_harmonic_model(task(name))
 

@@ -6,8 +6,8 @@ import pytest
 from documents import same
 
 from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
+from rotorid.files import read_job
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 RPM3000 = 100 * math.pi
 BK = sample_data() / "bk_two_plane" / "job.toml"

@@ -5,7 +5,7 @@ import pytest
 from tables_data import complaints, write_csv
 
 from fem import Rotor
-from rotorid.tables import read_bow
+from rotorid.files import read_bow
 
 SHAFT = Rotor(length=[0.1] * 4, outer_diameter=0.02, stations={"disc": 3})
 TABLE = [["node", "bow_um", "angle_deg"], ["1", 0, 0], ["disc", 50, 90], ["5", 20, -180]]

@@ -9,8 +9,8 @@ from tables_data import complaints, write_csv
 
 import fem
 from fem.parameters import with_parameters
+from rotorid.files import read_rotor, write_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor, write_rotor
 
 HEAD = 'shaft = "shaft.csv"\n[[bearing]]\nname = "DE"\nnode = 1\nkxx = 1e7\nkyy = 2e7\n'
 PLAIN = """[[calibration.parameter]]

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, write_book, write_csv
 
+from rotorid.files import read_rotor, read_trials
 from rotorid.files.cells import parse_text
 from rotorid.files.problems import Problems
-from rotorid.tables import read_rotor, read_trials
 
 HEADER = ("run", "value", "text")
 

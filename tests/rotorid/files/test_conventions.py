@@ -10,8 +10,8 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels, correct, estimate_influence
 from balancing.conventions import opposite
+from rotorid.files import job_from_files, read_influence, read_job, write_influence
 from rotorid.files.conventions import STATED_ANGLES, check_angles, resolve_angles
-from rotorid.tables import job_from_files, read_influence, read_job, write_influence
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'

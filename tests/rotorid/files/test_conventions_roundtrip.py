@@ -17,7 +17,7 @@ from whirl_rotors import machine
 
 import fem
 from balancing import compare_check, correct, estimate_influence, model_influence
-from rotorid.tables import read_job, write_rotor
+from rotorid.files import read_job, write_rotor
 
 SPEEDS_RPM = (1500, 4200)
 NODES = {"A": 4, "B": 20, "C": 12}

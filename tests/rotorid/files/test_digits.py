@@ -9,10 +9,10 @@ import pytest
 from tables_data import RUNS, WEIGHTS, csv_text, replaced, write_book, write_csv
 
 from balancing import ReadingErrors, estimate_influence, refine
+from rotorid.files import read_job, read_trials
 from rotorid.files.cells import Shown
 from rotorid.files.columns import written_steps
 from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
-from rotorid.tables import read_job, read_trials
 
 
 @pytest.mark.parametrize(

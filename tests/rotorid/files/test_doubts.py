@@ -7,7 +7,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
 from balancing import correct, estimate_influence
-from rotorid.tables import (
+from rotorid.files import (
     InputError,
     TableWarning,
     influence_frame,
@@ -45,7 +45,7 @@ def test_a_title_above_the_header_is_named(tmp_path, files, title):
 
 
 def test_different_values_and_scattered_rows():
-    from rotorid.tables import Problem
+    from rotorid.files import Problem
 
     problems = [Problem("f.csv", row, "a", str(row), "a number") for row in (2, 3, 5, 7, 9, 11)]
     assert str(InputError(problems)) == (

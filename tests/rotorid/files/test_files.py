@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from rotorid.tables import InputError, TableWarning, read_trials
+from rotorid.files import InputError, TableWarning, read_trials
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotorid.files import InputError
 from rotorid.files.measurements import read_amplitudes
-from rotorid.tables import InputError
 
 pyuff = pytest.importorskip("pyuff")
 HERTZ = np.linspace(0.0, 40.0, 401)

@@ -20,13 +20,13 @@ from balancing import (
     model_influence,
     with_parameters,
 )
-from rotorid.regression import stretch
-from rotorid.tables import (
+from rotorid.files import (
     influence_frame,
     job_from_files,
     read_influence,
     write_influence,
 )
+from rotorid.regression import stretch
 
 ERRORS = ReadingErrors(amplitude=0.03, phase=np.radians(2.0), floor=1e-7)
 LABELS = Labels("um_pp", 2e6, "g", 1e3)

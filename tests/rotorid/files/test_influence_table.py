@@ -11,8 +11,8 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import estimate_influence
+from rotorid.files import read_influence, read_trials, write_influence, write_table
 from rotorid.files.table_writing import write_bytes
-from rotorid.tables import read_influence, read_trials, write_influence, write_table
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
 TABLE = [

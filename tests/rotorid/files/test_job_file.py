@@ -9,7 +9,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
 from balancing import correct, estimate_influence
-from rotorid.tables import job_from_files, read_job, read_trials, write_influence
+from rotorid.files import job_from_files, read_job, read_trials, write_influence
 
 JOB = """
 runs = "runs.csv"

@@ -8,7 +8,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import correct, estimate_influence
 from rotorid.commands.option_quantities import limited
-from rotorid.tables import read_job
+from rotorid.files import read_job
 
 HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 AGAINST = 'angles = "against rotation"\n'

@@ -7,7 +7,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from rotorid.commands.option_quantities import limited
-from rotorid.tables import job_from_files, read_job
+from rotorid.files import job_from_files, read_job
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]

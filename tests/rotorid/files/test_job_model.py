@@ -8,7 +8,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import compare_check, correct, estimate_influence
 from fem import Sensor
-from rotorid.tables import read_job, read_rotor, read_trials, write_influence
+from rotorid.files import read_job, read_rotor, read_trials, write_influence
 
 SHAFT = [
     ["length_m", "diameter_m", "support_stiffness_N_per_m"],

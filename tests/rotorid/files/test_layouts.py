@@ -13,8 +13,8 @@ from cases import each_of
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
 from rotorid.base.text import listing
+from rotorid.files import InputError, read_job, read_trials
 from rotorid.files.runs import COLUMNS
-from rotorid.tables import InputError, read_job, read_trials
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase

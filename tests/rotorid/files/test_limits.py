@@ -9,11 +9,18 @@ import openpyxl
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
 
-from rotorid.files import cells, excel_workbook, input_file
+from rotorid.files import (
+    cells,
+    excel_workbook,
+    input_file,
+    read_harmonic_model,
+    read_ode_model,
+    read_rotor,
+    read_trials,
+)
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.input_file import each_file_once, file_content
 from rotorid.files.problems import Problems
-from rotorid.tables import read_harmonic_model, read_ode_model, read_rotor, read_trials
 
 
 @pytest.fixture

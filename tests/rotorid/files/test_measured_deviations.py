@@ -10,7 +10,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, estimate_influence, reading_of
-from rotorid.tables import read_job, read_trials
+from rotorid.files import read_job, read_trials
 
 JOB = 'phase = "lag"\nangles = "with rotation"\nruns = "runs.csv"\nweights = "weights.csv"\n'
 MEASURED = [

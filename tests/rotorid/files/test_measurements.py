@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rotorid import InputError, read_harmonic_model, read_measurements
+from rotorid.files import TableWarning
 from rotorid.identify.equations import harmonic_model
-from rotorid.tables import TableWarning
 
 MODEL = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
 TWO = harmonic_model(

@@ -14,13 +14,13 @@ from repetitions import FULL
 from timedomain_cases import motion_in, state_space_of
 
 import fem
+from rotorid.files import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
 from rotorid.files.small_model import equations_of
 from rotorid.files.toml_writing import toml_bytes
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
-from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
 
 TRUTH = {"d_x7": 1234.5, "d_x12": 321.0, "d_x18": 567.0}
 BEGIN = {"x7": 2000.0, "x12": 500.0, "x18": 400.0}

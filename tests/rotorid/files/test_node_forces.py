@@ -5,7 +5,7 @@ from cases import each_of
 from tables_data import complaints, write_csv
 
 import fem
-from rotorid.tables import InputError, TableWarning, read_rotor, write_rotor
+from rotorid.files import InputError, TableWarning, read_rotor, write_rotor
 
 SHAFT = [["length_m", "diameter_m", "mass_kg"], [0.3, 0.1, 0], [0.4, 0.12, 20], [0.3, 0.1, 0]]
 BEARING = ["length_mm = 30", "diameter_mm = 100", "clearance_um = 100", "viscosity_mPa_s = 100"]

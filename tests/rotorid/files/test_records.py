@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.tables import InputError, read_ode_model, read_record
+from rotorid.files import InputError, read_ode_model, read_record
 
 MODEL = """
 inputs = ["u"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotorid.files import read_job
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 FOLDER = sample_data() / "rk4"
 

@@ -8,8 +8,8 @@ import pytest
 from tables_data import complaints, replaced, the_only, write_book, write_csv
 
 from fem import Disc, Model, Pedestal, Rotor, Support
+from rotorid.files import InputError, read_rotor, rotor_files, write_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import InputError, read_rotor, rotor_files, write_rotor
 
 SHAFT = [["length_m", "diameter_m"], [0.3, 0.1], [0.4, 0.12], [0.3, 0.1]]
 TABLE = [

@@ -7,7 +7,7 @@ import pytest
 from tables_data import complaints, replaced, the_only, write_book, write_csv
 
 from fem import Disc, Rotor, Support
-from rotorid.tables import read_rotor, rotor_files
+from rotorid.files import read_rotor, rotor_files
 
 HEADER = ["element", "length_m", "diameter_m", "support_stiffness_N_per_m", "mass_kg"]
 TABLE = [

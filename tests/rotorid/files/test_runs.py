@@ -10,7 +10,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, UndeterminedError, estimate_influence
-from rotorid.tables import Errors, read_trials
+from rotorid.files import Errors, read_trials
 
 
 @pytest.fixture

@@ -162,8 +162,8 @@ def test_what_is_wrong_has_its_key_its_value_and_what_is_expected(data, column, 
 
 
 def test_all_problems_at_once():
-    found, problems = read(kind="on", use=False, holes=-1, model={"sise": 2, "size": 2}, disc=[{}])
-    assert [column for column, _, _ in problems] == ["kind", "holes", "model.sise", "disc[1].size"]
+    found, problems = read(kind="on", use=False, holes=-1, model={"sizze": 2, "size": 2}, disc=[{}])
+    assert [column for column, _, _ in problems] == ["kind", "holes", "model.sizze", "disc[1].size"]
     assert found is None
 
 

@@ -8,8 +8,8 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, Trials, correct, estimate_influence
 from balancing.errors import reading_covariance
+from rotorid.files import read_job
 from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
-from rotorid.tables import read_job
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 VECTORS = """[slow_roll.A]

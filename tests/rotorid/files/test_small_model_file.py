@@ -5,9 +5,9 @@ import pytest
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from rotorid.files import InputError, TableWarning
 from rotorid.files.small_model import read_small_model, small_model_files
 from rotorid.reduction import SmallModel
-from rotorid.tables import InputError, TableWarning
 from tests.helpers.cases import each_of
 
 PLAIN = """

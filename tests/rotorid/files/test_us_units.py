@@ -9,7 +9,7 @@ import openpyxl
 import pytest
 
 from rotorid.commands.option_quantities import mass
-from rotorid.tables import InputError, read_rotor
+from rotorid.files import InputError, read_rotor
 
 INCH, POUND, FORCE = 0.0254, 0.45359237, 4.4482216152605
 TABLE = """\

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from run_ups import drawn, table
 
+from rotorid.files import InputError
 from rotorid.files.vectors_table import read_vectors
-from rotorid.tables import InputError
 
 HEAD = "run,speed_rpm,sensor,amplitude_um_pp,phase_deg,time_s,amplitude_std_um_pp,phase_std_deg\n"
 ROWS = "a,600,DE,20,30,1,2,6\na,900,DE,40,90,2,2,3\n"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from rotorid.files import InputError, TableWarning
 from rotorid.files.job import read_job
-from rotorid.tables import InputError, TableWarning
 
 SAMPLE = Path(__file__).parents[3] / "sample_data" / "waveforms"
 

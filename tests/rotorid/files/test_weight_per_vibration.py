@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.tables import InputError, read_influence, read_job
+from rotorid.files import InputError, read_influence, read_job
 
 RUNS = "run,speed_rpm,sensor,amplitude_in_s,phase_deg\nas found,2419,prop,0.37,165\n"
 FORMS = {

@@ -8,8 +8,8 @@ import pytest
 from cases import each_of
 
 import balancing
+from rotorid.files import InputError, read_job, read_trials
 from rotorid.samples import sample_data
-from rotorid.tables import InputError, read_job, read_trials
 
 FAN = """\
 Run,RPM,Bearing 1 mils,Bearing 1 deg,Bearing 2 mils,Bearing 2 deg

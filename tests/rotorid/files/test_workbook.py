@@ -16,10 +16,10 @@ from tables_data import RUNS, WEIGHTS, write_csv
 from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, as_workbook, differences
 
 from balancing import correct, estimate_influence
+from rotorid.files import job_from_files, read_job, write_influence
 from rotorid.files.job_excel import NAMED, template_bytes
 from rotorid.files.job_models import Errors, JobSettings
 from rotorid.samples import sample_data
-from rotorid.tables import job_from_files, read_job, write_influence
 
 DATA = sample_data()
 

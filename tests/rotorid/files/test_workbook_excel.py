@@ -14,9 +14,9 @@ from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, wri
 from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
+from rotorid.files import read_job
 from rotorid.files.job_excel import template_bytes
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 BK = sample_data() / "bk_two_plane"
 FORM = ("runs", "weights", "planes", "sensors", "settings")

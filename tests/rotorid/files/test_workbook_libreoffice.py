@@ -12,7 +12,7 @@ from tables_data import RUNS, WEIGHTS, replaced
 from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
-from rotorid.tables import InputError, read_job
+from rotorid.files import InputError, read_job
 
 OFFICE = shutil.which("soffice") or shutil.which("libreoffice")
 pytestmark = pytest.mark.skipif(

@@ -9,11 +9,11 @@ import pytest
 from balancing import UndeterminedError
 from rotorid.commands import balance
 from rotorid.commands.balance import BalanceOptions
+from rotorid.files import read_job
 from rotorid.fleet import FleetFitOptions, fleet_fit
 from rotorid.fleet.jobs import read_fleet
 from rotorid.fleet.type_coefficients import type_coefficients
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")

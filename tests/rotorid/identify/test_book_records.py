@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 FOLDER = sample_data() / "fit"
 

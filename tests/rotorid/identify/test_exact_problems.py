@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rotorid.files import read_harmonic_model, read_measurements
 from rotorid.identify import experiments, harmonic_model, identify
-from rotorid.tables import read_harmonic_model, read_measurements
 
 TWO = ["(m*p**2 + b1*p + c1 + c2)*X1 - c2*X2 = F", "(5*p**2 + b2*p + c2)*X2 - c2*X1 = 0"]
 ROOTS = "sqrt(k)*sqrt(m)*z"

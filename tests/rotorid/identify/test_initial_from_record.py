@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from timedomain_cases import CHAIN_STATES, chain, chain_record
 
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import simulate
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 FOLDER = sample_data() / "fit" / "three_masses"
 FROM_RECORD = {"x": "record", "v": "record"}

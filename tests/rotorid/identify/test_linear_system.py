@@ -9,11 +9,11 @@ from timedomain_cases import motion_in, state_space_of
 
 import fem
 from fem import state_space as of_motion
+from rotorid.files import read_ode_model, read_rotor
 from rotorid.files.small_model import equations_of
 from rotorid.files.toml_writing import toml_bytes
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_rotor
 
 SPEED = 150.0
 CROSS = ((4e7, 6e6), (-6e6, 5e7))

@@ -91,7 +91,7 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
 def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
     """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
     from rotorid.commands.identify import identify
-    from rotorid.tables import read_harmonic_model, read_measurements
+    from rotorid.files import read_harmonic_model, read_measurements
 
     omega0, _ = undamped(M, K)
     omega = around(omega0, 2e-4 * omega0)

@@ -7,6 +7,7 @@ import pytest
 from documents import check_hygiene
 from matplotlib.figure import Figure
 
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.plots_records import (
@@ -17,7 +18,6 @@ from rotorid.identify.plots_records import (
 )
 from rotorid.identify.records import Record
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
 
 FOLDER = sample_data() / "fit"
 T = np.linspace(0, 3, 31)

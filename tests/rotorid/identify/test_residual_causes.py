@@ -5,11 +5,11 @@ import pytest
 from repetitions import FULL
 
 from rotorid.base.registry import names
+from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import METHODS, fit
 from rotorid.identify.ode import ode_model, with_nuisance
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import simulate
-from rotorid.tables import read_ode_model, read_record
 
 T = np.linspace(0.0, 4.0, 501)
 TRUTH = [100.0, 0.4]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 import fem
+from rotorid.files import read_ode_model, read_rotor
 from rotorid.identify.fit_records import fit
 from rotorid.identify.records import Record
 from rotorid.identify.second_order import second_order
 from rotorid.identify.simulation import simulate
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_rotor
 
 ROTOR = sample_data() / "rotor23.csv"
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rotorid.files import InputError, read_harmonic_model, read_measurements
 from rotorid.identify import harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
-from rotorid.tables import InputError, read_harmonic_model, read_measurements
 
 GYRO = [
     "(I*p**2 + b*p + k)*A + G*Omega*p*B = M",

@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 
 import fem
 from fem import GRAVITY, CubicSpring, JournalBearing, SqueezeFilm, Stop, static_deflection
+from rotorid.files import read_rotor
 from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.system import rotor_system
 from rotorid.reduction import SmallModel, held_rigidly, keep_supports, reduce, small_model
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 from tests.helpers.cases import each_of
 from tests.helpers.fem_rotors import rotor23
 

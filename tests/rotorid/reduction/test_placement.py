@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import fem
+from rotorid.files import read_rotor
 from rotorid.reduction import equivalent_masses, mac, natural_frequencies, placement, reduce
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from book_task_9 import (
 )
 
 import fem
+from rotorid.files import read_rotor
 from rotorid.reduction import (
     equivalent_masses,
     mac,
@@ -20,7 +21,6 @@ from rotorid.reduction import (
     small_model,
 )
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 
 @pytest.fixture(scope="module")

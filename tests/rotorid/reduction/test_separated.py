@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
+from rotorid.files import read_rotor
 from rotorid.reduction import Separated, reduce, separate
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
 
 
 @pytest.fixture(scope="module")

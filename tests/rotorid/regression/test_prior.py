@@ -7,6 +7,7 @@ import pytest
 
 from rotorid.commands.fit import FitOptions
 from rotorid.commands.fit import fit as work
+from rotorid.files import read_harmonic_model, read_ode_model
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.fit_records import fit
@@ -14,7 +15,6 @@ from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_ode_model
 
 T = np.linspace(0.0, 3.0, 25)
 K = np.column_stack((np.ones(25), T, np.exp(-T)))

@@ -12,6 +12,7 @@ from rotorid.commands import BalanceOptions, balance
 from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.reduce import ReduceOptions, reduce
+from rotorid.files import read_harmonic_model, read_job
 from rotorid.identify.expressions import parse
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
@@ -19,7 +20,6 @@ from rotorid.identify.second_order import second_order
 from rotorid.identify.simulation import simulate
 from rotorid.report.equations import BEHIND, Equations, Row
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_job
 
 IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
 ROTOR = sample_data() / "rotor23.csv"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from balancing import reading_of
+from rotorid.files import InputError, read_job
 from rotorid.samples import sample_data
-from rotorid.tables import InputError, read_job
 from rotorid.worksheet.runs_so_far import runs_so_far
 
 TURBO = sample_data() / "turbo_job" / "job.toml"
