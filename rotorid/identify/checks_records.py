@@ -21,6 +21,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
+from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import Iterations, Problem, at
 from rotorid.regression import gain, least_squares, solution
@@ -67,6 +68,8 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
     words += [poor, cause, path.bound_warning]
+    if problem.integrator in (*HEUN, "rk4"):
+        words.append(f"± do not count what a step of {problem.integrator} from sample to sample is off")
     if path.converged:
         estimate = combined(problem, estimate)
         words += ["" if estimate.full_rank or poor else estimate.describe_rank()]

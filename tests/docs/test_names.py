@@ -12,7 +12,7 @@ import pytest
 from cases import each_of
 
 PACKAGES = ("fem", "balancing", "rotorid")
-ROOMS = ("identify", "reduction", "calibration", "tables")
+ROOMS = ("identify", "reduction", "calibration", "files")
 LISTS = (*PACKAGES, *(f"rotorid.{room}" for room in ROOMS))
 
 
