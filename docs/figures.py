@@ -24,7 +24,7 @@ RESPONSE = (
     f"--speeds 1000:15000:100rpm {PROBES}"
 )
 MOTION = "sample_data/motion"
-RUN_UP = "sample_data/waveforms/run_up.wav --tacho 1 --sensors 2,3,4 --unit um --phase lag"
+RUN_UP = "sample_data/waveforms/run_up.wav --tacho 1 --unit um --phase lag"
 THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
 PNG_DOTS = 150
 """Dots an inch of a .png."""

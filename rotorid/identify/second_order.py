@@ -10,6 +10,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.ode import OdeModel, check_known, ode_model, read_expression
 
+__all__ = ["second_order"]
+
 Matrix = Sequence[Sequence[float | str]] | FloatArray
 """Numbers or expressions of parameters, (n, n)."""
 
