@@ -288,7 +288,7 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
         Column("action", [_action(c, plane) for plane in planes]),
         Column("hole", [place[1] for place in places], str),
-        Column("angle_deg", np.mod(angle + 180.0 * gone, 360), "{:.1f}°".format, "angle"),
+        Column("angle_deg", np.round(np.mod(angle + 180.0 * gone, 360), 9), "{:.1f}°".format, "angle"),
         Column("mass", size, figures, labels.weight_in),
         Column("unit", [labels.weight_unit] * len(places)),
         Column("pieces", [place[3] for place in places], str),

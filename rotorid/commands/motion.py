@@ -240,7 +240,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
 
     Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
 
-    Example: rotorid motion sample_data/motion/rotor.toml --run-up 1000:9000rpm --time 10 --plot bode.png
+    Example: rotorid motion sample_data/motion/unbalanced.toml --run-up 1000:9000rpm --time 10 --plot bode.png
     --view bode
 
     Parameters

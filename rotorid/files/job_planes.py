@@ -149,6 +149,9 @@ def make_limits(
             if unit.kind != vibration.kind:
                 expected = f"an amplitude in a unit that converts to {vibration.name}, as the readings have"
                 sensor.complain(problems, "limit", expected)
+            elif unit.name in units.VELOCITY and vibration.name.endswith("_rms"):
+                expected = f"limit_{unit.name}_rms, as the readings are, or limit_{unit.name}_pp"
+                sensor.complain(problems, "limit", expected)
             rows = _at_speeds(sensor, "limit", sensor.limit.value, trials, settings, math.inf, problems)
             residual[:, trials.sensors.index(name)] = rows / unit.scale
     limits = Limits(np.array(most), residual, arcs)

@@ -77,7 +77,7 @@ Name = Annotated[str, AfterValidator(_name)]
 Text = Annotated[float | str, PlainValidator(_expression, json_schema_input_type=float | str)]
 Texts = dict[Name, Text]
 Matrix = list[list[Text]]
-Limit = Annotated[float, Field(allow_inf_nan=True)]
+Limit = Annotated[float, Field(strict=True, allow_inf_nan=True)]
 Std = Annotated[Number, Field(ge=1e-30)]
 Estimates = Annotated[
     dict[Name, Number | None],

@@ -289,7 +289,7 @@ class Settings(BaseModel):
             return inner.problems
         usual, *steps = error["loc"]
         about, kind = cls.known_keys().get(str(usual), Key()), error["type"]
-        if kind == "missing":
+        if kind == "missing" and not steps:
             if usual in keys:  # with a unit that is none
                 return []
             expected = about.expected or f"a value: {about.about}"
@@ -307,6 +307,8 @@ class Settings(BaseModel):
             return [_problem(file, name, expected, value if table or near or len(keys) > 1 else None)]
         if kind == "value_error":
             words = str(inner)
+        elif kind == "missing":
+            words = "all values that belong there"
         else:
             words = next((words for begin, words in _WORDS.items() if kind.startswith(begin)), error["msg"])
             words = words.format(**error.get("ctx", {}), name=name)

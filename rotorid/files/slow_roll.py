@@ -120,10 +120,10 @@ def make_slow_roll(
     there = [name for name in given if name in sensors]
     whole[:, [sensors.index(name) for name in there]] = vectors[:, [given.index(name) for name in there]]
     if lacking := [name for name in sensors if name not in given]:
+        which, whose = ("sensors", "their") if len(lacking) > 1 else ("sensor", "its")
         words.append(
-            f"there is no slow-roll vector for {'sensors' if len(lacking) > 1 else 'sensor'} "
-            f"{listing(map(repr, lacking), 'and')}: its readings are used as they are (amplitude = 0 says "
-            "that nothing is to be subtracted)"
+            f"there is no slow-roll vector for {which} {listing(map(repr, lacking), 'and')}: {whose} "
+            "readings are used as they are (amplitude = 0 says that nothing is to be subtracted)"
         )
     return SlowRoll(sensors, whole if speeds is not None else whole[0], speeds, tuple(words))
 

@@ -222,7 +222,8 @@ class Estimate(Answered, Uncertain):
         if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > chance:
             return ""
         ratio = float(np.sqrt(self.chi_square / self.dof))
-        return f"residuals are {ratio:.2g} times as large as the stated errors explain"
+        more = f"{ratio:.2g} times as large as" if ratio >= 2 else f"{100 * (ratio - 1):.2g} % larger than"
+        return f"residuals are {more} the stated errors explain"
 
     @property
     def answer(self) -> Answer:
