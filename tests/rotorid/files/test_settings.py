@@ -197,7 +197,8 @@ def test_the_schema_has_every_key_in_every_unit_and_refuses_what_the_reader_refu
 @pytest.mark.parametrize("arcs", ["[[20]]", "[20]", "[[20, 60], [300]]", "[[]]"])
 def test_a_pair_that_is_too_short_is_a_problem_of_its_key(tmp_path, arcs):
     path = tmp_path / "job.toml"
-    path.write_text(
+    text = f'runs = "r.csv"\nweights = "w.csv"\n[planes.P1]\nforbidden_deg = {arcs}\n'
+    path.write_text(text, encoding="utf-8")
         f'runs = "r.csv"\nweights = "w.csv"\n[planes.P1]\nforbidden_deg = {arcs}\n', encoding="utf-8"
     )
     with pytest.raises(InputError, match=r"key planes\.P1\.forbidden_deg: found .* pairs \[from, to\]"):
