@@ -199,7 +199,5 @@ def test_a_pair_that_is_too_short_is_a_problem_of_its_key(tmp_path, arcs):
     path = tmp_path / "job.toml"
     text = f'runs = "r.csv"\nweights = "w.csv"\n[planes.P1]\nforbidden_deg = {arcs}\n'
     path.write_text(text, encoding="utf-8")
-        f'runs = "r.csv"\nweights = "w.csv"\n[planes.P1]\nforbidden_deg = {arcs}\n', encoding="utf-8"
-    )
     with pytest.raises(InputError, match=r"key planes\.P1\.forbidden_deg: found .* pairs \[from, to\]"):
         read_job(path)
