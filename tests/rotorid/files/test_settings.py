@@ -9,7 +9,7 @@ from cases import each_of
 from jsonschema import Draft202012Validator
 from pydantic import Field
 
-from rotorid.files import InputError, read_job, units
+from rotorid.files import InputError, read_harmonic_model, read_job, units
 from rotorid.files.problems import Problems
 from rotorid.files.settings import (
     Date,
@@ -201,3 +201,25 @@ def test_a_pair_that_is_too_short_is_a_problem_of_its_key(tmp_path, arcs):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"key planes\.P1\.forbidden_deg: found .* pairs \[from, to\]"):
         read_job(path)
+
+
+def test_a_bare_limit_in_mm_s_beside_rms_readings_is_asked_about(tmp_path):
+    lines = ["run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg", "base,1500,A,3,20", "trial,1500,A,2,80"]
+    (tmp_path / "r.csv").write_text("\n".join(lines), encoding="utf-8")
+    (tmp_path / "w.csv").write_text("run,plane,mass_g,angle_deg\ntrial,P,5,0\n", encoding="utf-8")
+    path = tmp_path / "job.toml"
+    for name, limit in (("limit_mm_s_rms", 1.0), ("limit_mm_s_pp", 1 / 8**0.5)):
+        path.write_text(f'runs = "r.csv"\nweights = "w.csv"\n[sensors.A]\n{name} = 1\n', encoding="utf-8")
+        job = read_job(path)
+        assert job.limits.residual * job.trials.labels.vibration_scale == pytest.approx(limit)
+    path.write_text('runs = "r.csv"\nweights = "w.csv"\n[sensors.A]\nlimit_mm_s = 1\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"key sensors\.A\.limit_mm_s: found '1', expected limit_mm_s_rms"):
+        read_job(path)
+
+
+def test_true_is_no_bound(tmp_path):
+    text = 'equations = ["c*X = F"]\n[estimate]\nc = 1\n[bounds]\nc = [false, true]\n'
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"key bounds\.c: found 'false', expected a number"):
+        read_harmonic_model(path)
