@@ -21,7 +21,7 @@ from pathlib import Path
 
 from benchmarks.peers import ROOT
 from benchmarks.timing import Row, relative_difference
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 
 sys.path[:0] = [str(ROOT / "tests" / "helpers")]
 SAMPLES = ROOT / "sample_data"

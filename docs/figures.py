@@ -328,7 +328,7 @@ def picture(name: str) -> bytes:
     """
     import matplotlib
 
-    from rotorid.cli import app
+    from rotorid.cli import application
 
     commands = [shlex.split(command) for command in (FIGURES[name].first, FIGURES[name].command) if command]
     with (
@@ -345,7 +345,7 @@ def picture(name: str) -> bytes:
         target = Path(folder) / f"{name}.{FIGURES[name].kind}"
         commands[-1] += ["--plot", str(target)]
         for words in commands:
-            app(words, standalone_mode=False)
+            application(words)(words, standalone_mode=False)
         return target.read_bytes()
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 
 JOB = Path(__file__).parents[1] / "sample_data" / "turbo_job" / "holes.toml"
 LIMIT = "3"  # µm peak-to-peak, of every probe at every speed

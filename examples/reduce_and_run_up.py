@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.commands import BearingsOptions, bearings
+from rotorid.commands.bearings import BearingsOptions, bearings
 from rotorid.files import read_rotor
 from rotorid.motion.equilibrium import at_rest, equilibrium
 from rotorid.motion.periodic import periodic_motion

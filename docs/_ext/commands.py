@@ -33,10 +33,10 @@ def all_commands() -> Iterator[tuple[str, Any]]:
     """Names and commands; a command has `params`, each with `opts`, `help`, `default` and more."""
     from typer.main import get_command
 
-    from rotorid.cli import app
+    from rotorid.cli import application
     from rotorid.cli.choices import tell_choices
 
-    group: Any = get_command(app)
+    group: Any = get_command(application())
     for name, command in group.commands.items():
         parts = getattr(command, "commands", {})  # of `rotorid fleet`
         for typed, one in ({f"{name} {part}": own for part, own in parts.items()} or {name: command}).items():

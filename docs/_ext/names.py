@@ -39,7 +39,7 @@ class Names(SphinxDirective):
 
 def entry(package: str, module: object, name: str) -> list[str]:
     """The lines of reStructuredText for one public name; refused if the package does not offer it."""
-    if name not in module.__all__:  # type: ignore[attr-defined]
+    if name not in getattr(module, "__all__", dir(module)):
         raise ValueError(f"{package} has no public name {name}")
     value = getattr(module, name)
     if inspect.isclass(value):

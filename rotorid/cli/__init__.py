@@ -4,33 +4,19 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from pkgutil import resolve_name
+from typing import Annotated, Any
 
 import typer
 
-from rotorid import commands
 from rotorid.base.answer import COLUMNS
-from rotorid.cli.choices import Command, Commands
+from rotorid.cli.choices import Command, Commands, whole_paragraphs
 from rotorid.cli.demo import demo
 from rotorid.commands.app import json_text, run, typer_command, written_help
 from rotorid.commands.progress import markup_mode
-from rotorid.fleet.fit import fleet_fit
-from rotorid.study.studies import study
 
-app = typer.Typer(
-    name="rotorid",
-    cls=Commands,
-    rich_markup_mode=markup_mode(),
-    invoke_without_command=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-fleet = typer.Typer(
-    no_args_is_help=True, help="Jobs of many machines as a table, and coefficients of their type."
-)
 _JOBS = {
     "Balance rotors": "balance vectors trial_weight split tolerance unbalance",
     "Compute rotors": "critical campbell response influence study",
@@ -83,20 +69,40 @@ def schema(
     typer.echo(json_text(schema_of(kind)))
 
 
-def _work_of(name: str) -> Callable[..., commands.Outcome]:
-    work: Callable[..., commands.Outcome] = study if name == "study" else getattr(commands, name)
+def _work_of(name: str) -> Callable[..., Any]:
+    """The function of a command; its module is loaded here."""
+    home = {"study": "rotorid.study.studies", "fleet_fit": "rotorid.fleet.fit"}
+    work: Callable[..., Any] = resolve_name(f"{home.get(name, f'rotorid.commands.{name}')}:{name}")
     return work
 
 
-for _job, _names in _JOBS.items():
-    for _name in _names.split():
-        _command = typer_command(_work_of(_name))
-        app.command(_name.replace("_", "-"), cls=Command, rich_help_panel=_job)(_command)
-fleet.command("fit", cls=Command)(typer_command(fleet_fit))
-app.add_typer(fleet, name="fleet", rich_help_panel="More")
-for _more in (worksheet, demo, schema):
-    _more.__doc__ = written_help(_more)
-    app.command(_more.__name__, cls=Command, rich_help_panel="More")(_more)
+def application(typed: Sequence[str] = ()) -> typer.Typer:
+    """The command line: of the one command that the first word names, or of all."""
+    app = typer.Typer(
+        name="rotorid",
+        cls=Commands,
+        rich_markup_mode=markup_mode(),
+        invoke_without_command=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        callback=_rotorid,
+        help=whole_paragraphs(written_help(_rotorid)),
+    )
+    panel_of = {name.replace("_", "-"): job for job, names in _JOBS.items() for name in names.split()}
+    one = typed[0] if typed and typed[0] in panel_of else ""
+    for name in [one] if one else panel_of:
+        command = typer_command(_work_of(name.replace("-", "_")))
+        app.command(name, cls=Command, rich_help_panel=panel_of[name])(command)
+    if not one:
+        fleet = typer.Typer(
+            no_args_is_help=True, help="Jobs of many machines as a table, and coefficients of their type."
+        )
+        fleet.command("fit", cls=Command)(typer_command(_work_of("fleet_fit")))
+        app.add_typer(fleet, name="fleet", rich_help_panel="More")
+        for more in (worksheet, demo, schema):
+            app.command(more.__name__, cls=Command, rich_help_panel="More", help=written_help(more))(more)
+    return app
 
 
 def _version(show: bool) -> None:
@@ -107,7 +113,6 @@ def _version(show: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _rotorid(
     ctx: typer.Context,
     version: bool = typer.Option(
@@ -126,9 +131,6 @@ def _rotorid(
         typer.echo(_overview())
 
 
-_rotorid.__doc__ = written_help(_rotorid)
-
-
 def _overview() -> str:
     """The four jobs, each with the first example of its first command, and what else there is for it."""
     lines = ["An example of each job, run in a checkout (else: rotorid demo DIR):"]
@@ -143,4 +145,4 @@ def _overview() -> str:
 
 def main() -> None:
     """Run the command line."""
-    run(app)
+    run(application(sys.argv[1:]))

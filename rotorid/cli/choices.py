@@ -63,10 +63,14 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
             parameter.help = f"{declared[0].help} {described(choices[parameter.name])}"
 
 
+def whole_paragraphs(text: str) -> str:
+    """Each paragraph of a docstring on one line."""
+    return "\n\n".join(" ".join(each.split()) for each in inspect.cleandoc(text).split("\n\n"))
+
+
 def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
     """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
-    paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
-    command.help = "\n\n".join(" ".join(each.split()) for each in paragraphs)
+    command.help = whole_paragraphs(command.help or "")
     for parameter in command.get_params(ctx):
         parameter._get_number_range_help_str = lambda: ""  # a refusal tells it
         if parameter.param_type_name == "argument" or parameter.is_flag:

@@ -66,8 +66,8 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
 
 def _run(words: list[str]) -> str:
     """What one command prints."""
-    from rotorid.cli import app
+    from rotorid.cli import application
 
     with contextlib.redirect_stdout(io.StringIO()) as text:
-        app(words, prog_name="rotorid", standalone_mode=False)
+        application(words)(words, prog_name="rotorid", standalone_mode=False)
     return text.getvalue()

@@ -70,7 +70,7 @@ def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]
 def _balance(job: str, asked: dict[str, Any]) -> tuple[Balance, list[str]]:
     """The job as it is now, balanced once for each version of its files, and what reading it warned of."""
     from rotorid.base.answer import kinds
-    from rotorid.commands import BalanceOptions, balance
+    from rotorid.commands.balance import BalanceOptions, balance
 
     name = json.dumps(asked)
     if name not in _kept:
@@ -167,7 +167,7 @@ def sheet(job: str, asked: dict[str, Any]) -> str:
 
 def trial(job: str | None, options: dict[str, Any]) -> dict[str, Any]:
     """A first trial weight, with the job's coefficients or from the load alone."""
-    from rotorid.commands import TrialWeightOptions, trial_weight
+    from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
 
     made = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
     answer = in_words(made)

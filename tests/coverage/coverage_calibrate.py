@@ -30,7 +30,7 @@ from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters
 from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
-from rotorid.commands import Balance, balance
+from rotorid.commands.balance import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
 from rotorid.files import Conventions, Job
 

@@ -9,7 +9,7 @@ from repetitions import FULL, of_a_spread
 import fem
 from fem.parameters import with_parameters
 from rotorid import read_job
-from rotorid.commands import balance
+from rotorid.commands.balance import balance
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "calibration"

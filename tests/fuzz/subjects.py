@@ -44,7 +44,7 @@ class Subject:
 
 
 def _influence(folder):
-    from rotorid.commands import balance
+    from rotorid.commands.balance import balance
     from rotorid.files import write_influence
 
     write_influence(folder / "influence.csv", balance(folder / "job.toml").influence)

@@ -8,7 +8,7 @@ from repetitions import FULL
 from golden.cases import CASES
 from golden.running import run
 from rotorid.base.answer import COLUMNS
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.samples import sample_data
 
 FEW = (

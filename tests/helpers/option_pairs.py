@@ -8,7 +8,7 @@ import sys
 import typer.main
 from typer.core import TyperGroup
 
-from rotorid.cli import app
+from rotorid.cli import application
 
 
 def options_of_commands():
@@ -27,7 +27,7 @@ def options_of_commands():
             for option in command.params
             if option.param_type_name == "option" and option.name != "help"
         ]
-        for name, command in commands(typer.main.get_command(app))
+        for name, command in commands(typer.main.get_command(application()))
     }
 
 

@@ -7,7 +7,7 @@ from unittest import mock
 
 from documents import is_text, undrawn
 
-from rotorid.cli import app
+from rotorid.cli import application
 from rotorid.commands.app import Destination
 from rotorid.samples import sample_data
 
@@ -58,7 +58,7 @@ def outcome_of(name):
         mock.patch.object(Destination, "deliver", lambda self, what, work, options=None: made.append(work())),
         contextlib.redirect_stdout(io.StringIO()),
     ):
-        app(words, prog_name="rotorid", standalone_mode=False)
+        application(words)(words, prog_name="rotorid", standalone_mode=False)
     return made[0]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import balancing
 import fem
 import rotorid
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.samples import sample_data
 
 

@@ -12,7 +12,7 @@ import pytest
 from tables_data import write_csv
 from workbook_jobs import as_workbook
 
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import write_influence
 from rotorid.samples import sample_data
 

@@ -6,7 +6,7 @@ import pytest
 
 import fem
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
-from rotorid.commands import BearingsOptions, bearings
+from rotorid.commands.bearings import BearingsOptions, bearings
 from rotorid.files import read_rotor, write_rotor
 from rotorid.reduction import SmallModel
 from rotorid.samples import sample_data

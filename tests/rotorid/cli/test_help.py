@@ -5,13 +5,12 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer.main
 from golden.cases import CASES, STORED
 from repetitions import FULL
 from typer.core import TyperOption
 
+import rotorid.cli
 from rotorid.base.answer import COLUMNS
-from rotorid.cli import app
 from rotorid.samples import sample_data
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))
@@ -53,8 +52,7 @@ def test_every_option_has_a_panel_and_the_first_two_are_short(name):
 @pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain):
     monkeypatch.setenv("COLUMNS", str(COLUMNS))
-    shown = COMMANDS.get(name, typer.main.get_command(app))
-    monkeypatch.setattr(shown, "rich_markup_mode", None if plain else "rich")
+    monkeypatch.setattr(rotorid.cli, "markup_mode", lambda: None if plain else "rich")
     text = cli(*name.split(), "--help").out
     assert max(map(len, text.splitlines())) <= COLUMNS
     if name:

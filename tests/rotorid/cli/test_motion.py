@@ -9,7 +9,7 @@ import pytest
 
 import fem
 from fem import JournalBearing, MuszynskaSeal
-from rotorid.commands import MotionOptions, motion
+from rotorid.commands.motion import MotionOptions, motion
 from rotorid.commands.moving import moving
 from rotorid.files import read_rotor, write_rotor
 from rotorid.motion.run import run

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.commands import SplitOptions, split
 from rotorid.commands.option_quantities import vectors
+from rotorid.commands.split import SplitOptions, split
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.commands import trial_weight
+from rotorid.commands.trial_weight import trial_weight
 from rotorid.samples import sample_data
 
 FORCE = ("--load", "500kg", "--speed", "3000rpm", "--radius", "200mm")

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from rotorid.commands import CampbellOptions, ResponseOptions, campbell, critical, response
+from rotorid.commands.campbell import CampbellOptions, campbell
+from rotorid.commands.critical import critical
 from rotorid.commands.quantities import band, nodes, sensors
+from rotorid.commands.response import ResponseOptions, response
 from rotorid.samples import sample_data
 
 

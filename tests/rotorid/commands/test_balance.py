@@ -5,7 +5,7 @@ import math
 import pytest
 from documents import same
 
-from rotorid.commands import Balance, BalanceOptions, balance
+from rotorid.commands.balance import Balance, BalanceOptions, balance
 from rotorid.files import job_from_files, read_job
 from rotorid.samples import sample_data
 

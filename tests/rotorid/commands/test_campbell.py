@@ -8,7 +8,7 @@ import pytest
 import fem
 from fem.parameters import spread
 from rotorid import read_rotor
-from rotorid.commands import CampbellOptions, campbell
+from rotorid.commands.campbell import CampbellOptions, campbell
 
 RPM = np.pi / 30
 

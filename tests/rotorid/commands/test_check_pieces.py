@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rotorid.cli import app
-from rotorid.commands import BalanceOptions, balance
+from rotorid.cli import application
+from rotorid.commands.balance import BalanceOptions, balance
 
 HEAD = "run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg\n"
 WEIGHTS = "run,plane,mass_g,angle_deg\n"
@@ -75,7 +75,7 @@ def test_the_first_line_says_what_is_mounted_and_what_is_left(tmp_path: Path, op
     pieces = balance(machine.job(), BalanceOptions(split=True)).mounted
     assert pieces is not None
     job = machine.checked(1e3 * pieces.weights)
-    said = CliRunner().invoke(app, ["balance", str(job), *options])
+    said = CliRunner().invoke(application(), ["balance", str(job), *options])
     assert said.exit_code == 0
     assert not any(line.startswith("Mount") for line in said.output.splitlines())
     outcome = balance(job, BalanceOptions(split="--split" in options, refine="--refine" in options))

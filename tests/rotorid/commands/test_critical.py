@@ -10,7 +10,7 @@ from tables_data import write_csv
 import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
-from rotorid.commands import CriticalOptions, critical
+from rotorid.commands.critical import CriticalOptions, critical
 
 
 def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):

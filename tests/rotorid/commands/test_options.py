@@ -8,35 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rotorid.commands as commands
-from rotorid.commands import (
-    BalanceOptions,
-    CampbellOptions,
-    CriticalOptions,
-    FitOptions,
-    InfluenceOptions,
-    ReduceOptions,
-    ResponseOptions,
-    SplitOptions,
-    ToleranceOptions,
-    TrialWeightOptions,
-    UnbalanceOptions,
-    balance,
-    campbell,
-    critical,
-    fit,
-    identify,
-    influence,
-    reduce,
-    response,
-    split,
-    tolerance,
-    trial_weight,
-    unbalance,
-)
+from rotorid.cli import _JOBS, _work_of
+from rotorid.commands.balance import BalanceOptions, balance
+from rotorid.commands.campbell import CampbellOptions, campbell
+from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.fit import FitOptions, fit
+from rotorid.commands.identify import identify
+from rotorid.commands.influence import InfluenceOptions, influence
+from rotorid.commands.reduce import ReduceOptions, reduce
+from rotorid.commands.response import ResponseOptions, response
+from rotorid.commands.split import SplitOptions, split
+from rotorid.commands.tolerance import ToleranceOptions, tolerance
+from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
+from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.files import read_job
 from rotorid.files.input_file import each_file_once
 from rotorid.report.options import changed, checked, plain
+from rotorid.report.outcome import options_of
 from rotorid.samples import sample_data
 
 SAMPLES = sample_data()
@@ -44,7 +32,7 @@ ROTOR = SAMPLES / "rotor23.csv"
 JOB = SAMPLES / "bk_two_plane" / "job.toml"
 MODEL = SAMPLES / "fit" / "run_down" / "model.toml"
 RECORD = SAMPLES / "fit" / "run_down" / "record.csv"
-KINDS = [getattr(commands, name) for name in commands.__all__ if name.endswith("Options")]
+KINDS = [options_of(_work_of(name)) for names in _JOBS.values() for name in names.split()]
 NEEDED = {"speeds": (100.0,), "mass": 1.0, "speed": 1.0, "grade": 1.0, "stations": (6,), "planes": (7,)}
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.commands import PeriodicOptions, ResponseOptions, periodic, response
+from rotorid.commands.periodic import PeriodicOptions, periodic
+from rotorid.commands.response import ResponseOptions, response
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "motion" / "rotor.toml"

@@ -12,7 +12,7 @@ from tables_data import write_csv
 import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
-from rotorid.commands import ResponseOptions, response
+from rotorid.commands.response import ResponseOptions, response
 from rotorid.files import read_unbalance
 from rotorid.files.small_model import small_model_files
 from rotorid.reduction import small_model

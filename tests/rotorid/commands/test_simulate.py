@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from rotorid.commands import SimulateOptions, simulate
+from rotorid.commands.simulate import SimulateOptions, simulate
 from rotorid.files import read_measurements, read_ode_model, read_record
 from rotorid.identify import AmplitudeErrors, harmonic_model
 from rotorid.samples import sample_data

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from scipy.io import wavfile
 
-from rotorid.commands import BalanceOptions, VectorsOptions, balance, vectors
+from rotorid.commands.balance import BalanceOptions, balance
+from rotorid.commands.vectors import VectorsOptions, vectors
 from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
 

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from balancing import UndeterminedError
-from rotorid.commands import balance
-from rotorid.commands.balance import BalanceOptions
+from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import read_job
 from rotorid.fleet import FleetFitOptions, fleet_fit
 from rotorid.fleet.jobs import read_fleet

@@ -3,7 +3,7 @@
 import numpy as np
 from documents import check_hygiene
 
-from rotorid.commands import ModesOptions, modes
+from rotorid.commands.modes import ModesOptions, modes
 
 M = np.diag([20.0, 20.0, 10.0])
 K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])

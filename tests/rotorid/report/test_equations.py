@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy
 
-from rotorid.commands import BalanceOptions, balance
+from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.reduce import ReduceOptions, reduce

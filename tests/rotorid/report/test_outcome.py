@@ -3,7 +3,8 @@
 import pytest
 from sheets import COMMANDS, disagreements, make, read_sheet
 
-from rotorid.commands import CriticalOptions, IdentifyOptions, critical, identify
+from rotorid.commands.critical import CriticalOptions, critical
+from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.samples import sample_data
 
 MINE = [name for name in COMMANDS if not name.startswith("balance")]

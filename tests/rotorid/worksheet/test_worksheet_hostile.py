@@ -91,7 +91,7 @@ def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_pa
     import numpy as np
 
     from balancing import reading_of
-    from rotorid.commands import balance
+    from rotorid.commands.balance import balance
     from rotorid.worksheet.runs_so_far import runs_so_far
 
     header = "run,speed_rpm,sensor,repeat,amplitude_um_pp,phase_deg\n"
