@@ -37,26 +37,23 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
     Formulas count with the values that the spreadsheet program stored.
     """
     data = read_bytes(path, problems)
-    return None if data is None else sheets_in(path, data, problems)
-
-
-def sheets_in(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row]] | None:
-    """What `read_workbook` gives, of a workbook that has been read; `path` is for messages."""
-    if not data.startswith(b"PK"):
-        problems.add(str(path), None, None, None, "an Excel workbook, as the name says; this is none")
+    if data is None:
         return None
     try:
+        if not data.startswith(b"PK"):
+            raise _RefusedError("an Excel workbook, as the name says; this is none")
         _check_size(data)
         return _sheets(str(path), data, time.monotonic() + MOST_SECONDS, problems)
-    except _TooLarge as error:
-        problems.add(str(path), None, None, None, str(error))
+    except _RefusedError as error:
+        expected = str(error)
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        problems.add(str(path), None, None, None, f"an intact Excel workbook (reading it failed: {reason})")
+        expected = f"an intact Excel workbook (reading it failed: {reason})"
+    problems.add(str(path), None, None, None, expected)
     return None
 
 
-class _TooLarge(ValueError):
+class _RefusedError(ValueError):
     """The message says what was expected instead."""
 
 
@@ -66,7 +63,7 @@ def _check_size(data: bytes) -> None:
         size = sum(part.file_size for part in archive.infolist())
     most = min(MOST_UNPACKED, 10_000_000 + MOST_PACKING * len(data))
     if size > most:
-        raise _TooLarge(
+        raise _RefusedError(
             f"a workbook of at most {most / 1e6:.0f} MB unpacked; this one has {size / 1e6:.0f} MB"
         )
 
@@ -112,7 +109,7 @@ def _rows(rows: Iterable[tuple[int, list[Any]]], deadline: float) -> Iterator[Ro
     total = 0
     for number, written in rows:
         if time.monotonic() > deadline:
-            raise _TooLarge(f"a workbook that can be read in {MOST_SECONDS:.0f} seconds")
+            raise _RefusedError(f"a workbook that can be read in {MOST_SECONDS:.0f} seconds")
         cells = {cell.column: value for cell in written if (value := _cell(cell)) != ""}
         if not cells:
             continue
@@ -120,7 +117,7 @@ def _rows(rows: Iterable[tuple[int, list[Any]]], deadline: float) -> Iterator[Ro
             raise ValueError(f"a cell beyond row {LAST_ROW} or column {LAST_COLUMN}")
         total += max(cells)
         if total > MOST_CELLS:
-            raise _TooLarge(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
+            raise _RefusedError(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
         yield number, tuple(cells.get(column, "") for column in range(1, max(cells) + 1))
 
 
@@ -157,16 +154,9 @@ def pick_sheet(
     path: Path, sheets: dict[str, list[Row]], name: str, problems: Problems, *, first: bool = False
 ) -> tuple[str, list[Row]] | None:
     """The sheet of this name, else the only one that holds something (or, with `first`, the first)."""
-    named = find_sheet(sheets, name)
-    if named is not None:
-        return named, sheets[named]
-    filled = [title for title, rows in sheets.items() if rows] or list(sheets)
-    if filled and (first or len(filled) == 1):
-        return filled[0], sheets[filled[0]]
+    there = [title for title in sheets if title.strip().casefold() == name][:1]
+    there = there or [title for title, rows in sheets.items() if rows] or list(sheets)
+    if there and (first or len(there) == 1):
+        return there[0], sheets[there[0]]
     problems.add(str(path), None, None, None, f"a sheet {name!r}; the sheets are {', '.join(sheets)}")
     return None
-
-
-def find_sheet(sheets: dict[str, list[Row]], name: str) -> str | None:
-    """The title of the sheet of this name, capitals aside."""
-    return next((title for title in sheets if title.strip().casefold() == name), None)

@@ -39,6 +39,7 @@ WEIGHTS = "weights"
 """In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
 READINGS = ("runs", "check", "slow_roll")
 """Those that are runs tables."""
+WEIGHT_TABLES = ("weights", "check_weights")
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
 MOST_HOLES = 1000
 SAME_DEG = 1e-4
