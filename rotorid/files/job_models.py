@@ -53,9 +53,11 @@ _LIMIT = "an amplitude above 0 in the unit of the readings"
 def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
     """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
     named = {key: settings.get(key) for key in TABLES}
-    if named["check_weights"] == WEIGHTS:
-        del named["check_weights"]
-    return {key: name for key, name in named.items() if isinstance(name, str)}
+    return {
+        key: name
+        for key, name in named.items()
+        if isinstance(name, str) and (key, name) != ("check_weights", WEIGHTS)
+    }
 
 
 def _printable(name: str) -> str:
@@ -218,28 +220,51 @@ class Plane(_Placed):
             degrees = tuple(self.first_hole + 360.0 * k / self.holes for k in range(self.holes))
         return dict(zip(self.hole_names or map(str, range(1, len(degrees) + 1)), degrees, strict=False))
 
+    def open_holes(self) -> dict[str, float]:
+        """Those outside the forbidden arcs, and those in which something is."""
+        near, arcs = SAME_DEG, [(first, (last - first) % 360.0) for first, last in self.forbidden]
+        return {
+            name: angle
+            for name, angle in self.hole_angles().items()
+            if name in self.taken
+            or not any(near < (angle - first) % 360.0 < width - near for first, width in arcs)
+        }
+
+    @property
+    def angles(self) -> list[float]:
+        """All that the job writes of it in degrees."""
+        return [*self.hole_angles().values(), *(end for arc in self.forbidden for end in arc)]
+
+    @property
+    def lever(self) -> float:
+        """What a trial weight counts at the correction radius, since mass × radius is what acts."""
+        return 1.0 if self.radius is None else (self.trial_radius or self.radius) / self.radius
+
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Radii and keys of holes that do not fit together."""
         yield from super().wrong()
+        if self.trial_radius is not None and self.radius is None:
+            yield (
+                "trial_radius",
+                "the correction radius too, radius_mm, to which the trial weights are converted",
+            )
         if self.holes is not None and self.holes_at is not None:
             yield "holes", "either holes, equally spaced, or holes_deg, their angles, not both"
             return
         if self.has("first_hole") and self.holes is None:
             yield "first_hole", "the number of equally spaced holes too, holes = 12"
-        names = tuple(self.hole_angles())
-        about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
-        if not names:
+        count, names = self.holes or len(self.holes_at or ()), tuple(self.hole_angles())
+        if not count:
             wanted = "the holes of the plane too, holes = 12 or holes_deg = [0, 30, 75]"
+            about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
             yield from ((one, wanted) for one in about_holes if self.has(one))
-            return
-        count = self.holes or len(self.holes_at or ())
-        if self.hole_names is not None and len(set(self.hole_names)) != count:
+        elif self.hole_names is not None and len({*self.hole_names}) != count:
             yield "hole_names", f"a different name for each of the {count} holes"
-            return
-        if self.has("per_hole") and self.available is None:
-            yield "per_hole", "the weights that are available too, available_g = [5, 10]"
-        for name in self.taken.keys() - names:
-            yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
+        else:
+            if self.has("per_hole") and self.available is None:
+                yield "per_hole", "the weights that are available too, available_g = [5, 10]"
+            for name in self.taken.keys() - names:
+                yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
 
 
 class Sensor(_Placed):

@@ -115,7 +115,7 @@ def balance_report(
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
-        trial_radii=bool(job.trial_radii),
+        trial_radii=any(plane.trial_radius for plane in job.planes.values()),
         slow_roll=job.slow_roll is not None,
     )
 
