@@ -426,9 +426,9 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
     """
     if not weights and not amplitudes:
         return job
-    trials, unit, planes = job.trials, job.trials.labels.weight_unit, list(job.planes)
-    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(planes))
-    most, residual, holes = old.max_weight.copy(), old.residual.copy(), dict(job.holes)
+    trials, unit = job.trials, job.trials.labels.weight_unit
+    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
+    most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
     for plane, weight in weights.items():
         size = in_job_units(weight, unit, job.planes[plane].radius)
         if size is None:
@@ -436,9 +436,8 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
                 f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
                 f"only with a radius_mm of plane {plane!r} in the job"
             )
-        most[planes.index(plane)] = size[0]
-        if plane in holes:
-            holes[plane] = replace(holes[plane], max_weight=size[0])
+        most[plane] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
-    return replace(job, limits=Limits(most, residual, old.forbidden), holes=holes)
+    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
+    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)

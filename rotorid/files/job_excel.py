@@ -57,7 +57,7 @@ class WrittenJob:
     @property
     def folder(self) -> Path:
         """From which files are named."""
-        return Path() if self.path is None else self.path.parent
+        return (self.path or Path()).parent
 
     def read(self, problems: Problems) -> JobSettings:
         """All settings; a file that is named in place of a sheet is a problem."""

@@ -26,7 +26,6 @@ from rotorid.files.settings import (
     Turn,
     Whole,
     by_name,
-    entries,
     key,
     listed,
     of,
@@ -46,8 +45,6 @@ SAME_DEG = 1e-4
 Pair = tuple[Turn, Turn]
 _ANY_NUMBER = r"([+-]?[0-9]+(?:[.,][0-9]+)?)"
 _PAIR = re.compile(rf"{_ANY_NUMBER}\s*(?:-|\N{{EN DASH}}|\.\.|:|to)\s*{_ANY_NUMBER}")
-_ARCS = "pairs [from, to] of different angles from -360 to 360 degrees, such as [[20, 60], [300, 340]]"
-_LIMIT = "an amplitude above 0 in the unit of the readings"
 
 
 def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
@@ -72,11 +69,8 @@ def _printable(name: str) -> str:
 def _pairs(value: object) -> object:
     """One pair, or a text of them, as pairs."""
     if isinstance(value, str):
-        found = [_PAIR.fullmatch(part.strip()) for part in value.split(";") if part.strip()]
-        value = [
-            [float(m[i].replace(",", ".")) for i in (1, 2)] if m else part
-            for part, m in zip(value, found, strict=False)
-        ]
+        parts = [part.strip() for part in value.split(";") if part.strip()]
+        return [list(pair.groups()) if (pair := _PAIR.fullmatch(part)) else part for part in parts]
     flat = isinstance(value, list) and not any(isinstance(one, list) for one in value)
     return [value] if flat and value else value
 
@@ -89,53 +83,33 @@ def _different(arcs: tuple[Pair, ...]) -> tuple[Pair, ...]:
 
 def _or_one(value: object) -> object:
     """A number for all speeds, at the speed ""."""
-    alone = not isinstance(value, dict) and ":" not in str(value)
-    return {"": value} if alone else entries(value)
+    return value if isinstance(value, dict) or ":" in str(value) else {"": value}
 
 
 def _kind(value: object) -> str:
     return "file" if isinstance(value, str) else "vectors"
 
 
-_NUMBERS = Annotated[dict[str, NotNegative], Field(min_length=1)]
-_LIMITS = Annotated[dict[str, Positive], Field(min_length=1)]
 Arcs = Annotated[
     tuple[Pair, ...],
     BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | str),
     AfterValidator(_different),
     Field(min_length=1),
 ]
-Limits = Annotated[
-    dict[str, Positive],
-    BeforeValidator(_or_one, json_schema_input_type=Positive | _LIMITS | str),
-    Field(min_length=1),
-]
-SpeedWeights = Annotated[
-    dict[str, NotNegative],
-    BeforeValidator(entries, json_schema_input_type=_NUMBERS | str),
-    Field(min_length=1),
+Limits: Any = Annotated[
+    by_name(Positive),
+    BeforeValidator(_or_one, json_schema_input_type=Positive | by_name(Positive)),
 ]
 Weight = Annotated[Quantity, of(Positive)]
 File = Annotated[Text, AfterValidator(_printable)]
-Files = Annotated[
-    tuple[File, ...],
-    BeforeValidator(
-        lambda v: v if isinstance(v, list) else (v,),
-        json_schema_input_type=Text | Annotated[list[Text], Field(min_length=1)],
-    ),
-    Field(min_length=1),
-]
+Count = Annotated[Whole, Field(ge=1)]
 
 
 class _Placed(Settings):
     """What may stand in the rotor model."""
 
-    node: Annotated[Whole, Field(ge=1)] | None = key(
-        "where it is in the rotor model, by number", default=None, expected="a node of the rotor model"
-    )
-    station: Text | None = key(
-        "or by name", default=None, expected="the name of a station of the rotor model, in quotes"
-    )
+    node: Count | None = key("a node of the rotor model", default=None)
+    station: Text | None = key("or the name of a station of the rotor model", default=None)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Both."""
@@ -163,37 +137,32 @@ class Plane(_Placed):
         "whether material is taken away (drilled, ground) instead of added", default=False, example="false"
     )
     forbidden: Arcs = key(
-        "arcs from … to … where nothing may be mounted",
+        "pairs [from, to] of different angles from -360 to 360 degrees, between which nothing may be mounted",
         "forbidden_deg",
         (),
-        expected=f"{_ARCS}, in a sheet 20-60; 300-340",
         example="[[20, 60], [300, 340]]",
     )
     holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = key(
-        "a number of equally spaced holes",
+        f"a number of equally spaced holes, up to {MOST_HOLES:,}",
         default=None,
-        expected=f"the number of holes, equally spaced, a whole number from 1 to {MOST_HOLES}",
     )
     first_hole: Turn = key("angle of the first of them, default 0", "first_hole_deg", 0.0)
     holes_at: listed(Number) | None = key(  # type: ignore[valid-type]
-        "or the angles of the holes",
+        "angles of the holes in degrees, in place of `holes`",
         "holes_deg",
         None,
-        expected="angles of the holes in degrees, such as holes_deg = [0, 30, 75]",
         example="holes_deg = [0, 30, 75]",
     )
     hole_names: listed(Label) | None = key(  # type: ignore[valid-type]
-        "names of the holes instead of the numbers 1, 2, …",
+        "a different name for each hole, in place of the numbers 1, 2, …",
         default=None,
-        expected='a different name for each hole, such as ["A", "B", "C"]',
         example='["A", "B", "C"]',
     )
     available: Annotated[Quantity, of(listed(Positive))] | None = key(
-        "weights, in any unit, of which each can be mounted in a hole",
+        "weights, in any unit, of which each can be mounted",
         "available_g available_g_mm",
         None,
         units=units.WEIGHT,
-        expected="weights of which each can be mounted, such as available_g = [5, 10, 20]",
         example="available_g = [5, 10, 20]",
     )
     step: Weight | None = key("or any weight in such steps", "step_g step_g_mm", None, units=units.WEIGHT)
@@ -203,13 +172,11 @@ class Plane(_Placed):
     taken: by_name(Positive) = key(  # type: ignore[valid-type]
         "weights that are in holes already, by number or name of the hole",
         default={},
-        expected='weights that are in holes already, by number or name of the hole, such as { "3" = 10 }',
         example='{ "3" = 10 }',
     )
     stock: listed(Annotated[Whole, Field(ge=0)]) | None = key(  # type: ignore[valid-type]
         "how many there are of each available weight",
         default=None,
-        expected="how many there are of each available weight, such as stock = [4, 4, 2]",
         example="stock = [4, 4, 2]",
     )
 
@@ -271,11 +238,11 @@ class Sensor(_Placed):
     """`[sensors.NAME]`."""
 
     limit: Annotated[Quantity, of(Limits)] | None = key(
-        "largest amplitude, in the unit of the readings, or with its own, `limit_mm_s_rms`; or by speed",
+        "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
+        "table by speed",
         "limit",
         None,
         units=units.vibration,
-        expected=f'{_LIMIT}, or a table of them by speed, such as {{ "3000" = 20 }}, in a sheet 3000: 20',
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
@@ -289,43 +256,43 @@ class Sensor(_Placed):
 class Errors(Settings):
     """`[errors]`."""
 
-    amplitude_percent: NotNegative | None = key(
-        "one standard deviation of an amplitude, percent of it", default=None
+    amplitude_percent: NotNegative = key("one standard deviation of an amplitude, percent of it", default=0.0)
+    phase_deg: NotNegative = key("one standard deviation of a phase, degrees", default=0.0)
+    floor: NotNegative = key(
+        "one standard deviation at amplitude 0, in the unit of the readings", default=0.0
     )
-    phase_deg: NotNegative | None = key("one standard deviation of a phase, degrees", default=None)
-    floor: NotNegative | None = key(
-        "one standard deviation at amplitude 0, in the unit of the readings", default=None
+    run_percent: NotNegative = key(
+        "what changes from run to run, one standard deviation, percent", default=0.0
     )
-    run_percent: NotNegative | None = key(
-        "what changes from run to run, one standard deviation, percent", default=None
+    run_floor: NotNegative = key("the same at amplitude 0, in the unit of the readings", default=0.0)
+    placement_deg: NotNegative = key(
+        "one standard deviation of the angle of a mounted weight, degrees", default=0.0
     )
-    run_floor: NotNegative | None = key("the same at amplitude 0, in the unit of the readings", default=None)
-    placement_deg: NotNegative | None = key(
-        "one standard deviation of the angle of a mounted weight, degrees", default=None
+    placement_percent: NotNegative = key("one standard deviation of its mass, percent", default=0.0)
+    drift_percent: NotNegative = key(
+        "how far readings drift from the first run to the last, percent", default=0.0
     )
-    placement_percent: NotNegative | None = key("one standard deviation of its mass, percent", default=None)
-    drift_percent: NotNegative | None = key(
-        "how far readings drift from the first run to the last, percent", default=None
-    )
+
+    @property
+    def between_runs(self) -> bool:
+        """Whether they say what changes from run to run; 0: nothing."""
+        return self.has("run_percent") or self.has("run_floor")
 
     def stated_in(self, trials: Trials) -> Trials:
         """The runs with these errors: relative, in rad, and in the unit of the readings inside."""
         scale, reading, between = trials.labels.vibration_scale, None, None
         if self.amplitude_percent or self.phase_deg or self.floor:
-            reading = ReadingErrors(
-                (self.amplitude_percent or 0.0) / 100.0,
-                radians(self.phase_deg or 0.0),
-                (self.floor or 0.0) / scale,
-            )
-        if self.run_percent is not None or self.run_floor is not None:
-            between = RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / scale)
-        placement = Placement((self.placement_percent or 0.0) / 100.0, radians(self.placement_deg or 0.0))
-        drift = (self.drift_percent or 0.0) / 100.0
+            phase, floor = radians(self.phase_deg), self.floor / scale
+            reading = ReadingErrors(self.amplitude_percent / 100.0, phase, floor)
+        if self.between_runs:
+            between = RunScatter(self.run_percent / 100.0, self.run_floor / scale)
+        placement = Placement(self.placement_percent / 100.0, radians(self.placement_deg))
+        drift = self.drift_percent / 100.0
         return replace(trials, errors=reading, run_errors=between, placement=placement, drift=drift)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Nothing above 0."""
-        if not any(value or (name.startswith("run_") and value == 0) for name, value in self):
+        if not self.between_runs and not any(value for _, value in self):
             yield "", "an error above 0 (amplitude_percent, phase_deg or floor), or no [errors] at all"
 
 
@@ -333,9 +300,8 @@ class KeyPhasor(Settings):
     """`[key_phasor]`."""
 
     angle: Turn = key(
-        "where it stands, from the model's x, in the job's angle direction",
+        "the direction of the key phasor from the model's x, in the job's angle direction",
         "angle_deg",
-        expected="the direction of the key phasor, degrees from the model's x",
     )
 
 
@@ -343,15 +309,13 @@ class Vector(Settings):
     """`[slow_roll.SENSOR]`."""
 
     amplitude: Annotated[Quantity, of(NotNegative)] = key(
-        "at slow speed, in the unit of the readings; or `amplitude_<unit>`",
+        "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
         "amplitude",
         units=units.vibration,
-        expected="the amplitude at slow speed, in the unit of the readings",
     )
     phase: Turn = key(
-        "counted as the readings count it",
+        "the phase at slow speed, counted as the readings count it",
         "phase_deg",
-        expected="the phase at slow speed, counted as the readings count it",
     )
 
 
@@ -377,11 +341,7 @@ class Columns(Settings):
 class Sheet(Settings):
     """`[sheet]`."""
 
-    machine: Label = key("what was balanced; default: `machine` of the job", default="")
     place: Label = key("where it stands", default="")
-    date: Date | None = key(
-        "when it was balanced; default: `date` of the job", default=None, example="2026-03-17"
-    )
     engineer: Label = key("who balanced it", default="")
     instrument: Label = key("with what, its number", default="")
     zero: Literal["right", "top"] = key(
@@ -393,7 +353,7 @@ class Sheet(Settings):
 class JobSettings(Settings):
     """A job file."""
 
-    runs: Files | None = key(
+    runs: listed(File) | None = key(  # type: ignore[valid-type]
         "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
         default=None,
         expected='the runs table, or the files of the runs, runs = ["as found.csv", "trial.csv"]',
@@ -421,10 +381,9 @@ class JobSettings(Settings):
         'slow speed, slow_roll = "slow.csv"',
     )
     key_phasor: KeyPhasor | None = key("where the key phasor stands, see below", default=None)
-    speed_weights: SpeedWeights = key(
-        "weights of the speeds in the fit, 0: only for the limits",
+    speed_weights: by_name(NotNegative) = key(  # type: ignore[valid-type]
+        "a table of weights by speed in the fit, 0: only for the limits",
         default={},
-        expected='a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }',
         example='{ "3000" = 2, "4500" = 0.5 }',
     )
     phase: Phase | None = key(
@@ -454,9 +413,9 @@ class JobSettings(Settings):
     columns: Columns | None = key("other names of the columns of runs tables, see below", default=None)
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
-    machine: Label = key("its name or serial number, for `rotorid fleet`", default="")
-    machine_type: Label = key("its type, for the same", default="")
-    date: Date | None = key("when it was balanced, for the same", default=None, example="2026-03-17")
+    machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
+    machine_type: Label = key("its type, for `rotorid fleet`", default="")
+    date: Date | None = key("when it was balanced, for both", default=None, example="2026-03-17")
     sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
 
     def wrong(self) -> Iterator[tuple[str, str]]:

@@ -135,17 +135,20 @@ def key(
         for each name), or a reader of any unit after the name. The field is in SI, unless its type is `of` a
         `Quantity`.
     expected
-        For messages: what is expected, with an example; also where a required key is missing.
+        For messages: what is expected, with an example; also where a required key is missing. Unstated: what
+        it is, with the example.
     example
         How a file writes it.
     **limits
         Of pydantic: gt, ge, lt, le, min_length, max_length.
     """
     names = tuple(name.split())
+    plain = about.translate(_UNMARKED)
+    expected = expected or plain.partition(";")[0] + (f", such as {example}" if example else "")
     return Field(
         default,
         alias=names[0] if names else None,
-        description=about.translate(_UNMARKED),
+        description=plain,
         examples=[example] if example else None,
         json_schema_extra=Key(names, about, units, expected),
         **limits,
@@ -177,16 +180,14 @@ class _Table:
         return Problem(source, row, column, None if value is None else shown, expected)
 
 
-def _names(node: object, name: str = "") -> dict[int, str]:
+def _names(node: object, name: str = "") -> Iterator[tuple[int, str]]:
     """The dotted name of each table in a file, by identity."""
-    names, inside = {id(node): name}, list[tuple[str, object]]()
+    yield id(node), name
     if isinstance(node, dict):
-        inside = [(f"{name}.{key}".strip("."), value) for key, value in node.items()]
-    elif isinstance(node, list):
-        inside = [(f"{name}[{number}]", value) for number, value in enumerate(node, start=1)]
-    for inner, value in inside:
-        names |= _names(value, inner)
-    return names
+        for key, value in node.items():
+            yield from _names(value, f"{name}.{key}".strip("."))
+    for number, value in enumerate(node if isinstance(node, list) else (), start=1):
+        yield from _names(value, f"{name}[{number}]")
 
 
 class _Wrong(ValueError):
@@ -292,7 +293,7 @@ class Settings(BaseModel):
             return list(ctx["error"].problems)
         usual, steps = str(error["loc"][0]), error["loc"][1:]
         about, key = cls.known_keys().get(usual, Key()), table.keys.get(usual)
-        words = about.expected or f"a value: {about.about}"
+        words = about.expected
         if key is None or (kind == "missing" and not steps):  # the latter with a unit that is none
             return [] if key else [table.problem(usual, words)]
         node = table.data[key]
@@ -326,15 +327,12 @@ class Settings(BaseModel):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """As pydantic's, with each key in all its units."""
         schema, keys = handler.resolve_ref_schema(handler(core)), cls.known_keys()
-        plain, required = schema.get("properties", {}), schema.pop("required", [])
-        names = {usual: [*key.variants] for usual, key in keys.items()}
-        schema["properties"] = {name: plain[usual] for usual, all_ in names.items() for name in all_}
+        plain = schema.get("properties", {})
+        schema["properties"] = {name: plain[usual] for usual, key in keys.items() for name in key.variants}
         schema["patternProperties"] = {
             f"^{usual}_": plain[usual] for usual, key in keys.items() if callable(key.units)
         }
-        listed = [usual for usual in required if not callable(keys[usual].units)]
-        if listed:
-            schema["allOf"] = [{"anyOf": [{"required": [name]} for name in names[one]]} for one in listed]
+        schema["required"] = [usual for usual in schema.get("required", []) if not keys[usual].units]
         return schema
 
 
@@ -365,7 +363,7 @@ def read_settings(
     The model, or None where there are problems.
     """
     tables = dict(data)
-    names = _names(tables)
+    names = dict(_names(tables))
 
     def table(data: Mapping[str, Any]) -> _Table:
         return _Table(source, where or {}, names.get(id(data), ""), data)
@@ -413,12 +411,8 @@ def entries(value: object) -> object:
 
 
 def _day(value: object) -> object:
-    if isinstance(value, datetime.datetime):
-        return value.date()
-    if isinstance(value, datetime.date):
-        return value
     try:
-        return datetime.date.fromisoformat(str(value).strip())
+        return datetime.date.fromisoformat(str(value).strip().partition(" ")[0])  # without a time of the day
     except ValueError:
         raise ValueError("a date, such as 2026-03-17") from None
 

@@ -88,8 +88,7 @@ def balance_report(
         warnings=list(map(sentence, answer.warnings)),
         provenance=provenance,
         judgement=answer.judgement.splitlines(),
-        head={**dict.fromkeys(_HEAD, ""), "machine": job.machine, "date": job.date or ""}
-        | {key: value for key, value in job.sheet.items() if key in _HEAD and value},
+        head={key: job.sheet.get(key) or getattr(job, key, "") or "" for key in _HEAD},
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
         source=_SOURCES.get(result.influence.reading.source, ""),

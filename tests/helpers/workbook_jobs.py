@@ -43,7 +43,7 @@ PARTS = {
         '[sensors.A]\nlimit = { "1000" = 4.5 }\nweight = 2\n[sensors.B]\nlimit = 6\n'
     ),
     "machine": 'machine = "007"\nmachine_type = "fan-132"\ndate = 2026-03-17\n',
-    "sheet": '[sheet]\nplace = "hall 3"\nengineer = "N. N."\ndate = 2026-03-18\nzero = "top"\n',
+    "sheet": '[sheet]\nplace = "hall 3"\nengineer = "N. N."\nzero = "top"\n',
     "weights of speeds": 'speed_weights = { "1000" = 0.5 }\n',
     "holes": (
         "[planes.1]\nholes_deg = [-30, 0, 7.25]\nhole_names = ['A', '2', 'C 3']\navailable_g = [5, 2.5]\n"

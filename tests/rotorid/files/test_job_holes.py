@@ -145,8 +145,8 @@ def test_a_largest_weight_of_the_command_line_holds_for_the_holes(job):
 
 BAD = [
     ("holes = 4\nholes_deg = [0, 90]", "holes", "4", "either holes, equally spaced, or holes_deg"),
-    ("holes = 0", "holes", "0", "the number of holes, equally spaced, a whole number from 1 to 1000"),
-    ("holes = 2.5", "holes", "2.5", "a whole number from 1"),
+    ("holes = 0", "holes", "0", "a number of 1 or more: a number of equally spaced holes, up to 1,000"),
+    ("holes = 2.5", "holes", "2.5", "a whole number: a number of equally spaced holes, up to 1,000"),
     ("holes = 4\nfirst_hole_deg = 400", "first_hole_deg", "400", "a number up to 360"),
     ("holes_deg = [0]\nfirst_hole_deg = 5", "first_hole_deg", "5", "equally spaced holes too, holes = 12"),
     ("holes_deg = [0, 45, 45]", "holes_deg", "[0, 45, 45]", "holes 2 and 3 stand at the same angle"),
@@ -160,7 +160,12 @@ BAD = [
     ),
     ("available_g = [5]", "available_g", "[5]", "the holes of the plane too, holes = 12"),
     ("per_hole = 2", "per_hole", "2", "the holes of the plane too"),
-    ("holes = 4\navailable_g = [5, 0]", "available_g", "0", "a number above 0: weights of which"),
+    (
+        "holes = 4\navailable_g = [5, 0]",
+        "available_g",
+        "0",
+        "a number above 0: weights, in any unit, of which",
+    ),
     ("holes = 4\navailable_g = [5, 5]", "holes", "4", "a piece is listed twice"),
     ("holes = 4\navailable_g = 5\nstep_g = 1", "holes", "4", "either pieces or a smallest step"),
     ("holes = 4\nstep_g = 0", "step_g", "0", "a number above 0"),

@@ -156,8 +156,8 @@ def test_bad_planes(job, lines, key, value, words):
 
 
 BAD_SENSORS = [
-    ("limit = 0", "limit", "0", "an amplitude above 0"),
-    ('limit = "3 um"', "limit", "3 um", "in a sheet"),
+    ("limit = 0", "limit", "0", "largest amplitude above 0"),
+    ('limit = "3 um"', "limit", "3 um", "the unit stands in the name of the key"),
     (
         'limit = { "1500" = 3 }',
         "limit",
@@ -170,7 +170,7 @@ BAD_SENSORS = [
         'limit = { "1000" = 0 }',
         "limit.1000",
         "0",
-        "a number above 0: an amplitude above 0 in the unit of the readings",
+        "a number above 0: largest amplitude above 0, in the unit of the readings",
     ),
     ('limit = "1000: 3; 1000: 4"', "limit", "1000: 3; 1000: 4", "each name once"),
     ("weight = -1", "weight", "-1", "0 or more"),
