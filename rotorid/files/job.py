@@ -59,7 +59,6 @@ class Overrides:
     angles: str | None = None
     amplitude_error_percent: float | None = None
     phase_error_deg: float | None = None
-    waveforms: str | Path | None = None
 
     def on(self, settings: JobSettings) -> JobSettings:
         """The settings of a job with what the caller says; ValueError for an error below 0."""
@@ -196,8 +195,7 @@ def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
     path
         The job; files that it names are found relative to it.
     overrides
-        phase, angles, amplitude_error_percent, phase_error_deg: replace what the job says; waveforms: a
-        waveforms file, in place of the runs table.
+        phase, angles, amplitude_error_percent, phase_error_deg: replace what the job says.
 
     Returns
     -------
@@ -230,7 +228,7 @@ def job_from_files(
     influence
         Influence table.
     overrides
-        Conventions, stated errors and waveforms as of `read_job`; default: lead and with rotation, which the
+        Conventions and stated errors as of `read_job`; default: lead and with rotation, which the
         labels then call assumed; none stated.
 
     Returns
@@ -261,8 +259,6 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
     settings = overrides.on(written.read(problems))
     problems.stop()
     tables, records = tables_of(written, settings)
-    if overrides.waveforms is not None:
-        tables["runs"] = Path(overrides.waveforms)
     for key in READINGS:
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import io
-import tomllib
+import re
 import warnings
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -166,14 +165,8 @@ def _value(key: str, cell: Cell) -> Cell | bool:
 
 def _key_parts(key: str) -> list[str]:
     """Parts of a dotted key; as in a job file, one in quotes may hold points itself."""
-    parts: list[str] = []
-    if '"' in key or "'" in key:
-        with suppress(tomllib.TOMLDecodeError):
-            inner: Any = tomllib.loads(f"{key} = 0")
-            while isinstance(inner, dict) and len(inner) == 1:
-                [(part, inner)] = inner.items()
-                parts.append(part)
-    return parts or key.split(".")
+    parts = re.findall(r'"((?:[^"\\]|\\.)*)"|([^.]+)', key)
+    return [re.sub(r"\\(.)", r"\1", quoted) or plain for quoted, plain in parts]
 
 
 def _put(job: WrittenJob, parts: Sequence[str], value: object, place: Place) -> bool:

@@ -29,6 +29,7 @@ from rotorid.files.settings import (
     key,
     listed,
     of,
+    optional,
 )
 from rotorid.files.units import Quantity
 
@@ -108,8 +109,8 @@ Count = Annotated[Whole, Field(ge=1)]
 class _Placed(Settings):
     """What may stand in the rotor model."""
 
-    node: Count | None = key("a node of the rotor model", default=None)
-    station: Text | None = key("or the name of a station of the rotor model", default=None)
+    node: Count | None = optional("a node of the rotor model")
+    station: Text | None = optional("or the name of a station of the rotor model")
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Both."""
@@ -120,17 +121,16 @@ class _Placed(Settings):
 class Plane(_Placed):
     """`[planes.NAME]`."""
 
-    max_weight: Weight | None = key(
+    max_weight: Weight | None = optional(
         "largest weight that may be mounted, in any unit of a mass or unbalance",
         "max_mass_g max_unbalance_g_mm",
-        None,
         units=units.WEIGHT,
     )
-    radius: Positive | None = key(
-        "radius of the corrections; converts masses and unbalances", "radius_mm", None, units=RADIUS
+    radius: Positive | None = optional(
+        "radius of the corrections; converts masses and unbalances", "radius_mm", units=RADIUS
     )
-    trial_radius: Positive | None = key(
-        "radius of the trial weights, where it is another", "trial_radius_mm", None, units=RADIUS
+    trial_radius: Positive | None = optional(
+        "radius of the trial weights, where it is another", "trial_radius_mm", units=RADIUS
     )
     use: bool = key("whether the plane is used", default=True, example="false")
     remove: bool = key(
@@ -142,30 +142,26 @@ class Plane(_Placed):
         (),
         example="[[20, 60], [300, 340]]",
     )
-    holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = key(
+    holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = optional(
         f"a number of equally spaced holes, up to {MOST_HOLES:,}",
-        default=None,
     )
     first_hole: Turn = key("angle of the first of them, default 0", "first_hole_deg", 0.0)
-    holes_at: listed(Number) | None = key(  # type: ignore[valid-type]
+    holes_at: listed(Number) | None = optional(  # type: ignore[valid-type]
         "angles of the holes in degrees, in place of `holes`",
         "holes_deg",
-        None,
         example="holes_deg = [0, 30, 75]",
     )
-    hole_names: listed(Label) | None = key(  # type: ignore[valid-type]
+    hole_names: listed(Label) | None = optional(  # type: ignore[valid-type]
         "a different name for each hole, in place of the numbers 1, 2, …",
-        default=None,
         example='["A", "B", "C"]',
     )
-    available: Annotated[Quantity, of(listed(Positive))] | None = key(
+    available: Annotated[Quantity, of(listed(Positive))] | None = optional(
         "weights, in any unit, of which each can be mounted",
         "available_g available_g_mm",
-        None,
         units=units.WEIGHT,
         example="available_g = [5, 10, 20]",
     )
-    step: Weight | None = key("or any weight in such steps", "step_g step_g_mm", None, units=units.WEIGHT)
+    step: Weight | None = optional("or any weight in such steps", "step_g step_g_mm", units=units.WEIGHT)
     per_hole: Annotated[Whole, Field(ge=1, le=100)] = key(
         "how many weights one hole takes, default 1", default=1
     )
@@ -174,9 +170,8 @@ class Plane(_Placed):
         default={},
         example='{ "3" = 10 }',
     )
-    stock: listed(Annotated[Whole, Field(ge=0)]) | None = key(  # type: ignore[valid-type]
+    stock: listed(Annotated[Whole, Field(ge=0)]) | None = optional(  # type: ignore[valid-type]
         "how many there are of each available weight",
-        default=None,
         example="stock = [4, 4, 2]",
     )
 
@@ -237,19 +232,18 @@ class Plane(_Placed):
 class Sensor(_Placed):
     """`[sensors.NAME]`."""
 
-    limit: Annotated[Quantity, of(Limits)] | None = key(
+    limit: Annotated[Quantity, of(Limits)] | None = optional(
         "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
         "table by speed",
         "limit",
-        None,
         units=units.vibration,
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
         "weight in the fit, default 1; 0: the sensor counts only for its limit", default=1.0
     )
-    angle: Turn | None = key(
-        "where the sensor points, from the model's x, in the job's angle direction", "angle_deg", None
+    angle: Turn | None = optional(
+        "where the sensor points, from the model's x, in the job's angle direction", "angle_deg"
     )
 
 
@@ -322,16 +316,16 @@ class Vector(Settings):
 class Columns(Settings):
     """`[columns]`."""
 
-    run: Text | None = key("name in the file of the column `run`, and so on", default=None)
-    speed: Annotated[Quantity, of(Text)] | None = key(
-        "or another unit of a speed", "speed_rpm", None, units=units.SPEED
+    run: Text | None = optional("name in the file of the column `run`, and so on")
+    speed: Annotated[Quantity, of(Text)] | None = optional(
+        "or another unit of a speed", "speed_rpm", units=units.SPEED
     )
-    sensor: Text | None = key("not where each sensor has columns of its own", default=None)
-    amplitude: Annotated[Quantity, of(Text)] | None = key(
-        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", None, units=units.vibration
+    sensor: Text | None = optional("not where each sensor has columns of its own")
+    amplitude: Annotated[Quantity, of(Text)] | None = optional(
+        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", units=units.vibration
     )
-    phase: Annotated[Quantity, of(Text)] | None = key("or `phase_rad`", "phase_deg", None, units=units.ANGLE)
-    repeat: Text | None = key("of repeated readings", default=None)
+    phase: Annotated[Quantity, of(Text)] | None = optional("or `phase_rad`", "phase_deg", units=units.ANGLE)
+    repeat: Text | None = optional("of repeated readings")
 
     def in_file(self) -> dict[str, str]:
         """Fields by the names that the columns have in the file."""
@@ -353,19 +347,17 @@ class Sheet(Settings):
 class JobSettings(Settings):
     """A job file."""
 
-    runs: listed(File) | None = key(  # type: ignore[valid-type]
+    runs: listed(File) | None = optional(  # type: ignore[valid-type]
         "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
-        default=None,
         expected='the runs table, or the files of the runs, runs = ["as found.csv", "trial.csv"]',
     )
-    weights: File | None = key("the weights table", default=None)
-    influence: File | None = key("stored coefficients instead of trial runs, or beside them", default=None)
-    rotor: File | None = key("a rotor table or file: coefficients are computed", default=None)
-    check: File | None = key("runs table of a check run, with the proposed weights mounted", default=None)
-    check_weights: File | None = key(
+    weights: File | None = optional("the weights table")
+    influence: File | None = optional("stored coefficients instead of trial runs, or beside them")
+    rotor: File | None = optional("a rotor table or file: coefficients are computed")
+    check: File | None = optional("runs table of a check run, with the proposed weights mounted")
+    check_weights: File | None = optional(
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
         'where there are holes, else the weights; `"weights"`: these, although there are holes',
-        default=None,
     )
     slow_roll: (
         Annotated[
@@ -373,49 +365,45 @@ class JobSettings(Settings):
             Discriminator(_kind),
         ]
         | None
-    ) = key(
+    ) = optional(
         "a runs table of one run at slow speed, to be subtracted from every reading; or "
         "`[slow_roll.SENSOR]`, see below",
-        default=None,
         expected="vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at "
         'slow speed, slow_roll = "slow.csv"',
     )
-    key_phasor: KeyPhasor | None = key("where the key phasor stands, see below", default=None)
+    key_phasor: KeyPhasor | None = optional("where the key phasor stands, see below")
     speed_weights: by_name(NotNegative) = key(  # type: ignore[valid-type]
         "a table of weights by speed in the fit, 0: only for the limits",
         default={},
         example='{ "3000" = 2, "4500" = 0.5 }',
     )
-    phase: Phase | None = key(
+    phase: Phase | None = optional(
         "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
-        default=None,
     )
-    angles: Literal[Angles, Rotation] | None = key(
+    angles: Literal[Angles, Rotation] | None = optional(
         "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
         "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
-        default=None,
     )
-    rotation: Rotation | None = key("how the rotor turns, seen from the same end as the angles", default=None)
-    view: View | None = key("the end from which that is seen", default=None)
+    rotation: Rotation | None = optional("how the rotor turns, seen from the same end as the angles")
+    view: View | None = optional("the end from which that is seen")
     speed_tolerance_percent: Annotated[NotNegative, Field(le=LARGEST_TOLERANCE)] = key(
         f"speeds of different runs that differ by less count as one, default {DEFAULT_TOLERANCE:g}",
         default=DEFAULT_TOLERANCE,
     )
-    speed: Annotated[Quantity, of(Positive)] | None = key(
-        "the speed of runs tables without a column of speeds", "speed_rpm", None, units=units.SPEED
+    speed: Annotated[Quantity, of(Positive)] | None = optional(
+        "the speed of runs tables without a column of speeds", "speed_rpm", units=units.SPEED
     )
-    errors: Errors | None = key(
+    errors: Errors | None = optional(
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
-        default=None,
     )
-    columns: Columns | None = key("other names of the columns of runs tables, see below", default=None)
+    columns: Columns | None = optional("other names of the columns of runs tables, see below")
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
     machine_type: Label = key("its type, for `rotorid fleet`", default="")
-    date: Date | None = key("when it was balanced, for both", default=None, example="2026-03-17")
+    date: Date | None = optional("when it was balanced", example="2026-03-17")
     sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
 
     def wrong(self) -> Iterator[tuple[str, str]]:

@@ -155,6 +155,11 @@ def key(
     )
 
 
+def optional(about: str, name: str = "", **more: Any) -> Any:  # noqa: ANN401
+    """A field of `Settings` that is None without its key; otherwise as of `key`."""
+    return key(about, name, None, **more)
+
+
 @dataclass(frozen=True)
 class _Table:
     """A table in a file: its dotted name, what it holds, and its keys as written, by their usual names."""
@@ -205,10 +210,6 @@ class Settings(BaseModel):
         extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True, allow_inf_nan=False
     )
     _table: _Table = PrivateAttr(default_factory=_Table)
-
-    def __eq__(self, other: object) -> bool:
-        """Where settings stand makes no difference."""
-        return type(self) is type(other) and self.__dict__ == getattr(other, "__dict__", None)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Fields that are right by themselves and do not fit together, each with what is expected.

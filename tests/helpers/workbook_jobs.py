@@ -18,6 +18,7 @@ from tables_data import RUNS
 from rotorid.files.cells import Shown
 from rotorid.files.job_excel import template_bytes
 from rotorid.files.job_models import TABLES
+from rotorid.files.settings import Settings
 
 SAMPLES = (
     "turbo_job/job",
@@ -97,8 +98,8 @@ def _parts(value):
     if dataclasses.is_dataclass(value):
         names = (field.name for field in dataclasses.fields(value) if field.name not in _NOT_SAID)
         return type(value), ".{}", {name: getattr(value, name) for name in names}
-    if isinstance(value, Mapping):
-        return Mapping, ".{}", value
+    if isinstance(value, (Mapping, Settings)):
+        return Mapping, ".{}", dict(value)
     if isinstance(value, (tuple, list)):
         return list, "[{}]", dict(enumerate(value, start=1))
     return None
