@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from rotorid.files.influence import fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_models import (
     READINGS,
+    TABLES,
     WEIGHTS,
     Errors,
     JobSettings,
@@ -61,11 +61,8 @@ class Overrides:
     phase_error_deg: float | None = None
 
     def on(self, settings: JobSettings) -> JobSettings:
-        """The settings of a job with what the caller says; ValueError for an error below 0."""
+        """The settings of a job with what the caller says."""
         errors = _given(amplitude_percent=self.amplitude_error_percent, phase_deg=self.phase_error_deg)
-        for key, value in errors.items():
-            if not 0 <= value < math.inf:
-                raise ValueError(f"{key} must be finite and not negative, not {value!r}")
         stated = (settings.errors or Errors.model_construct()).model_copy(update=errors) if errors else None
         return settings.model_copy(update=_given(phase=self.phase, angles=self.angles, errors=stated))
 
@@ -280,9 +277,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
     if check is not None and mounted is not None:
         holes = with_taken(holes, mounted, check, readings.conventions)
     problems.stop()
-    order = ("runs", "weights", "influence"), ("check", "check_weights", "slow_roll")
-    first, last = ([tables.get(key) for key in keys] for keys in order)
-    files = (written.path, *first, *model_files, *last, *records)
+    files = (written.path, *map(tables.get, TABLES), *model_files, *records)
     sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
     key_phasor = trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0)
     # phases always matter, the direction of angles as soon as one is written other than 0° and 180°
@@ -303,7 +298,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
         limits=limits,
         row_weights=weights,
         check=None if check is None else replace(check, labels=labels),
-        check_mounted=check is not None and mounted is not None,
+        check_mounted=mounted is not None,
         check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
         rotor=rotor,
         holes=holes,
@@ -338,14 +333,13 @@ def _readings(settings: JobSettings, tables: Mapping[str, Source], problems: Pro
         )
         settings.complain(problems, "weights", expected)
     before, runs, stored, name = len(problems), tables["runs"], None, ""
-    if settings.phase is None:
-        settings = settings.model_copy(update={"phase": stated_phase(runs, settings.columns)})
-    conventions = conventions_of(settings)
+    phase, angles = settings.phase or stated_phase(runs, settings.columns), settings.angles
+    settings = settings.model_copy(update={"phase": phase})
     if "influence" in tables:
-        name, labels = source_name(tables["influence"]), conventions.labels
-        stated = labels.phase if settings.phase else None, labels.angles if settings.angles else None
-        stored = load_influence(tables["influence"], *stated, problems)
-        conventions = conventions_of(settings, {} if stored is None else stored.said)
+        name = source_name(tables["influence"])
+        resolved = None if angles is None else resolve_angles(angles, settings.rotation)
+        stored = load_influence(tables["influence"], phase, resolved, problems)
+    conventions = conventions_of(settings, {} if stored is None else stored.said)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     influence = None
     if stored is not None and trials is not None:

@@ -65,10 +65,9 @@ class WrittenJob:
             problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
             problems.stop()
         settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
-        for key in TABLES if self.tables and self.path else ():
-            if settings.has(key) and (key in self.tables or key in TABLES[:2]):
-                expected = f"the table in the sheet {key!r} of this workbook, not a file"
-                settings.complain(problems, key, expected)
+        for key in (key for key in self.tables if settings.has(key)):
+            expected = f"the table in the sheet {key!r} of this workbook, not a file"
+            settings.complain(problems, key, expected)
         return settings
 
 
