@@ -37,7 +37,11 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
     try:
         if not data.startswith(b"PK"):
             raise _RefusedError("an Excel workbook, as the name says; this is none")
-        _check_size(data)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+        if size > MOST_UNPACKED:  # known before anything is unpacked
+            most = f"a workbook of at most {MOST_UNPACKED / 1e6:.0f} MB unpacked"
+            raise _RefusedError(f"{most}; this one has {size / 1e6:.0f} MB")
         return _sheets(str(path), data, problems)
     except _RefusedError as error:
         expected = str(error)
@@ -50,15 +54,6 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
 
 class _RefusedError(ValueError):
     """The message says what was expected instead."""
-
-
-def _check_size(data: bytes) -> None:
-    """Refuse a workbook that unpacks to too much, before it is unpacked."""
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(part.file_size for part in archive.infolist())
-    if size > MOST_UNPACKED:
-        most = f"a workbook of at most {MOST_UNPACKED / 1e6:.0f} MB unpacked"
-        raise _RefusedError(f"{most}; this one has {size / 1e6:.0f} MB")
 
 
 def _sheets(source: str, data: bytes, problems: Problems) -> dict[str, list[Row]]:

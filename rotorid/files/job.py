@@ -172,9 +172,8 @@ class Job:
     @property
     def sensor_places(self) -> dict[str, Probe]:
         """Node and direction of each sensor that has a node."""
-        angles = self.sensor_angles
-        nodes = {name: one.node for name, one in self.sensors.items()}
-        return {name: Probe(node, angles.get(name, 0.0)) for name, node in nodes.items() if node is not None}
+        angles, sensors = self.sensor_angles, self.sensors.items()
+        return {s: Probe(one.node, angles.get(s, 0.0)) for s, one in sensors if one.node is not None}
 
     def limits_of(self, planes: Sequence[str]) -> Limits | None:
         """Limits of these planes only, in their order, at all speeds."""

@@ -268,22 +268,21 @@ def check_runs(
     )
     for k, column in enumerate(("amplitude", "weight")[: 1 if weights is None else 2]):
         if has[k].kind != must[k].kind:
-            unit = must[k].name or "no unit"
-            expected = f"{column}s in {unit}, as the job has, or in one that converts to it"
+            expected = (
+                f"{column}s in {must[k].name or 'no unit'}, as the job has, or in one that converts to it"
+            )
             problems.add(files[k], None, column, has[k].name or "no unit", expected)
     names = ("sensor", check.sensors, trials.sensors), ("plane", check.planes, planes)
     for file, (noun, there, known) in zip(files, names, strict=True):
         for name in (name for name in there if name not in known):
             expected = f"a {noun} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
             problems.add(file, None, noun, name, expected)
-    speed_unit, speeds = units.SPEED[check.labels.speed_unit], list[float]()
-    for speed in check.speeds.tolist():
-        near = nearest_speed(trials.speeds, speed, readings.conventions.speed_tolerance_percent)
-        if near is None or float(trials.speeds[near]) in speeds:
-            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, speed_unit)}"
-            problems.add(files[0], None, "speed", show_speed(speed, speed_unit), expected)
-        else:
-            speeds.append(float(trials.speeds[near]))
+    unit, tolerance = units.SPEED[check.labels.speed_unit], readings.conventions.speed_tolerance_percent
+    near = [nearest_speed(trials.speeds, speed, tolerance) for speed in check.speeds.tolist()]
+    for k, at in enumerate(near):
+        if at is None or at in near[:k]:
+            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
+            problems.add(files[0], None, "speed", show_speed(float(check.speeds[k]), unit), expected)
     if len(problems) > before:
         return None
     shown, mounted = check.planes, check.weights
@@ -291,7 +290,9 @@ def check_runs(
         # all planes of the job: a weights table without rows says that nothing was mounted
         shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
         mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(check, speeds=np.array(speeds), labels=labels, planes=shown, weights=mounted)
+    check = replace(
+        check, speeds=trials.speeds[[at or 0 for at in near]], labels=labels, planes=shown, weights=mounted
+    )
     if readings.slow_roll is None:
         return check
     check = subtract_slow_roll(check, readings.slow_roll)

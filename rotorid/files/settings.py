@@ -196,11 +196,7 @@ def _names(node: object, name: str = "") -> Iterator[tuple[int, str]]:
 
 
 class _Wrong(ValueError):
-    """What is wrong with a table and those in it."""
-
-    def __init__(self, problems: list[Problem]) -> None:
-        super().__init__(*problems)
-        self.problems = problems
+    """What is wrong with a table and those in it: `Problem`s."""
 
 
 class Settings(BaseModel):
@@ -263,7 +259,8 @@ class Settings(BaseModel):
     def _read(cls, data: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
         if not isinstance(data, dict):
             return handler(data)
-        table = info.context(data) if info.context else _Table(data=data)
+        context: tuple[str, Mapping[str, Place], Mapping[int, str]] = info.context or ("", {}, {})
+        table = _Table(*context[:2], context[2].get(id(data), ""), data)
         problems, values = list[Problem](), dict[str, Any]()
         for written, value in data.items():
             usual = cls.usual(written)
@@ -283,7 +280,7 @@ class Settings(BaseModel):
         else:
             made._table = table
         if problems or (problems := [made.problem(*one) for one in made.wrong()]):
-            raise _Wrong(problems)
+            raise _Wrong(*problems)
         return made
 
     @classmethod
@@ -291,7 +288,7 @@ class Settings(BaseModel):
         """What pydantic found wrong with a field, or with something in it, in our words."""
         ctx, kind, value = error.get("ctx", {}), error["type"], error["input"]
         if isinstance(ctx.get("error"), _Wrong):
-            return list(ctx["error"].problems)
+            return list(ctx["error"].args)
         usual, steps = str(error["loc"][0]), error["loc"][1:]
         about, key = cls.known_keys().get(usual, Key()), table.keys.get(usual)
         words = about.expected
@@ -364,15 +361,10 @@ def read_settings(
     The model, or None where there are problems.
     """
     tables = dict(data)
-    names = dict(_names(tables))
-
-    def table(data: Mapping[str, Any]) -> _Table:
-        return _Table(source, where or {}, names.get(id(data), ""), data)
-
     try:
-        return model.model_validate(tables, context=table)
+        return model.model_validate(tables, context=(source, where or {}, dict(_names(tables))))
     except ValidationError as error:
-        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].problems)
+        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].args)
     return None
 
 
