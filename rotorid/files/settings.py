@@ -294,10 +294,8 @@ class Settings(BaseModel):
         words = about.expected
         if key is None or (kind == "missing" and not steps):  # the latter with a unit that is none
             return [] if key else [table.problem(usual, words)]
-        node = table.data[key]
-        for step in steps:  # of lists, and of texts and unions, there are no names
-            if isinstance(node, dict) and step in node:
-                key, node = f"{key}.{step}", node[str(step)]
+        inside = table.data[key] if isinstance(table.data[key], dict) else {}
+        key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
             known = [one for each in cls.known_keys().values() for one in each.names]
             near = did_you_mean(usual, known)
