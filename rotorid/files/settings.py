@@ -328,7 +328,9 @@ class Settings(BaseModel):
         schema["patternProperties"] = {
             f"^{usual}_": plain[usual] for usual, key in keys.items() if callable(key.units)
         }
-        schema["required"] = [usual for usual in schema.get("required", []) if not keys[usual].units]
+        required = [keys[usual] for usual in schema.pop("required", []) if not callable(keys[usual].units)]
+        if required:
+            schema["allOf"] = [{"anyOf": [{"required": [name]} for name in key.variants]} for key in required]
         return schema
 
 
