@@ -231,7 +231,7 @@ def correct_job(
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,
         strength=options.ridge,
-        remove=job.removed,
+        remove=[name for name, plane in job.planes.items() if plane.remove],
     )
 
 

@@ -75,7 +75,7 @@ def _separate(trials: Trials) -> bool:
 
 def used_planes(job: Job, influence: Influence) -> list[str]:
     """Planes of these coefficients that the job does not leave out."""
-    return [plane for plane in influence.planes if plane not in job.left_out]
+    return [plane for plane in influence.planes if plane in job.used or plane not in job.planes]
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

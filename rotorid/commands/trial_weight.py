@@ -186,7 +186,9 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
                 share=(40.0 if options.share is None else options.share) / 100,
                 limit=limit,
                 radius=radius,
-                trial_radius=stated or job.trial_radii.get(name) if radius is not None else None,
+                trial_radius=stated or getattr(job.planes.get(name), "trial_radius", None)
+                if radius is not None
+                else None,
                 load=load,
             )
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import io
 import re
-import time
 import warnings
 import zipfile
 from collections.abc import Iterable, Iterator
@@ -18,10 +17,6 @@ from rotorid.files.problems import Problems
 SUFFIXES = (".xlsx", ".xlsm")
 MOST_UNPACKED = 200_000_000
 """Bytes of all parts of a workbook."""
-MOST_PACKING = 100
-"""Times that parts may be larger than the file; those that people write are about 10 times."""
-MOST_SECONDS = 60.0
-LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
 _DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
 """A number format with decimals or a power of ten."""
 
@@ -37,41 +32,31 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
     Formulas count with the values that the spreadsheet program stored.
     """
     data = read_bytes(path, problems)
-    return None if data is None else sheets_in(path, data, problems)
-
-
-def sheets_in(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row]] | None:
-    """What `read_workbook` gives, of a workbook that has been read; `path` is for messages."""
-    if not data.startswith(b"PK"):
-        problems.add(str(path), None, None, None, "an Excel workbook, as the name says; this is none")
+    if data is None:
         return None
     try:
-        _check_size(data)
-        return _sheets(str(path), data, time.monotonic() + MOST_SECONDS, problems)
-    except _TooLarge as error:
-        problems.add(str(path), None, None, None, str(error))
+        if not data.startswith(b"PK"):
+            raise _RefusedError("an Excel workbook, as the name says; this is none")
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+        if size > MOST_UNPACKED:  # known before anything is unpacked
+            most = f"a workbook of at most {MOST_UNPACKED / 1e6:.0f} MB unpacked"
+            raise _RefusedError(f"{most}; this one has {size / 1e6:.0f} MB")
+        return _sheets(str(path), data, problems)
+    except _RefusedError as error:
+        expected = str(error)
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        problems.add(str(path), None, None, None, f"an intact Excel workbook (reading it failed: {reason})")
+        expected = f"an intact Excel workbook (reading it failed: {reason})"
+    problems.add(str(path), None, None, None, expected)
     return None
 
 
-class _TooLarge(ValueError):
+class _RefusedError(ValueError):
     """The message says what was expected instead."""
 
 
-def _check_size(data: bytes) -> None:
-    """Refuse a workbook that unpacks to too much, before it is unpacked."""
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(part.file_size for part in archive.infolist())
-    most = min(MOST_UNPACKED, 10_000_000 + MOST_PACKING * len(data))
-    if size > most:
-        raise _TooLarge(
-            f"a workbook of at most {most / 1e6:.0f} MB unpacked; this one has {size / 1e6:.0f} MB"
-        )
-
-
-def _sheets(source: str, data: bytes, deadline: float, problems: Problems) -> dict[str, list[Row]]:
+def _sheets(source: str, data: bytes, problems: Problems) -> dict[str, list[Row]]:
     import openpyxl
     from openpyxl.cell.read_only import ReadOnlyCell
     from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
@@ -103,24 +88,20 @@ def _sheets(source: str, data: bytes, deadline: float, problems: Problems) -> di
                     timedelta_formats=book._timedelta_formats,
                 ).parse()
                 made = ((number, [ReadOnlyCell(sheet, **cell) for cell in cells]) for number, cells in rows)
-                found[sheet.title] = sorted(_rows(made, deadline), key=lambda row: row[0])
+                found[sheet.title] = sorted(_rows(made), key=lambda row: row[0])
     return found
 
 
-def _rows(rows: Iterable[tuple[int, list[Any]]], deadline: float) -> Iterator[Row]:
+def _rows(rows: Iterable[tuple[int, list[Any]]]) -> Iterator[Row]:
     """The rows that hold something, without blanks at their ends."""
     total = 0
     for number, written in rows:
-        if time.monotonic() > deadline:
-            raise _TooLarge(f"a workbook that can be read in {MOST_SECONDS:.0f} seconds")
         cells = {cell.column: value for cell in written if (value := _cell(cell)) != ""}
         if not cells:
             continue
-        if number > LAST_ROW or max(cells) > LAST_COLUMN:
-            raise ValueError(f"a cell beyond row {LAST_ROW} or column {LAST_COLUMN}")
         total += max(cells)
         if total > MOST_CELLS:
-            raise _TooLarge(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
+            raise _RefusedError(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
         yield number, tuple(cells.get(column, "") for column in range(1, max(cells) + 1))
 
 
@@ -157,16 +138,9 @@ def pick_sheet(
     path: Path, sheets: dict[str, list[Row]], name: str, problems: Problems, *, first: bool = False
 ) -> tuple[str, list[Row]] | None:
     """The sheet of this name, else the only one that holds something (or, with `first`, the first)."""
-    named = find_sheet(sheets, name)
-    if named is not None:
-        return named, sheets[named]
-    filled = [title for title, rows in sheets.items() if rows] or list(sheets)
-    if filled and (first or len(filled) == 1):
-        return filled[0], sheets[filled[0]]
+    there = [title for title in sheets if title.strip().casefold() == name][:1]
+    there = there or [title for title, rows in sheets.items() if rows] or list(sheets)
+    if there and (first or len(there) == 1):
+        return there[0], sheets[there[0]]
     problems.add(str(path), None, None, None, f"a sheet {name!r}; the sheets are {', '.join(sheets)}")
     return None
-
-
-def find_sheet(sheets: dict[str, list[Row]], name: str) -> str | None:
-    """The title of the sheet of this name, capitals aside."""
-    return next((title for title in sheets if title.strip().casefold() == name), None)

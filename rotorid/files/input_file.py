@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import NamedTuple
 
 from rotorid.base.logs import files
 
@@ -17,8 +18,16 @@ STANDARD_INPUT = "-"
 MOST_BYTES = 200_000_000
 reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
 """Is called before a file is opened, and may refuse it by an OSError."""
-_read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
-_asked: ContextVar[dict[Path, None] | None] = ContextVar("asked", default=None)
+
+
+class _Files(NamedTuple):
+    """What was read of files, and the files that were asked for."""
+
+    known: dict[Path, bytes]
+    asked: dict[Path, None]
+
+
+_files: ContextVar[_Files | None] = ContextVar("files", default=None)
 
 
 @contextmanager
@@ -28,16 +37,14 @@ def each_file_once(held: Mapping[Path, bytes] | None = None) -> Iterator[Collect
     Inside another one what that has read counts; `held` is what is known of files beforehand. Gives the files
     that are asked for inside, in that order.
     """
-    seen = _read.get()
-    known = {} if seen is None else seen
-    known.update(held or {})
-    asked: dict[Path, None] = {}
-    tokens = _read.set(known), _asked.set(asked)
+    outer = _files.get()
+    inner = _Files({} if outer is None else outer.known, {})
+    inner.known.update(held or {})
+    token = _files.set(inner)
     try:
-        yield asked
+        yield inner.asked
     finally:
-        _read.reset(tokens[0])
-        _asked.reset(tokens[1])
+        _files.reset(token)
 
 
 def file_content(path: Path) -> bytes:
@@ -48,11 +55,11 @@ def file_content(path: Path) -> bytes:
     OSError
         If it cannot be read, is larger than 200 MB, or no regular file (a pipe could go on for ever).
     """
-    seen, asked = _read.get(), _asked.get()
-    if asked is not None:
-        asked[path] = None
-    if seen is not None and path in seen:
-        return seen[path]
+    seen = _files.get()
+    if seen is not None:
+        seen.asked[path] = None
+        if path in seen.known:
+            return seen.known[path]
     if seen is not None and str(path) == STANDARD_INPUT:
         if sys.stdin is None:
             raise OSError(errno.EBADF, "it is closed", str(path))
@@ -63,7 +70,7 @@ def file_content(path: Path) -> bytes:
         raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
     files.debug("read %s, %d bytes", path, len(data))
     if seen is not None:
-        seen[path] = data
+        seen.known[path] = data
     return data
 
 
@@ -92,8 +99,8 @@ def sha256(path: Path) -> str:
     OSError
         If it cannot be read.
     """
-    seen = _read.get() or {}
-    if path in seen or str(path) == STANDARD_INPUT:
+    seen = _files.get()
+    if (seen is not None and path in seen.known) or str(path) == STANDARD_INPUT:
         return hashlib.sha256(file_content(path)).hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import datetime
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,15 +16,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import off_axis
 from rotorid.base.text import counted
 from rotorid.files.columns import Source, source_name
-from rotorid.files.conventions import (
-    ROTATIONS,
-    Conventions,
-    as_angles,
-    as_phase,
-    check_angles,
-    resolve_angles,
-)
-from rotorid.files.influence import Stored, fit_to_readings, load_influence
+from rotorid.files.conventions import ROTATIONS, Conventions, as_angles, as_phase, resolve_angles
+from rotorid.files.influence import fit_to_readings, load_influence
 from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_models import (
     READINGS,
@@ -58,46 +50,25 @@ if TYPE_CHECKING:
     from balancing import Mounted
     from fem import Rotor
 
-IN_HOLE = 1e-3
-"""Relative distance of a weight from the hole that it is in."""
-Arc = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Overrides:
-    """What the caller says instead of a job, or where none says it.
-
-    Raises
-    ------
-    ValueError
-        If a value is none of the allowed ones.
-    """
+    """What the caller says instead of a job, or where none says it."""
 
     phase: str | None = None
     angles: str | None = None
     amplitude_error_percent: float | None = None
     phase_error_deg: float | None = None
-    run_error_percent: float | None = None
-    waveforms: str | Path | None = None
 
-    def __post_init__(self) -> None:
-        Labels(phase=as_phase(self.phase or "lead"))
-        if self.angles is not None:
-            check_angles(self.angles)
-        self.on(None)
+    def on(self, settings: JobSettings) -> JobSettings:
+        """The settings of a job with what the caller says."""
+        errors = _given(amplitude_percent=self.amplitude_error_percent, phase_deg=self.phase_error_deg)
+        stated = (settings.errors or Errors.model_construct()).model_copy(update=errors) if errors else None
+        return settings.model_copy(update=_given(phase=self.phase, angles=self.angles, errors=stated))
 
-    def on(self, stated: Errors | None) -> Errors | None:
-        """The errors of a job with those that the caller states."""
-        given = {
-            "amplitude_percent": self.amplitude_error_percent,
-            "phase_deg": self.phase_error_deg,
-            "run_percent": self.run_error_percent,
-        }
-        ours = {key: value for key, value in given.items() if value is not None}
-        for key, value in ours.items():
-            if not 0 <= value < math.inf:
-                raise ValueError(f"{key} must be finite and not negative, not {value!r}")
-        return (stated or Errors.model_construct()).model_copy(update=ours) if ours else stated
+
+def _given(**values: Any) -> dict[str, Any]:  # noqa: ANN401
+    return {key: value for key, value in values.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -183,25 +154,9 @@ class Job:
         return tuple(name for name, plane in self.planes.items() if plane.use)
 
     @property
-    def left_out(self) -> tuple[str, ...]:
-        """Planes that the job tells not to use."""
-        return tuple(name for name, plane in self.planes.items() if not plane.use)
-
-    @property
-    def removed(self) -> list[str]:
-        """Planes in which material is taken away."""
-        return [name for name, plane in self.planes.items() if plane.remove]
-
-    @property
     def radii(self) -> dict[str, float]:
         """Radius, m, of each plane that has one: it converts between masses and unbalances."""
         return {name: plane.radius for name, plane in self.planes.items() if plane.radius is not None}
-
-    @property
-    def trial_radii(self) -> dict[str, float]:
-        """Radius, m, at which the weights of the weights table were mounted, where it is another."""
-        radii = {name: plane.trial_radius for name, plane in self.planes.items()}
-        return {name: radius for name, radius in radii.items() if radius is not None}
 
     @property
     def plane_nodes(self) -> dict[str, int]:
@@ -217,9 +172,8 @@ class Job:
     @property
     def sensor_places(self) -> dict[str, Probe]:
         """Node and direction of each sensor that has a node."""
-        angles = self.sensor_angles
-        nodes = {name: one.node for name, one in self.sensors.items()}
-        return {name: Probe(node, angles.get(name, 0.0)) for name, node in nodes.items() if node is not None}
+        angles, sensors = self.sensor_angles, self.sensors.items()
+        return {s: Probe(one.node, angles.get(s, 0.0)) for s, one in sensors if one.node is not None}
 
     def limits_of(self, planes: Sequence[str]) -> Limits | None:
         """Limits of these planes only, in their order, at all speeds."""
@@ -237,8 +191,7 @@ def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
     path
         The job; files that it names are found relative to it.
     overrides
-        phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent: replace what the job says;
-        waveforms: a waveforms file, in place of the runs table.
+        phase, angles, amplitude_error_percent, phase_error_deg: replace what the job says.
 
     Returns
     -------
@@ -271,7 +224,7 @@ def job_from_files(
     influence
         Influence table.
     overrides
-        Conventions, stated errors and waveforms as of `read_job`; default: lead and with rotation, which the
+        Conventions and stated errors as of `read_job`; default: lead and with rotation, which the
         labels then call assumed; none stated.
 
     Returns
@@ -299,22 +252,19 @@ def job_from_files(
 
 def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job:
     """The job of these settings and tables; raises `InputError` with all problems."""
-    settings = written.read(problems)
+    settings = overrides.on(written.read(problems))
     problems.stop()
     tables, records = tables_of(written, settings)
-    if overrides.waveforms is not None:
-        tables["runs"] = Path(overrides.waveforms)
-    # vectors know their sign, so that nothing is assumed: a job that says nothing writes lead
-    phase = overrides.phase or settings.phase
     for key in READINGS:
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
             from rotorid.files.waveforms import read_vectors_grid
 
-            grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
+            grid, phase, read = problems.need(read_vectors_grid(path, settings.phase, problems))
             tables[key], records = grid, (*records, *read)
-            overrides = replace(overrides, phase=phase)
-    readings = _readings(settings, tables, overrides, problems)
+            # vectors know their sign, so that nothing is assumed: a job that says nothing writes lead
+            settings = settings.model_copy(update={"phase": phase})
+    readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     readings = problems.need(readings)
     trials, planes = planes_of(settings, readings.trials, readings.influence, rotor, problems)
@@ -326,77 +276,70 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
     if check is not None and mounted is not None:
         holes = with_taken(holes, mounted, check, readings.conventions)
     problems.stop()
-    order = ("runs", "weights", "influence"), ("check", "check_weights", "slow_roll")
-    first, last = ([tables.get(key) for key in keys] for keys in order)
-    files = (written.path, *first, *model_files, *last, *records)
-    job = Job(
-        trials=trials,
-        influence=readings.influence,
+    files = (written.path, *map(tables.get, TABLES), *model_files, *records)
+    sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
+    key_phasor = trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0)
+    # phases always matter, the direction of angles as soon as one is written other than 0° and 180°
+    degrees = [angle for plane in planes.values() for angle in plane.angles]
+    if rotor is not None:
+        degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
+    vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
+    matters = {"phase": True, "angles": any(map(off_axis, vectors))}
+    assumed = tuple(name for name in readings.conventions.unstated if matters[name])
+    labels = replace(trials.labels, assumed=assumed)
+    return Job(
+        trials=replace(trials, labels=labels),
+        influence=None if readings.influence is None else replace(readings.influence, labels=labels),
         conventions=readings.conventions,
         files=tuple(file for file in files if isinstance(file, Path)),
         planes=planes,
-        sensors={name: settings.sensors.get(name, Sensor()) for name in trials.sensors},
+        sensors=sensors,
         limits=limits,
         row_weights=weights,
-        check=check,
-        check_mounted=check is not None and mounted is not None,
+        check=None if check is None else replace(check, labels=labels),
+        check_mounted=mounted is not None,
         check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
         rotor=rotor,
         holes=holes,
         slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
-        key_phasor=trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0),
+        key_phasor=key_phasor,
         machine=settings.machine,
         machine_type=settings.machine_type,
         date=settings.date,
         sheet=settings.sheet.model_dump(),
     )
-    return _with_assumed(job)
 
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
     """What tables there are, by `TABLES`, and the files with one run each."""
-    named = named_tables({key: getattr(settings, key) for key in TABLES})
-    tables: dict[str, Source] = {key: written.folder / name for key, name in named.items()}
     runs = tuple(written.folder / name for name in settings.runs or ())
-    if runs:
-        tables["runs"] = runs if len(runs) > 1 else runs[0]
+    tables: dict[str, Source] = {"runs": runs[0]} if runs else {}
+    tables |= {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
     tables |= written.tables
     files = runs if len(runs) > 1 else files_of_runs(tables.get("runs"))
-    if files:
-        tables["runs"] = files
-    return tables, tuple(files)
+    return tables | ({"runs": files} if files else {}), files
 
 
-def _readings(
-    settings: JobSettings, tables: Mapping[str, Source], overrides: Overrides, problems: Problems
-) -> Readings | None:
+def _readings(settings: JobSettings, tables: Mapping[str, Source], problems: Problems) -> Readings | None:
     """Trial runs and stored coefficients, or None and problems."""
-    given = {*tables, *(key for key in (*TABLES, "rotor", "machine_type") if settings.has(key))}
-    if "check_weights" in given and "check" not in given:
+    if "check" not in tables and ("check_weights" in tables or settings.check_weights):
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
-    if not given & {"weights", "influence", "rotor", "machine_type"}:
+    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type):
         expected = (
             "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
             "whose coefficients come with balance --type"
         )
         settings.complain(problems, "weights", expected)
-    if "runs" not in tables:
-        return None
-    before = len(problems)
-    errors = overrides.on(settings.errors)
-    if (overrides.phase or settings.phase) is None:
-        overrides = replace(overrides, phase=stated_phase(tables["runs"], settings.columns))
-    stored, name = None, ""
+    before, runs, stored, name = len(problems), tables["runs"], None, ""
+    phase, angles = settings.phase or stated_phase(runs, settings.columns), settings.angles
+    settings = settings.model_copy(update={"phase": phase})
     if "influence" in tables:
         name = source_name(tables["influence"])
-        known = conventions_of(settings, overrides)
-        phase, angles = (
-            None if k in known.unstated else getattr(known.labels, k) for k in ("phase", "angles")
-        )
-        stored = load_influence(tables["influence"], phase, angles, problems)
-    conventions = conventions_of(settings, overrides, {} if stored is None else stored.said)
-    trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, problems)
+        resolved = None if angles is None else resolve_angles(angles, settings.rotation)
+        stored = load_influence(tables["influence"], phase, resolved, problems)
+    conventions = conventions_of(settings, {} if stored is None else stored.said)
+    trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     influence = None
     if stored is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
@@ -404,97 +347,47 @@ def _readings(
     if trials is None or len(problems) > before:
         return None
     labels = conventions.on(trials.labels if influence is None else influence.labels)
-    if influence is not None:
-        influence = replace(influence, labels=labels)
-    notes = _notes(conventions, stored, name)
-    trials = replace(trials, labels=labels, warnings=notes + trials.warnings)
+    usual, read, notes = Labels(), {} if stored is None else stored.said, list[str]()
+    adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
+    if adopted:
+        words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+        notes = [
+            f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
+        ]
+    if read.get("phase", labels.phase) != labels.phase:
+        notes.append(
+            f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
+            f"phase = {read['phase']}, as {name} says"
+        )
+    trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors = tables.get("slow_roll", settings.slow_roll)
     roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
-    if roll is not None:
-        trials = subtract_slow_roll(trials, roll)
-    return Readings(trials, influence, conventions, errors, roll)
+    trials = trials if roll is None else subtract_slow_roll(trials, roll)
+    return Readings(trials, influence, conventions, settings.errors, roll)
 
 
-def conventions_of(
-    settings: JobSettings, overrides: Overrides, stored: Mapping[str, str] | None = None
-) -> Conventions:
-    """What the numbers of the tables mean: as the caller says, or the job, or the stored coefficients."""
-    stored, rotation = stored or {}, settings.rotation
-    phase, angles = overrides.phase or settings.phase, overrides.angles or settings.angles
-    clock = angles in ROTATIONS and rotation is not None
-    if angles is not None:
-        angles = resolve_angles(angles, rotation)
+def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = None) -> Conventions:
+    """What the numbers of the tables mean: as the job says, or the stored coefficients."""
+    said = {"phase": "lead", "angles": "with rotation"} | dict(stored or {})
+    angles, rotation, planes = settings.angles, settings.rotation, settings.planes.items()
     labels = Labels(
-        phase=as_phase(phase or stored.get("phase", "lead")),
-        angles=as_angles(angles or stored.get("angles", "with rotation")),
+        phase=as_phase(settings.phase or said["phase"]),
+        angles=as_angles(said["angles"]) if angles is None else resolve_angles(angles, rotation),
         rotation=rotation,
         view=settings.view if rotation else None,
-        clock=clock,
+        clock=angles in ROTATIONS,
     )
-    speed, planes = settings.speed, settings.planes.items()
+    speed, limits = settings.speed, [one.limit for one in settings.sensors.values()]
     return Conventions(
         labels,
         settings.speed_tolerance_percent,
-        tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None),
+        tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
         settings.columns,
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
-        any(
-            one.limit is not None and one.limit.unit.name.endswith("_rms")
-            for one in settings.sensors.values()
-        ),
+        any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),
     )
-
-
-def _notes(conventions: Conventions, stored: Stored | None, name: str) -> tuple[str, ...]:
-    """What the user should know about conventions that the coefficients state, or state otherwise."""
-    phase, angles, unstated = conventions.labels.phase, conventions.labels.angles, conventions.unstated
-    adopted = []
-    if "phase" in unstated and phase != "lead":
-        adopted.append(f"phase = {phase}")
-    if "angles" in unstated and angles != "with rotation":
-        adopted.append(f"angles {angles}")
-    notes = []
-    if adopted:
-        notes.append(
-            f"nothing states the conventions of the readings: those of {name} are used for them too, "
-            f"{' and '.join(adopted)}"
-        )
-    if stored is not None and stored.said.get("phase", phase) != phase:
-        notes.append(
-            f"the readings are taken with phase = {phase}, as stated, and the coefficients with "
-            f"phase = {stored.said['phase']}, as {name} says"
-        )
-    return tuple(notes)
-
-
-def _with_assumed(job: Job) -> Job:
-    """The job whose labels name what is assumed.
-
-    Phases always matter. The direction of angles matters as soon as the job writes an angle other than 0° and
-    180°: of a weight, a hole, a forbidden arc, or of a sensor or key phasor of the model.
-    """
-    matters = {"phase": True, "angles": any(off_axis(unit) for unit in _directions(job))}
-    assumed = tuple(name for name in job.conventions.unstated if matters[name])
-    if not assumed:
-        return job
-    labels = replace(job.trials.labels, assumed=assumed)
-    parts = {name: getattr(job, name) for name in ("trials", "influence", "check")}
-    return replace(job, **{k: replace(one, labels=labels) for k, one in parts.items() if one is not None})
-
-
-def _directions(job: Job) -> Iterator[ComplexArray]:
-    """Whatever the job writes with an angle, as complex numbers."""
-    yield job.trials.weights
-    if job.check is not None:
-        yield job.check.weights
-    for holes in job.holes.values():
-        yield np.exp(1j * holes.angles)
-    for arcs in () if job.limits is None else job.limits.forbidden:
-        yield np.exp(1j * np.array([end for start, width in arcs for end in (start, start + width)]))
-    if job.rotor is not None:
-        yield np.exp(1j * np.radians([job.key_phasor, *job.sensor_angles.values()]))
 
 
 def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:
@@ -522,9 +415,9 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
     """
     if not weights and not amplitudes:
         return job
-    trials, unit, planes = job.trials, job.trials.labels.weight_unit, list(job.planes)
-    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(planes))
-    most, residual = old.max_weight.copy(), old.residual.copy()
+    trials, unit = job.trials, job.trials.labels.weight_unit
+    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
+    most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
     for plane, weight in weights.items():
         size = in_job_units(weight, unit, job.planes[plane].radius)
         if size is None:
@@ -532,8 +425,8 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
                 f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
                 f"only with a radius_mm of plane {plane!r} in the job"
             )
-        most[planes.index(plane)] = size[0]
+        most[plane] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {p: replace(its, max_weight=float(most[planes.index(p)])) for p, its in job.holes.items()}
-    return replace(job, limits=Limits(most, residual, old.forbidden), holes=holes)
+    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
+    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)

@@ -26,10 +26,10 @@ from rotorid.files.settings import (
     Turn,
     Whole,
     by_name,
-    entries,
     key,
     listed,
     of,
+    optional,
 )
 from rotorid.files.units import Quantity
 
@@ -39,22 +39,23 @@ WEIGHTS = "weights"
 """In place of a table of `check_weights`: the weights were mounted, although there are holes for pieces."""
 READINGS = ("runs", "check", "slow_roll")
 """Those that are runs tables."""
+WEIGHT_TABLES = ("weights", "check_weights")
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
 MOST_HOLES = 1000
 SAME_DEG = 1e-4
 Pair = tuple[Turn, Turn]
 _ANY_NUMBER = r"([+-]?[0-9]+(?:[.,][0-9]+)?)"
 _PAIR = re.compile(rf"{_ANY_NUMBER}\s*(?:-|\N{{EN DASH}}|\.\.|:|to)\s*{_ANY_NUMBER}")
-_ARCS = "pairs [from, to] of different angles from -360 to 360 degrees, such as [[20, 60], [300, 340]]"
-_LIMIT = "an amplitude above 0 in the unit of the readings"
 
 
 def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
     """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
     named = {key: settings.get(key) for key in TABLES}
-    if named["check_weights"] == WEIGHTS:
-        del named["check_weights"]
-    return {key: name for key, name in named.items() if isinstance(name, str)}
+    return {
+        key: name
+        for key, name in named.items()
+        if isinstance(name, str) and (key, name) != ("check_weights", WEIGHTS)
+    }
 
 
 def _printable(name: str) -> str:
@@ -69,11 +70,8 @@ def _printable(name: str) -> str:
 def _pairs(value: object) -> object:
     """One pair, or a text of them, as pairs."""
     if isinstance(value, str):
-        found = [_PAIR.fullmatch(part.strip()) for part in value.split(";") if part.strip()]
-        value = [
-            [float(m[i].replace(",", ".")) for i in (1, 2)] if m else part
-            for part, m in zip(value, found, strict=False)
-        ]
+        parts = [part.strip() for part in value.split(";") if part.strip()]
+        return [list(pair.groups()) if (pair := _PAIR.fullmatch(part)) else part for part in parts]
     flat = isinstance(value, list) and not any(isinstance(one, list) for one in value)
     return [value] if flat and value else value
 
@@ -86,53 +84,33 @@ def _different(arcs: tuple[Pair, ...]) -> tuple[Pair, ...]:
 
 def _or_one(value: object) -> object:
     """A number for all speeds, at the speed ""."""
-    alone = not isinstance(value, dict) and ":" not in str(value)
-    return {"": value} if alone else entries(value)
+    return value if isinstance(value, dict) or ":" in str(value) else {"": value}
 
 
 def _kind(value: object) -> str:
     return "file" if isinstance(value, str) else "vectors"
 
 
-_NUMBERS = Annotated[dict[str, NotNegative], Field(min_length=1)]
-_LIMITS = Annotated[dict[str, Positive], Field(min_length=1)]
 Arcs = Annotated[
     tuple[Pair, ...],
     BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | str),
     AfterValidator(_different),
     Field(min_length=1),
 ]
-Limits = Annotated[
-    dict[str, Positive],
-    BeforeValidator(_or_one, json_schema_input_type=Positive | _LIMITS | str),
-    Field(min_length=1),
-]
-SpeedWeights = Annotated[
-    dict[str, NotNegative],
-    BeforeValidator(entries, json_schema_input_type=_NUMBERS | str),
-    Field(min_length=1),
+Limits: Any = Annotated[
+    by_name(Positive),
+    BeforeValidator(_or_one, json_schema_input_type=Positive | by_name(Positive)),
 ]
 Weight = Annotated[Quantity, of(Positive)]
 File = Annotated[Text, AfterValidator(_printable)]
-Files = Annotated[
-    tuple[File, ...],
-    BeforeValidator(
-        lambda v: v if isinstance(v, list) else (v,),
-        json_schema_input_type=Text | Annotated[list[Text], Field(min_length=1)],
-    ),
-    Field(min_length=1),
-]
+Count = Annotated[Whole, Field(ge=1)]
 
 
 class _Placed(Settings):
     """What may stand in the rotor model."""
 
-    node: Annotated[Whole, Field(ge=1)] | None = key(
-        "where it is in the rotor model, by number", default=None, expected="a node of the rotor model"
-    )
-    station: Text | None = key(
-        "or by name", default=None, expected="the name of a station of the rotor model, in quotes"
-    )
+    node: Count | None = optional("a node of the rotor model")
+    station: Text | None = optional("or the name of a station of the rotor model")
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Both."""
@@ -143,70 +121,57 @@ class _Placed(Settings):
 class Plane(_Placed):
     """`[planes.NAME]`."""
 
-    max_weight: Weight | None = key(
+    max_weight: Weight | None = optional(
         "largest weight that may be mounted, in any unit of a mass or unbalance",
         "max_mass_g max_unbalance_g_mm",
-        None,
         units=units.WEIGHT,
     )
-    radius: Positive | None = key(
-        "radius of the corrections; converts masses and unbalances", "radius_mm", None, units=RADIUS
+    radius: Positive | None = optional(
+        "radius of the corrections; converts masses and unbalances", "radius_mm", units=RADIUS
     )
-    trial_radius: Positive | None = key(
-        "radius of the trial weights, where it is another", "trial_radius_mm", None, units=RADIUS
+    trial_radius: Positive | None = optional(
+        "radius of the trial weights, where it is another", "trial_radius_mm", units=RADIUS
     )
     use: bool = key("whether the plane is used", default=True, example="false")
     remove: bool = key(
         "whether material is taken away (drilled, ground) instead of added", default=False, example="false"
     )
     forbidden: Arcs = key(
-        "arcs from … to … where nothing may be mounted",
+        "pairs [from, to] of different angles from -360 to 360 degrees, between which nothing may be mounted",
         "forbidden_deg",
         (),
-        expected=f"{_ARCS}, in a sheet 20-60; 300-340",
         example="[[20, 60], [300, 340]]",
     )
-    holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = key(
-        "a number of equally spaced holes",
-        default=None,
-        expected=f"the number of holes, equally spaced, a whole number from 1 to {MOST_HOLES}",
+    holes: Annotated[Whole, Field(ge=1, le=MOST_HOLES)] | None = optional(
+        f"a number of equally spaced holes, up to {MOST_HOLES:,}",
     )
     first_hole: Turn = key("angle of the first of them, default 0", "first_hole_deg", 0.0)
-    holes_at: listed(Number) | None = key(  # type: ignore[valid-type]
-        "or the angles of the holes",
+    holes_at: listed(Number) | None = optional(  # type: ignore[valid-type]
+        "angles of the holes in degrees, in place of `holes`",
         "holes_deg",
-        None,
-        expected="angles of the holes in degrees, such as holes_deg = [0, 30, 75]",
         example="holes_deg = [0, 30, 75]",
     )
-    hole_names: listed(Label) | None = key(  # type: ignore[valid-type]
-        "names of the holes instead of the numbers 1, 2, …",
-        default=None,
-        expected='a different name for each hole, such as ["A", "B", "C"]',
+    hole_names: listed(Label) | None = optional(  # type: ignore[valid-type]
+        "a different name for each hole, in place of the numbers 1, 2, …",
         example='["A", "B", "C"]',
     )
-    available: Annotated[Quantity, of(listed(Positive))] | None = key(
-        "weights, in any unit, of which each can be mounted in a hole",
+    available: Annotated[Quantity, of(listed(Positive))] | None = optional(
+        "weights, in any unit, of which each can be mounted",
         "available_g available_g_mm",
-        None,
         units=units.WEIGHT,
-        expected="weights of which each can be mounted, such as available_g = [5, 10, 20]",
         example="available_g = [5, 10, 20]",
     )
-    step: Weight | None = key("or any weight in such steps", "step_g step_g_mm", None, units=units.WEIGHT)
+    step: Weight | None = optional("or any weight in such steps", "step_g step_g_mm", units=units.WEIGHT)
     per_hole: Annotated[Whole, Field(ge=1, le=100)] = key(
         "how many weights one hole takes, default 1", default=1
     )
     taken: by_name(Positive) = key(  # type: ignore[valid-type]
         "weights that are in holes already, by number or name of the hole",
         default={},
-        expected='weights that are in holes already, by number or name of the hole, such as { "3" = 10 }',
         example='{ "3" = 10 }',
     )
-    stock: listed(Annotated[Whole, Field(ge=0)]) | None = key(  # type: ignore[valid-type]
+    stock: listed(Annotated[Whole, Field(ge=0)]) | None = optional(  # type: ignore[valid-type]
         "how many there are of each available weight",
-        default=None,
-        expected="how many there are of each available weight, such as stock = [4, 4, 2]",
         example="stock = [4, 4, 2]",
     )
 
@@ -217,89 +182,111 @@ class Plane(_Placed):
             degrees = tuple(self.first_hole + 360.0 * k / self.holes for k in range(self.holes))
         return dict(zip(self.hole_names or map(str, range(1, len(degrees) + 1)), degrees, strict=False))
 
+    def open_holes(self) -> dict[str, float]:
+        """Those outside the forbidden arcs, and those in which something is."""
+        near, arcs = SAME_DEG, [(first, (last - first) % 360.0) for first, last in self.forbidden]
+        return {
+            name: angle
+            for name, angle in self.hole_angles().items()
+            if name in self.taken
+            or not any(near < (angle - first) % 360.0 < width - near for first, width in arcs)
+        }
+
+    @property
+    def angles(self) -> list[float]:
+        """All that the job writes of it in degrees."""
+        return [*self.hole_angles().values(), *(end for arc in self.forbidden for end in arc)]
+
+    @property
+    def lever(self) -> float:
+        """What a trial weight counts at the correction radius, since mass × radius is what acts."""
+        return 1.0 if self.radius is None else (self.trial_radius or self.radius) / self.radius
+
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Radii and keys of holes that do not fit together."""
         yield from super().wrong()
+        if self.trial_radius is not None and self.radius is None:
+            yield (
+                "trial_radius",
+                "the correction radius too, radius_mm, to which the trial weights are converted",
+            )
         if self.holes is not None and self.holes_at is not None:
             yield "holes", "either holes, equally spaced, or holes_deg, their angles, not both"
             return
         if self.has("first_hole") and self.holes is None:
             yield "first_hole", "the number of equally spaced holes too, holes = 12"
-        names = tuple(self.hole_angles())
-        about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
-        if not names:
+        count, names = self.holes or len(self.holes_at or ()), tuple(self.hole_angles())
+        if not count:
             wanted = "the holes of the plane too, holes = 12 or holes_deg = [0, 30, 75]"
+            about_holes = ("hole_names", "available", "step", "per_hole", "taken", "stock")
             yield from ((one, wanted) for one in about_holes if self.has(one))
-            return
-        count = self.holes or len(self.holes_at or ())
-        if self.hole_names is not None and len(set(self.hole_names)) != count:
+        elif self.hole_names is not None and len({*self.hole_names}) != count:
             yield "hole_names", f"a different name for each of the {count} holes"
-            return
-        if self.has("per_hole") and self.available is None:
-            yield "per_hole", "the weights that are available too, available_g = [5, 10]"
-        for name in self.taken.keys() - names:
-            yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
+        else:
+            if self.has("per_hole") and self.available is None:
+                yield "per_hole", "the weights that are available too, available_g = [5, 10]"
+            for name in self.taken.keys() - names:
+                yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
 
 
 class Sensor(_Placed):
     """`[sensors.NAME]`."""
 
-    limit: Annotated[Quantity, of(Limits)] | None = key(
-        "largest amplitude, in the unit of the readings, or with its own, `limit_mm_s_rms`; or by speed",
+    limit: Annotated[Quantity, of(Limits)] | None = optional(
+        "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
+        "table by speed",
         "limit",
-        None,
         units=units.vibration,
-        expected=f'{_LIMIT}, or a table of them by speed, such as {{ "3000" = 20 }}, in a sheet 3000: 20',
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
         "weight in the fit, default 1; 0: the sensor counts only for its limit", default=1.0
     )
-    angle: Turn | None = key(
-        "where the sensor points, from the model's x, in the job's angle direction", "angle_deg", None
+    angle: Turn | None = optional(
+        "where the sensor points, from the model's x, in the job's angle direction", "angle_deg"
     )
 
 
 class Errors(Settings):
     """`[errors]`."""
 
-    amplitude_percent: NotNegative | None = key(
-        "one standard deviation of an amplitude, percent of it", default=None
+    amplitude_percent: NotNegative = key("one standard deviation of an amplitude, percent of it", default=0.0)
+    phase_deg: NotNegative = key("one standard deviation of a phase, degrees", default=0.0)
+    floor: NotNegative = key(
+        "one standard deviation at amplitude 0, in the unit of the readings", default=0.0
     )
-    phase_deg: NotNegative | None = key("one standard deviation of a phase, degrees", default=None)
-    floor: NotNegative | None = key(
-        "one standard deviation at amplitude 0, in the unit of the readings", default=None
+    run_percent: NotNegative = key(
+        "what changes from run to run, one standard deviation, percent", default=0.0
     )
-    run_percent: NotNegative | None = key(
-        "what changes from run to run, one standard deviation, percent", default=None
+    run_floor: NotNegative = key("the same at amplitude 0, in the unit of the readings", default=0.0)
+    placement_deg: NotNegative = key(
+        "one standard deviation of the angle of a mounted weight, degrees", default=0.0
     )
-    run_floor: NotNegative | None = key("the same at amplitude 0, in the unit of the readings", default=None)
-    placement_deg: NotNegative | None = key(
-        "one standard deviation of the angle of a mounted weight, degrees", default=None
+    placement_percent: NotNegative = key("one standard deviation of its mass, percent", default=0.0)
+    drift_percent: NotNegative = key(
+        "how far readings drift from the first run to the last, percent", default=0.0
     )
-    placement_percent: NotNegative | None = key("one standard deviation of its mass, percent", default=None)
-    drift_percent: NotNegative | None = key(
-        "how far readings drift from the first run to the last, percent", default=None
-    )
+
+    @property
+    def between_runs(self) -> bool:
+        """Whether they say what changes from run to run; 0: nothing."""
+        return self.has("run_percent") or self.has("run_floor")
 
     def stated_in(self, trials: Trials) -> Trials:
         """The runs with these errors: relative, in rad, and in the unit of the readings inside."""
         scale, reading, between = trials.labels.vibration_scale, None, None
         if self.amplitude_percent or self.phase_deg or self.floor:
-            reading = ReadingErrors(
-                (self.amplitude_percent or 0.0) / 100.0,
-                radians(self.phase_deg or 0.0),
-                (self.floor or 0.0) / scale,
-            )
-        if self.run_percent is not None or self.run_floor is not None:
-            between = RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / scale)
-        placement = Placement((self.placement_percent or 0.0) / 100.0, radians(self.placement_deg or 0.0))
-        drift = (self.drift_percent or 0.0) / 100.0
+            phase, floor = radians(self.phase_deg), self.floor / scale
+            reading = ReadingErrors(self.amplitude_percent / 100.0, phase, floor)
+        if self.between_runs:
+            between = RunScatter(self.run_percent / 100.0, self.run_floor / scale)
+        placement = Placement(self.placement_percent / 100.0, radians(self.placement_deg))
+        drift = self.drift_percent / 100.0
         return replace(trials, errors=reading, run_errors=between, placement=placement, drift=drift)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Nothing above 0."""
-        if not any(value or (name.startswith("run_") and value == 0) for name, value in self):
+        if not self.between_runs and not any(value for _, value in self):
             yield "", "an error above 0 (amplitude_percent, phase_deg or floor), or no [errors] at all"
 
 
@@ -307,9 +294,8 @@ class KeyPhasor(Settings):
     """`[key_phasor]`."""
 
     angle: Turn = key(
-        "where it stands, from the model's x, in the job's angle direction",
+        "the direction of the key phasor from the model's x, in the job's angle direction",
         "angle_deg",
-        expected="the direction of the key phasor, degrees from the model's x",
     )
 
 
@@ -317,31 +303,29 @@ class Vector(Settings):
     """`[slow_roll.SENSOR]`."""
 
     amplitude: Annotated[Quantity, of(NotNegative)] = key(
-        "at slow speed, in the unit of the readings; or `amplitude_<unit>`",
+        "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
         "amplitude",
         units=units.vibration,
-        expected="the amplitude at slow speed, in the unit of the readings",
     )
     phase: Turn = key(
-        "counted as the readings count it",
+        "the phase at slow speed, counted as the readings count it",
         "phase_deg",
-        expected="the phase at slow speed, counted as the readings count it",
     )
 
 
 class Columns(Settings):
     """`[columns]`."""
 
-    run: Text | None = key("name in the file of the column `run`, and so on", default=None)
-    speed: Annotated[Quantity, of(Text)] | None = key(
-        "or another unit of a speed", "speed_rpm", None, units=units.SPEED
+    run: Text | None = optional("name in the file of the column `run`, and so on")
+    speed: Annotated[Quantity, of(Text)] | None = optional(
+        "or another unit of a speed", "speed_rpm", units=units.SPEED
     )
-    sensor: Text | None = key("not where each sensor has columns of its own", default=None)
-    amplitude: Annotated[Quantity, of(Text)] | None = key(
-        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", None, units=units.vibration
+    sensor: Text | None = optional("not where each sensor has columns of its own")
+    amplitude: Annotated[Quantity, of(Text)] | None = optional(
+        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", units=units.vibration
     )
-    phase: Annotated[Quantity, of(Text)] | None = key("or `phase_rad`", "phase_deg", None, units=units.ANGLE)
-    repeat: Text | None = key("of repeated readings", default=None)
+    phase: Annotated[Quantity, of(Text)] | None = optional("or `phase_rad`", "phase_deg", units=units.ANGLE)
+    repeat: Text | None = optional("of repeated readings")
 
     def in_file(self) -> dict[str, str]:
         """Fields by the names that the columns have in the file."""
@@ -351,11 +335,7 @@ class Columns(Settings):
 class Sheet(Settings):
     """`[sheet]`."""
 
-    machine: Label = key("what was balanced; default: `machine` of the job", default="")
     place: Label = key("where it stands", default="")
-    date: Date | None = key(
-        "when it was balanced; default: `date` of the job", default=None, example="2026-03-17"
-    )
     engineer: Label = key("who balanced it", default="")
     instrument: Label = key("with what, its number", default="")
     zero: Literal["right", "top"] = key(
@@ -367,19 +347,17 @@ class Sheet(Settings):
 class JobSettings(Settings):
     """A job file."""
 
-    runs: Files | None = key(
+    runs: listed(File) | None = optional(  # type: ignore[valid-type]
         "the runs table, relative to the job file; or a folder, or a list of files, with one run each",
-        default=None,
         expected='the runs table, or the files of the runs, runs = ["as found.csv", "trial.csv"]',
     )
-    weights: File | None = key("the weights table", default=None)
-    influence: File | None = key("stored coefficients instead of trial runs, or beside them", default=None)
-    rotor: File | None = key("a rotor table or file: coefficients are computed", default=None)
-    check: File | None = key("runs table of a check run, with the proposed weights mounted", default=None)
-    check_weights: File | None = key(
+    weights: File | None = optional("the weights table")
+    influence: File | None = optional("stored coefficients instead of trial runs, or beside them")
+    rotor: File | None = optional("a rotor table or file: coefficients are computed")
+    check: File | None = optional("runs table of a check run, with the proposed weights mounted")
+    check_weights: File | None = optional(
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
         'where there are holes, else the weights; `"weights"`: these, although there are holes',
-        default=None,
     )
     slow_roll: (
         Annotated[
@@ -387,50 +365,45 @@ class JobSettings(Settings):
             Discriminator(_kind),
         ]
         | None
-    ) = key(
+    ) = optional(
         "a runs table of one run at slow speed, to be subtracted from every reading; or "
         "`[slow_roll.SENSOR]`, see below",
-        default=None,
         expected="vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at "
         'slow speed, slow_roll = "slow.csv"',
     )
-    key_phasor: KeyPhasor | None = key("where the key phasor stands, see below", default=None)
-    speed_weights: SpeedWeights = key(
-        "weights of the speeds in the fit, 0: only for the limits",
+    key_phasor: KeyPhasor | None = optional("where the key phasor stands, see below")
+    speed_weights: by_name(NotNegative) = key(  # type: ignore[valid-type]
+        "a table of weights by speed in the fit, 0: only for the limits",
         default={},
-        expected='a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }',
         example='{ "3000" = 2, "4500" = 0.5 }',
     )
-    phase: Phase | None = key(
+    phase: Phase | None = optional(
         "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
-        default=None,
     )
-    angles: Literal[Angles, Rotation] | None = key(
+    angles: Literal[Angles, Rotation] | None = optional(
         "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
         "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
-        default=None,
     )
-    rotation: Rotation | None = key("how the rotor turns, seen from the same end as the angles", default=None)
-    view: View | None = key("the end from which that is seen", default=None)
+    rotation: Rotation | None = optional("how the rotor turns, seen from the same end as the angles")
+    view: View | None = optional("the end from which that is seen")
     speed_tolerance_percent: Annotated[NotNegative, Field(le=LARGEST_TOLERANCE)] = key(
         f"speeds of different runs that differ by less count as one, default {DEFAULT_TOLERANCE:g}",
         default=DEFAULT_TOLERANCE,
     )
-    speed: Annotated[Quantity, of(Positive)] | None = key(
-        "the speed of runs tables without a column of speeds", "speed_rpm", None, units=units.SPEED
+    speed: Annotated[Quantity, of(Positive)] | None = optional(
+        "the speed of runs tables without a column of speeds", "speed_rpm", units=units.SPEED
     )
-    errors: Errors | None = key(
+    errors: Errors | None = optional(
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
-        default=None,
     )
-    columns: Columns | None = key("other names of the columns of runs tables, see below", default=None)
+    columns: Columns | None = optional("other names of the columns of runs tables, see below")
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
-    machine: Label = key("its name or serial number, for `rotorid fleet`", default="")
-    machine_type: Label = key("its type, for the same", default="")
-    date: Date | None = key("when it was balanced, for the same", default=None, example="2026-03-17")
+    machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
+    machine_type: Label = key("its type, for `rotorid fleet`", default="")
+    date: Date | None = optional("when it was balanced", example="2026-03-17")
     sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
 
     def wrong(self) -> Iterator[tuple[str, str]]:

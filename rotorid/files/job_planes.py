@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,7 +24,7 @@ from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
-from rotorid.files.job_models import SAME_DEG, Errors, JobSettings, Plane, Sensor
+from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 from rotorid.files.settings import Settings
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 
 IN_HOLE = 1e-3
 """Relative distance of a weight from the hole that it is in."""
-Arc = tuple[float, float]
-"""First angle and width, rad."""
 
 
 class Readings(NamedTuple):
@@ -75,18 +74,16 @@ def in_model(
 
 def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Plane | Sensor:
     """A plane or sensor with its station as a node."""
-    key = "node" if part.station is None else "station"
-    if part.node is None and part.station is None:
+    node, station, key = part.node, part.station, "node" if part.station is None else "station"
+    if node is None and station is None:
         return part
     if rotor is None:
         part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
-        return part
-    node = part.node if part.station is None else rotor.stations.get(part.station)
-    if node is None:
+    elif station is not None and station not in rotor.stations:
         known = listing(map(repr, rotor.stations), "and") or "none"
-        hint = did_you_mean(str(part.station), rotor.stations)
+        hint = did_you_mean(station, rotor.stations)
         part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
-    elif node > rotor.n_nodes:
+    elif (node := node or rotor.stations[str(station)]) > rotor.n_nodes:
         part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
     return part.model_copy(update={"node": node})
 
@@ -111,28 +108,18 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    for noun, parts, known in (
-        ("plane", stated, tuple(planes)),
-        ("sensor", settings.sensors, trials.sensors),
+    missing = "; there is no trial weight in plane {!r}: is its row missing in the weights?"
+    for noun, parts, known, more_words in (
+        ("plane", stated, (*planes,), missing),
+        ("sensor", settings.sensors, trials.sensors, ""),
     ):
-        for name, part in parts.items():
-            if known and name not in known:
-                expected = f"one of the job's {noun}s, {listing(known, 'and')}{did_you_mean(name, known)}"
-                if noun == "plane":
-                    expected += (
-                        f"; there is no trial weight in plane {name!r}: is its row missing in the weights?"
-                    )
-                problems.extend([replace(part.problem("", expected), value=name)])
-    # what acts is the unbalance, mass × radius: a mass m at the radius r counts as m r / R at R
-    factors = np.ones(len(trials.planes))
-    for k, name in enumerate(() if trials.labels.unbalances else trials.planes):
-        plane = planes.get(name, Plane())
-        if plane.trial_radius is not None and plane.radius is not None:
-            factors[k] = plane.trial_radius / plane.radius
-        elif plane.trial_radius is not None:
-            expected = "the correction radius too, radius_mm, to which the trial weights are converted"
-            plane.complain(problems, "trial_radius", expected)
-    return replace(trials, weights=trials.weights * factors), planes
+        for name in (name for name in parts if known and name not in known):
+            expected = f"one of the job's {noun}s, {listing(known, 'and')}{did_you_mean(name, known)}"
+            problem = parts[name].problem("", expected + more_words.format(name))
+            problems.extend([replace(problem, value=name)])
+    if not trials.labels.unbalances:
+        trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
+    return trials, planes
 
 
 def make_limits(
@@ -140,20 +127,22 @@ def make_limits(
 ) -> Limits | None:
     """In the order of speeds, sensors and planes; None: nothing limited."""
     labels, vibration = trials.labels, units.vibration(trials.labels.vibration_unit)
-    most = [(_sizes(plane, "max_weight", labels, problems) or (np.inf,))[0] for plane in planes.values()]
+    most = [(*_sizes(plane, "max_weight", labels, problems), np.inf)[0] for plane in planes.values()]
     arcs = tuple(tuple(_arc(plane, labels, *pair) for pair in plane.forbidden) for plane in planes.values())
     residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
-    for name, sensor in settings.sensors.items():
-        if name in trials.sensors and sensor.limit is not None:
-            unit = sensor.limit.unit if sensor.limit.unit.name else vibration
-            if unit.kind != vibration.kind:
-                expected = f"an amplitude in a unit that converts to {vibration.name}, as the readings have"
-                sensor.complain(problems, "limit", expected)
-            elif unit.name in units.VELOCITY and vibration.name.endswith("_rms"):
-                expected = f"limit_{unit.name}_rms, as the readings are, or limit_{unit.name}_pp"
-                sensor.complain(problems, "limit", expected)
-            rows = _at_speeds(sensor, "limit", sensor.limit.value, trials, settings, math.inf, problems)
-            residual[:, trials.sensors.index(name)] = rows / unit.scale
+    for k, name in enumerate(trials.sensors):
+        sensor = settings.sensors.get(name)
+        if sensor is None or sensor.limit is None:
+            continue
+        unit = sensor.limit.unit if sensor.limit.unit.name else vibration
+        if unit.kind != vibration.kind:
+            expected = f"an amplitude in a unit that converts to {vibration.name}, as the readings have"
+            sensor.complain(problems, "limit", expected)
+        elif unit.name in units.VELOCITY and vibration.name.endswith("_rms"):
+            expected = f"limit_{unit.name}_rms, as the readings are, or limit_{unit.name}_pp"
+            sensor.complain(problems, "limit", expected)
+        rows = _at_speeds(sensor, "limit", sensor.limit.value, trials, settings, math.inf, problems)
+        residual[:, k] = rows / unit.scale
     limits = Limits(np.array(most), residual, arcs)
     return limits if limits.any else None
 
@@ -161,19 +150,16 @@ def make_limits(
 def _sizes(plane: Plane, field: str, labels: Labels, problems: Problems) -> tuple[float, ...]:
     """Weights that a plane states, as those of the job are (kg or kg·m); empty where it states none."""
     stated: Quantity | None = getattr(plane, field)
-    if stated is None:
-        return ()
-    sizes = in_job_units(stated, labels.weight_unit, plane.radius)
+    sizes = () if stated is None else in_job_units(stated, labels.weight_unit, plane.radius)
     if sizes is None:
         kind = "unbalances (mass × radius)" if labels.unbalances else "masses"
-        plane.complain(
-            problems, field, f"{kind}, as the weights of the job are, or radius_mm too, to convert"
-        )
+        expected = f"{kind}, as the weights of the job are, or radius_mm too, to convert"
+        plane.complain(problems, field, expected)
     return sizes or ()
 
 
-def _arc(plane: Plane, labels: Labels, first: float, last: float) -> Arc:
-    """Of the degrees from → to as the job writes them."""
+def _arc(plane: Plane, labels: Labels, first: float, last: float) -> tuple[float, float]:
+    """First angle and width, rad, of the degrees from → to as the job writes them."""
     start = (first if labels.angle_sign > 0 else -last) + (180.0 if plane.remove else 0.0)
     return math.radians(start % 360.0), math.radians((last - first) % 360.0)
 
@@ -186,7 +172,8 @@ def row_weights(settings: JobSettings, trials: Trials, problems: Problems) -> Fl
     for field, weights in (("sensors", columns), ("speed_weights", rows)):
         if not weights.any():
             settings.complain(problems, field, "at least one weight above 0")
-    return None if (columns == 1.0).all() and (rows == 1.0).all() else np.asarray(rows[:, None] * columns)
+    weights = rows[:, None] * columns
+    return None if (weights == 1.0).all() else weights
 
 
 def _at_speeds(
@@ -199,61 +186,44 @@ def _at_speeds(
     problems: Problems,
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    unit = units.SPEED[trials.labels.speed_unit]
-    out = np.full(len(trials.speeds), numbers.get("", default))
-    seen = set[int]()
+    unit, near = units.SPEED[trials.labels.speed_unit], dict[int, float]()
     for word in filter(None, numbers):
-        try:
+        k = None
+        with suppress(NotANumber):
             speed = unit.to_si(parse_number(word, comma="," in word))
-            near = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
-        except NotANumber:
-            near = None
-        if near is None or near in seen:
+            k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
+        if k is None or k in near:
             known = show_speeds(trials.speeds, unit)
-            part.complain(
-                problems, field, f"speeds of the runs table, each once, not {word}: there are {known}"
-            )
+            expected = f"speeds of the runs table, each once, not {word}: there are {known}"
+            part.complain(problems, field, expected)
         else:
-            seen.add(near)
-            out[near] = numbers[word]
-    return out
+            near[k] = numbers[word]
+    return np.array([near.get(k, numbers.get("", default)) for k in range(len(trials.speeds))])
 
 
 def make_holes(
     planes: Mapping[str, Plane], labels: Labels, limits: Limits | None, problems: Problems
 ) -> dict[str, Holes]:
     """Of each plane that has some; those inside a forbidden arc are left out."""
-    near, out = math.radians(SAME_DEG), dict[str, Holes]()
+    out = dict[str, Holes]()
     for k, (plane_name, plane) in enumerate(planes.items()):
-        at = plane.hole_angles()
-        arcs = () if limits is None else limits.forbidden[k]
-        turn = 180.0 if plane.remove else 0.0
-        angles = {
-            name: math.radians((labels.with_rotation(angle) + turn) % 360.0) for name, angle in at.items()
-        }
-        kept = [
-            name
-            for name, angle in angles.items()
-            if name in plane.taken
-            or not any(near < (angle - start) % (2 * math.pi) < width - near for start, width in arcs)
-        ]
-        before = len(problems)
+        before, turn, angles = len(problems), 180.0 if plane.remove else 0.0, plane.open_holes()
         pieces, step = (_sizes(plane, field, labels, problems) for field in ("available", "step"))
-        if not at or len(problems) > before:
+        if not plane.hole_angles() or len(problems) > before:
             continue
         try:
             out[plane_name] = from_list(
-                [angles[name] for name in kept],
+                [math.radians((labels.with_rotation(angle) + turn) % 360.0) for angle in angles.values()],
                 pieces,
                 per_hole=plane.per_hole,
-                step=(step or (0.0,))[0],
-                taken=[plane.taken.get(name, 0.0) / labels.weight_scale for name in kept],
+                step=(*step, 0.0)[0],
+                taken=[plane.taken.get(name, 0.0) / labels.weight_scale for name in angles],
                 stock=None if plane.stock is None else np.array(plane.stock),
-                names=kept,
+                names=[*angles],
                 max_weight=np.inf if limits is None else float(limits.max_weight[k]),
             )
         except ValueError as error:
-            field = "holes" if plane.holes is not None else "holes_at"
+            field = "holes_at" if plane.holes is None else "holes"
             wanted = "holes outside forbidden_deg in which something can be mounted"
             plane.complain(problems, field, f"{wanted}: {error}")
     return out
@@ -266,19 +236,16 @@ def with_taken(
 
     A plane whose weights are not all in its holes, or fill all of them, stays as it is.
     """
-    read = read_weights(weights, check.runs, conventions, Problems())
-    rows = () if read is None else read.rows
-    out = dict(holes)
+    read, out = read_weights(weights, check.runs, conventions, Problems()), dict(holes)
     for plane, free in holes.items():
+        rows = () if read is None else read.rows
         mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
         if not len(mounted) or free.taken.any():
             continue
-        unit = np.exp(1j * free.angles)
-        hole = np.argmax((unit.conj() * mounted[:, None]).real, axis=1)
-        taken = np.zeros(len(unit))
-        np.add.at(taken, hole, np.abs(mounted))
-        off = np.abs(mounted - np.abs(mounted) * unit[hole])
-        if (off <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
+        off = np.abs(mounted[:, None] - np.abs(mounted)[:, None] * np.exp(1j * free.angles))
+        taken = np.zeros(len(free.angles))
+        np.add.at(taken, off.argmin(axis=1), np.abs(mounted))
+        if (off.min(axis=1) <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
             out[plane] = replace(free, taken=taken)
     return out
 
@@ -295,31 +262,27 @@ def check_runs(
     check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
     if check is None:
         return None
-    before, mounting = len(problems), runs if weights is None else weights
-    for table, column, kinds in (
-        (runs, "amplitude", [units.vibration(one.labels.vibration_unit) for one in (check, trials)]),
-        (weights, "weight", [units.weight(one.labels.weight_unit) for one in (check, trials)]),
-    ):
-        if table is not None and kinds[0].kind != kinds[1].kind:
+    before, files = len(problems), [source_name(runs), source_name(runs if weights is None else weights)]
+    has, must = (
+        (units.vibration(x.vibration_unit), units.weight(x.weight_unit)) for x in (check.labels, labels)
+    )
+    for k, column in enumerate(("amplitude", "weight")[: 1 if weights is None else 2]):
+        if has[k].kind != must[k].kind:
             expected = (
-                f"{column}s in {kinds[1].name or 'no unit'}, as the job has, or in one that converts to it"
+                f"{column}s in {must[k].name or 'no unit'}, as the job has, or in one that converts to it"
             )
-            problems.add(source_name(table), None, column, kinds[0].name or "no unit", expected)
-    for table, noun, names, known in (
-        (runs, "sensor", check.sensors, trials.sensors),
-        (mounting, "plane", check.planes, planes),
-    ):
-        for name in (name for name in names if name not in known):
+            problems.add(files[k], None, column, has[k].name or "no unit", expected)
+    names = ("sensor", check.sensors, trials.sensors), ("plane", check.planes, planes)
+    for file, (noun, there, known) in zip(files, names, strict=True):
+        for name in (name for name in there if name not in known):
             expected = f"a {noun} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
-            problems.add(source_name(table), None, noun, name, expected)
-    unit, speeds = units.SPEED[check.labels.speed_unit], list[float]()
-    for speed in check.speeds.tolist():
-        near = nearest_speed(trials.speeds, speed, readings.conventions.speed_tolerance_percent)
-        if near is None or float(trials.speeds[near]) in speeds:
+            problems.add(file, None, noun, name, expected)
+    unit, tolerance = units.SPEED[check.labels.speed_unit], readings.conventions.speed_tolerance_percent
+    near = [nearest_speed(trials.speeds, speed, tolerance) for speed in check.speeds.tolist()]
+    for k, at in enumerate(near):
+        if at is None or at in near[:k]:
             expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
-            problems.add(source_name(runs), None, "speed", show_speed(speed, unit), expected)
-        else:
-            speeds.append(float(trials.speeds[near]))
+            problems.add(files[0], None, "speed", show_speed(float(check.speeds[k]), unit), expected)
     if len(problems) > before:
         return None
     shown, mounted = check.planes, check.weights
@@ -327,7 +290,9 @@ def check_runs(
         # all planes of the job: a weights table without rows says that nothing was mounted
         shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
         mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(check, speeds=np.array(speeds), labels=labels, planes=shown, weights=mounted)
+    check = replace(
+        check, speeds=trials.speeds[[at or 0 for at in near]], labels=labels, planes=shown, weights=mounted
+    )
     if readings.slow_roll is None:
         return check
     check = subtract_slow_roll(check, readings.slow_roll)

@@ -8,10 +8,11 @@ in the light of other files. Keys of which the name ends in a unit may end in an
 from __future__ import annotations
 
 import datetime
+import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -30,7 +31,7 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_core import CoreSchema, ErrorDetails, core_schema
+from pydantic_core import CoreSchema, ErrorDetails
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -40,8 +41,8 @@ from rotorid.files.problems import Problem, Problems
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
-Where = Mapping[str, tuple[str, int, str]]
-"""Sheet, row and column of each setting of a workbook, by its dotted name."""
+Place = tuple[str, int, str]
+"""Sheet, row and column of a setting of a workbook."""
 _Model = TypeVar("_Model", bound="Settings")
 _UNMARKED = str.maketrans("", "", "`")
 _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
@@ -56,6 +57,7 @@ _WORDS = {
     "less_than_equal": "a number up to {le:g}",
     "less_than": "a number below {lt:g}",
     "literal": "{expected}",
+    "value_error": "{error}",
     "model": "a table of settings, [{name}]",
     "dict": "a table, [{name}]",
     "list": "a list, or tables that begin with [[{name}]]",
@@ -73,10 +75,7 @@ class of:
         self._inner = inner
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        def read(raw: Quantity, inner: ValidatorFunctionWrapHandler) -> Quantity:
-            return replace(raw, value=inner(raw.value))
-
-        return core_schema.no_info_wrap_validator_function(read, handler.generate_schema(self._inner))
+        return handler.generate_schema(self._inner)
 
 
 @dataclass(frozen=True)
@@ -91,27 +90,23 @@ class Key:
     def __call__(self, schema: dict[str, Any]) -> None:
         """Of `json_schema_extra`: adds nothing."""
 
-    @property
-    def variants(self) -> dict[str, Unit]:
-        """All names that can be listed, in all units."""
-        plain, units = Unit("", ""), self.units
-        if not isinstance(units, Mapping):
-            return dict.fromkeys(self.names, plain)
-        out: dict[str, Unit] = {}
-        for name in self.names:
-            usual = max((unit for unit in units if name.endswith(f"_{unit}")), key=len, default="")
-            out[name] = units[usual] if usual else plain
-            alike = [unit for unit in units.values() if usual and unit.kind == units[usual].kind]
-            out |= {f"{name.removesuffix(usual)}{unit.name}": unit for unit in alike}
-        return out
+    def unit(self, written: str) -> Unit | None:
+        """The unit in which a key is written, None without one; `UnitError` for another."""
+        if callable(self.units):
+            return self.units(written[len(self.names[0]) + 1 :])
+        return self.variants[written] if self.units else None
 
-    def read(self, name: str, value: object) -> object:
-        """A value at a name of this key, with its unit where it has one; `UnitError` for another."""
-        if self.units is None:
-            return value
-        if not callable(self.units):
-            return Quantity(name, value, self.variants[name])
-        return Quantity(name, value, self.units(name[len(self.names[0]) + 1 :]))
+    @cached_property
+    def variants(self) -> dict[str, Unit]:
+        """All names that can be listed, with their units."""
+        out, units = dict[str, Unit](), self.units if isinstance(self.units, Mapping) else {}
+        for name in self.names:
+            out[name] = Unit("", "")
+            for usual in units:
+                if name.endswith(f"_{usual}"):
+                    alike = (unit for unit in units.values() if unit.kind == units[usual].kind)
+                    out |= {f"{name.removesuffix(usual)}{unit.name}": unit for unit in alike}
+        return out
 
 
 def key(
@@ -140,50 +135,68 @@ def key(
         for each name), or a reader of any unit after the name. The field is in SI, unless its type is `of` a
         `Quantity`.
     expected
-        For messages: what is expected, with an example; also where a required key is missing.
+        For messages: what is expected, with an example; also where a required key is missing. Unstated: what
+        it is, with the example.
     example
         How a file writes it.
     **limits
         Of pydantic: gt, ge, lt, le, min_length, max_length.
     """
     names = tuple(name.split())
+    plain = about.translate(_UNMARKED)
+    expected = expected or plain.partition(";")[0] + (f", such as {example}" if example else "")
     return Field(
         default,
         alias=names[0] if names else None,
-        description=about.translate(_UNMARKED),
+        description=plain,
         examples=[example] if example else None,
         json_schema_extra=Key(names, about, units, expected),
         **limits,
     )
 
 
+def optional(about: str, name: str = "", **more: Any) -> Any:  # noqa: ANN401
+    """A field of `Settings` that is None without its key; otherwise as of `key`."""
+    return key(about, name, None, **more)
+
+
 @dataclass(frozen=True)
-class _File:
-    """A file of settings: the dotted name of each table in it, by identity, and the cells of a workbook."""
+class _Table:
+    """A table in a file: its dotted name, what it holds, and its keys as written, by their usual names."""
 
     source: str = ""
-    where: Where = field(default_factory=dict)
-    names: Mapping[int, str] = field(default_factory=dict)
+    where: Mapping[str, Place] = field(default_factory=dict)
+    name: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict)
+    keys: dict[str, str] = field(default_factory=dict)
+
+    def dotted(self, key: str) -> str:
+        """The dotted name of a key."""
+        return f"{self.name}.{key}".strip(".")
+
+    def problem(self, key: str, expected: str, value: object = None) -> Problem:
+        """A problem with a key, in the cell of it or of the table that holds it."""
+        name = at = self.dotted(key)
+        while at and at not in self.where:
+            at = at.rpartition(".")[0]
+        source, row, column = self.where.get(at, (self.source, None, name or None))
+        shown = "a table" if isinstance(value, dict) else str(value)
+        shown = shown.lower() if isinstance(value, bool) else shown
+        return Problem(source, row, column, None if value is None else shown, expected)
 
 
-def _table_names(node: object, name: str = "") -> dict[int, str]:
-    inside: Iterable[tuple[str, object]] = ()
+def _names(node: object, name: str = "") -> Iterator[tuple[int, str]]:
+    """The dotted name of each table in a file, by identity."""
+    yield id(node), name
     if isinstance(node, dict):
-        inside = ((f"{name}.{key}".strip("."), value) for key, value in node.items())
-    elif isinstance(node, list):
-        inside = ((f"{name}[{number}]", value) for number, value in enumerate(node, start=1))
-    out = {id(node): name} if inside else {}
-    for inner, value in inside:
-        out |= _table_names(value, inner)
-    return out
+        for key, value in node.items():
+            yield from _names(value, f"{name}.{key}".strip("."))
+    for number, value in enumerate(node if isinstance(node, list) else (), start=1):
+        yield from _names(value, f"{name}[{number}]")
 
 
 class _Wrong(ValueError):
-    """What is wrong with a table and those in it."""
-
-    def __init__(self, problems: list[Problem]) -> None:
-        super().__init__(*problems)
-        self.problems = problems
+    """What is wrong with a table and those in it: `Problem`s."""
 
 
 class Settings(BaseModel):
@@ -192,15 +205,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True, allow_inf_nan=False
     )
-    _file: _File = PrivateAttr(default_factory=_File)
-    _name: str = PrivateAttr("")
-    _data: dict[str, Any] = PrivateAttr(default_factory=dict)
-    _keys: dict[str, str] = PrivateAttr(default_factory=dict)
-    """Each key as it is written, by its usual name."""
-
-    def __eq__(self, other: object) -> bool:
-        """Where settings stand makes no difference."""
-        return type(self) is type(other) and self.__dict__ == getattr(other, "__dict__", None)
+    _table: _Table = PrivateAttr(default_factory=_Table)
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Fields that are right by themselves and do not fit together, each with what is expected.
@@ -211,10 +216,8 @@ class Settings(BaseModel):
 
     def problem(self, field: str, expected: str) -> Problem:
         """A problem with a field: file, row, key as written, its value, what is expected."""
-        key = self.written(field)
-        value = self._data.get(key)
-        value = None if isinstance(value, dict) else value
-        return _problem(self._file, f"{self._name}.{key}".strip("."), expected, value)
+        value = self._table.data.get(self.written(field))
+        return self._table.problem(self.written(field), expected, None if isinstance(value, dict) else value)
 
     def complain(self, problems: Problems, field: str, expected: str) -> None:
         """Note a problem with a field."""
@@ -222,8 +225,8 @@ class Settings(BaseModel):
 
     def written(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
-        alias = (type(self).model_fields[field].alias if field else None) or field
-        return self._keys.get(alias, alias)
+        usual = (type(self).model_fields[field].alias if field else None) or field
+        return self._table.keys.get(usual, usual)
 
     def has(self, field: str) -> bool:
         """Whether a field is written."""
@@ -233,11 +236,12 @@ class Settings(BaseModel):
     @cache
     def known_keys(cls) -> dict[str, Key]:
         """What is said about its fields, by the names of their keys."""
-        out = {}
-        for name, one in cls.model_fields.items():
-            key = one.json_schema_extra if isinstance(one.json_schema_extra, Key) else Key()
-            out[one.alias or name] = replace(key, names=key.names or (name,))
-        return out
+        keys = {one.alias or name: one.json_schema_extra for name, one in cls.model_fields.items()}
+        return {
+            name: replace(key, names=key.names or (name,))
+            for name, key in keys.items()
+            if isinstance(key, Key)
+        }
 
     @classmethod
     @cache
@@ -248,104 +252,85 @@ class Settings(BaseModel):
         longer = [
             name for name, key in keys.items() if callable(key.units) and written.startswith(f"{name}_")
         ]
-        return next(iter([*exact, *longer]), written)
+        return [*exact, *longer, written][0]
 
     @model_validator(mode="wrap")
     @classmethod
     def _read(cls, data: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
         if not isinstance(data, dict):
             return handler(data)
-        file = info.context or _File()
-        name, values, keys = file.names.get(id(data), ""), dict[str, Any](), dict[str, str]()
-        problems = list[Problem]()
-        for key, value in data.items():
-            usual, about = cls.usual(key), cls.known_keys().get(cls.usual(key), Key())
+        context: tuple[str, Mapping[str, Place], Mapping[int, str]] = info.context or ("", {}, {})
+        table = _Table(*context[:2], context[2].get(id(data), ""), data)
+        problems, values = list[Problem](), dict[str, Any]()
+        for written, value in data.items():
+            usual = cls.usual(written)
             try:
-                if usual in keys:
-                    raise UnitError(f"one key of them; {keys[usual]} says it already")
-                values[usual] = about.read(key, value)
+                if usual in table.keys:
+                    raise UnitError(f"one key of them; {table.keys[usual]} says it already")
+                table.keys[usual] = written
+                unit = cls.known_keys().get(usual, Key()).unit(written)
+                values[usual] = value if unit is None else Quantity(written, value, unit)
             except UnitError as error:
-                problems.append(_problem(file, f"{name}.{key}".strip("."), str(error), value))
-            keys.setdefault(usual, key)
+                problems.append(table.problem(written, str(error), value))
         try:
             made = handler(values)
         except ValidationError as error:
             for one in error.errors(include_url=False):
-                problems += cls._problems(one, file, name, data, keys)
-        if problems:
-            raise _Wrong(problems)
-        made._file, made._name, made._data, made._keys = file, name, data, keys
-        if wrong := [made.problem(*one) for one in made.wrong()]:
-            raise _Wrong(wrong)
+                problems += cls._problems(one, table)
+        else:
+            made._table = table
+        if problems or (problems := [made.problem(*one) for one in made.wrong()]):
+            raise _Wrong(*problems)
         return made
 
     @classmethod
-    def _problems(
-        cls, error: ErrorDetails, file: _File, table: str, data: dict[str, Any], keys: dict[str, str]
-    ) -> list[Problem]:
+    def _problems(cls, error: ErrorDetails, table: _Table) -> list[Problem]:
         """What pydantic found wrong with a field, or with something in it, in our words."""
-        inner = error.get("ctx", {}).get("error")
-        if isinstance(inner, _Wrong):
-            return inner.problems
-        usual, *steps = error["loc"]
-        about, kind = cls.known_keys().get(str(usual), Key()), error["type"]
-        if kind == "missing" and not steps:
-            if usual in keys:  # with a unit that is none
-                return []
-            expected = about.expected or f"a value: {about.about}"
-            return [_problem(file, f"{table}.{usual}".strip("."), expected)]
-        name, node = f"{table}.{keys[str(usual)]}".strip("."), data[keys[str(usual)]]
-        for step in steps:  # of lists, and of texts and unions, there are no names
-            if isinstance(node, dict) and step in node:
-                name, node = f"{name}.{step}", node[str(step)]
-        value = error["input"].value if isinstance(error["input"], Quantity) else error["input"]
+        ctx, kind, value = error.get("ctx", {}), error["type"], error["input"]
+        if isinstance(ctx.get("error"), _Wrong):
+            return list(ctx["error"].args)
+        usual, steps = str(error["loc"][0]), error["loc"][1:]
+        about, key = cls.known_keys().get(usual, Key()), table.keys.get(usual)
+        words = about.expected
+        if key is None or (kind == "missing" and not steps):  # the latter with a unit that is none
+            return [] if key else [table.problem(usual, words)]
+        inside = table.data[key] if isinstance(table.data[key], dict) else {}
+        key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
-            known = [one for key in cls.known_keys().values() for one in key.names]
-            near = did_you_mean(str(usual), known)
-            expected = f"a known key{near}; known are {listing(known, 'and') or 'none yet'}"
-            # nothing is printed of a file of something else
-            return [_problem(file, name, expected, value if table or near or len(keys) > 1 else None)]
-        if kind == "value_error":
-            words = str(inner)
-        elif kind == "missing":
-            words = "all values that belong there"
-        else:
+            known = [one for each in cls.known_keys().values() for one in each.names]
+            near = did_you_mean(usual, known)
+            words = f"a known key{near}; known are {listing(known, 'and') or 'none yet'}"
+            if not (table.name or near or len(table.keys) > 1):
+                value = None  # nothing is printed of a file of something else
+        elif kind != "missing":
             words = next((words for begin, words in _WORDS.items() if kind.startswith(begin)), error["msg"])
-            words = words.format(**error.get("ctx", {}), name=name)
-        if kind == "literal_error":
-            words += did_you_mean(str(value), re.findall(r"'([^']*)'", words))
-        if about.expected not in words:
-            words += f": {about.expected}"
-        return [_problem(file, name, words, value)]
+            words = words.format(**ctx, name=table.dotted(key))
+            words += did_you_mean(str(value), re.findall(r"'([^']*)'", words) if "literal" in kind else ())
+            words += "" if about.expected in words else f": {about.expected}"
+        return [table.problem(key, words, value)]
 
     @field_validator("*", mode="wrap")
     @classmethod
     def _in_si(cls, value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
-        if not isinstance(value, Quantity) or "Quantity" in repr(
-            cls.model_fields[str(info.field_name)].annotation
-        ):
+        if not isinstance(value, Quantity):
             return handler(value)
-        read = handler(value.value)
-        if isinstance(read, tuple):
-            return tuple(map(value.unit.to_si, read))
-        return value.unit.to_si(read) if isinstance(read, (int, float)) else read
+        read, to_si = handler(value.value), value.unit.to_si
+        if "Quantity" in repr(cls.model_fields[str(info.field_name)].annotation):
+            return replace(value, value=read)
+        return tuple(map(to_si, read)) if isinstance(read, tuple) else to_si(read)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """As pydantic's, with each key in all its units."""
-        schema = handler.resolve_ref_schema(handler(core))
-        plain, required = schema.pop("properties", {}), schema.pop("required", [])
-        schema["properties"] = properties = dict[str, Any]()
-        for usual, key in cls.known_keys().items():
-            names = list(key.variants)
-            properties |= dict.fromkeys(names, plain[usual])
-            if callable(key.units):
-                schema.setdefault("patternProperties", {})[f"^{usual}_"] = plain[usual]
-            elif usual in required and len(names) == 1:
-                schema.setdefault("required", []).append(usual)
-            elif usual in required:
-                one_of_them = {"anyOf": [{"required": [name]} for name in names]}
-                schema.setdefault("allOf", []).append(one_of_them)
+        schema, keys = handler.resolve_ref_schema(handler(core)), cls.known_keys()
+        plain = schema.get("properties", {})
+        schema["properties"] = {name: plain[usual] for usual, key in keys.items() for name in key.variants}
+        schema["patternProperties"] = {
+            f"^{usual}_": plain[usual] for usual, key in keys.items() if callable(key.units)
+        }
+        required = [keys[usual] for usual in schema.pop("required", []) if not callable(keys[usual].units)]
+        if required:
+            schema["allOf"] = [{"anyOf": [{"required": [name]} for name in key.variants]} for key in required]
         return schema
 
 
@@ -354,7 +339,7 @@ def read_settings(
     data: Mapping[str, Any],
     source: str,
     problems: Problems,
-    where: Where | None = None,
+    where: Mapping[str, Place] | None = None,
 ) -> _Model | None:
     """Settings as a model; all that is wrong with them is noted.
 
@@ -377,21 +362,10 @@ def read_settings(
     """
     tables = dict(data)
     try:
-        return model.model_validate(tables, context=_File(source, where or {}, _table_names(tables)))
+        return model.model_validate(tables, context=(source, where or {}, dict(_names(tables))))
     except ValidationError as error:
-        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].problems)
+        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].args)
     return None
-
-
-def _problem(file: _File, name: str, expected: str, value: object = None) -> Problem:
-    """A problem with the key of this dotted name, in the cell of it or of the table that holds it."""
-    at = name
-    while at and at not in file.where:
-        at = at.rpartition(".")[0]
-    source, row, column = file.where.get(at, (file.source, None, name or None))
-    shown = "a table" if isinstance(value, dict) else str(value)
-    shown = shown.lower() if isinstance(value, bool) else shown
-    return Problem(source, row, column, None if value is None else shown, expected)
 
 
 def _plain(value: object) -> object:
@@ -400,7 +374,8 @@ def _plain(value: object) -> object:
         try:
             return parse_number(value.strip(), comma=decimal_comma([value.strip()], ""))
         except NotANumber as error:
-            raise ValueError(str(error)) from None
+            in_a_key = "the unit stands in the name of the key"
+            raise ValueError(str(error).replace("write the unit in the header", in_a_key)) from None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError("a number")
     if not abs(value) <= LARGEST:
@@ -422,19 +397,15 @@ def entries(value: object) -> object:
     parts = [part.partition(":") for part in value.split(";") if part.strip()]
     if not all(colon and name.strip() for name, colon, _ in parts):
         raise ValueError('a table, in a sheet "3: 10; 5: 20"')
-    found = {name.strip(): text.strip() for name, _, text in parts}
-    if len(found) < len(parts):
+    values = {name.strip(): text.strip() for name, _, text in parts}
+    if len(values) < len(parts):
         raise ValueError("each name once")
-    return found
+    return values
 
 
 def _day(value: object) -> object:
-    if isinstance(value, datetime.datetime):
-        return value.date()
-    if isinstance(value, datetime.date):
-        return value
     try:
-        return datetime.date.fromisoformat(str(value).strip())
+        return datetime.date.fromisoformat(str(value).strip().partition(" ")[0])  # without a time of the day
     except ValueError:
         raise ValueError("a date, such as 2026-03-17") from None
 
@@ -470,19 +441,12 @@ def by_name(inner: Any) -> Any:  # noqa: ANN401
 
 def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
     """Settings of a whole file as a JSON schema (draft 2020-12), for editors."""
-    schema = _tidy(model.model_json_schema())
+    text = json.dumps(model.model_json_schema())
+    for name, bound in _BOUNDS.items():  # of numbers that may be texts pydantic writes its own names
+        text = text.replace(f'"{name}": ', f'"{bound}": ')
+    schema = json.loads(text)
     schema["properties"]["schema_version"] = {
         "const": SCHEMA_VERSION,
         "description": "of the keys of this file; unstated: this one",
     }
     return {"$schema": DRAFT, **schema, "title": title}
-
-
-def _tidy(node: Any) -> Any:  # noqa: ANN401
-    """Without titles and nulls, which TOML has not; bounds by their names in schemas."""
-    if isinstance(node, list):
-        return [_tidy(one) for one in node if one != {"type": "null"}]
-    if not isinstance(node, dict):
-        return node
-    out = {_BOUNDS.get(name, name): _tidy(value) for name, value in node.items()}
-    return {k: v for k, v in out.items() if v is not None and not (k == "title" and isinstance(v, str))}

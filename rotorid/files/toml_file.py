@@ -22,24 +22,21 @@ def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
     data = read_bytes(path, problems)
     if data is None:
         return None
-    if len(data) > MOST_BYTES:
-        problems.add(str(path), None, None, None, f"a TOML file of at most {MOST_BYTES // 10**6} MB")
-        return None
     try:
+        if len(data) > MOST_BYTES:
+            raise ValueError(f"at most {MOST_BYTES // 10**6} MB")
         text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
-        return None
-    if not text.strip():
-        problems.add(str(path), None, None, None, "a TOML file with settings; the file is empty")
-        return None
-    try:
+        if not text.strip():
+            raise ValueError("settings; the file is empty")
         if _DEEP.search(text):
             raise ValueError("a key of more than 20 parts")
         # A lone carriage return ends a line for no reader of TOML.
-        said = tomllib.loads(text.replace("\r\n", "\n"))
+        settings = tomllib.loads(text.replace("\r\n", "\n"))
+    except UnicodeDecodeError:
+        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
     except (ValueError, RecursionError) as error:
         problems.add(str(path), None, None, None, f"a TOML file: {error}")
-        return None
-    problems.refuse_newer(str(path), said.pop("schema_version", SCHEMA_VERSION))
-    return said
+    else:
+        problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
+        return settings
+    return None

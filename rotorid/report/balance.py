@@ -88,8 +88,7 @@ def balance_report(
         warnings=list(map(sentence, answer.warnings)),
         provenance=provenance,
         judgement=answer.judgement.splitlines(),
-        head={**dict.fromkeys(_HEAD, ""), "machine": job.machine, "date": job.date or ""}
-        | {key: value for key, value in job.sheet.items() if key in _HEAD and value},
+        head={key: job.sheet.get(key) or getattr(job, key, "") or "" for key in _HEAD},
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
         source=_SOURCES.get(result.influence.reading.source, ""),
@@ -115,7 +114,7 @@ def balance_report(
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
-        trial_radii=bool(job.trial_radii),
+        trial_radii=any(plane.trial_radius for plane in job.planes.values()),
         slow_roll=job.slow_roll is not None,
     )
 

@@ -133,7 +133,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     """
     from balancing import reading_of
     from rotorid.files.columns import make_table, read_grid
-    from rotorid.files.job import Overrides, conventions_of, tables_of
+    from rotorid.files.job import conventions_of, tables_of
     from rotorid.files.job_excel import open_job
     from rotorid.files.layout import read_runs_grid
     from rotorid.files.problems import Problems
@@ -143,7 +143,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     problems = Problems()
     written = open_job(job, problems)
     settings = written.read(Problems())
-    conventions = conventions_of(settings, Overrides())
+    conventions = conventions_of(settings)
     sources, _ = tables_of(written, settings)
     grid = None if "runs" not in sources else read_grid(sources["runs"], "runs", problems)
     grid = None if grid is None else read_runs_grid(_finished(grid), conventions, problems)

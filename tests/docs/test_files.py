@@ -36,7 +36,7 @@ def test_every_column_of_a_table_is_described(table):
 
 
 def test_every_sheet_of_a_workbook_is_described():
-    assert {*jobkeys.TABLES, *jobbook.SETTINGS} <= WORDS
+    assert {*jobkeys.TABLES, *(*jobbook.NAMED, "settings")} <= WORDS
 
 
 def test_the_tables_of_keys_of_a_job_are_those_of_the_code():

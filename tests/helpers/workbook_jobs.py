@@ -18,6 +18,7 @@ from tables_data import RUNS
 from rotorid.files.cells import Shown
 from rotorid.files.job_excel import template_bytes
 from rotorid.files.job_models import TABLES
+from rotorid.files.settings import Settings
 
 SAMPLES = (
     "turbo_job/job",
@@ -43,7 +44,7 @@ PARTS = {
         '[sensors.A]\nlimit = { "1000" = 4.5 }\nweight = 2\n[sensors.B]\nlimit = 6\n'
     ),
     "machine": 'machine = "007"\nmachine_type = "fan-132"\ndate = 2026-03-17\n',
-    "sheet": '[sheet]\nplace = "hall 3"\nengineer = "N. N."\ndate = 2026-03-18\nzero = "top"\n',
+    "sheet": '[sheet]\nplace = "hall 3"\nengineer = "N. N."\nzero = "top"\n',
     "weights of speeds": 'speed_weights = { "1000" = 0.5 }\n',
     "holes": (
         "[planes.1]\nholes_deg = [-30, 0, 7.25]\nhole_names = ['A', '2', 'C 3']\navailable_g = [5, 2.5]\n"
@@ -97,8 +98,8 @@ def _parts(value):
     if dataclasses.is_dataclass(value):
         names = (field.name for field in dataclasses.fields(value) if field.name not in _NOT_SAID)
         return type(value), ".{}", {name: getattr(value, name) for name in names}
-    if isinstance(value, Mapping):
-        return Mapping, ".{}", value
+    if isinstance(value, (Mapping, Settings)):
+        return Mapping, ".{}", dict(value)
     if isinstance(value, (tuple, list)):
         return list, "[{}]", dict(enumerate(value, start=1))
     return None

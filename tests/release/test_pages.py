@@ -25,8 +25,6 @@ MB = 10**6
     [
         ("a file, and a workbook unpacked", f"{input_file.MOST_BYTES // MB} MB"),
         ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
-        ("how much larger a workbook unpacks", f"{excel_workbook.MOST_PACKING} times, and 10 MB"),
-        ("seconds that reading a workbook takes", f"{excel_workbook.MOST_SECONDS:.0f}"),
         ("cells of a table", f"{cells.MOST_CELLS:,}"),
         ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
         ("names in a list or table of a model", f"{toml_file.MOST_NAMES:,}"),

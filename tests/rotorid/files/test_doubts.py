@@ -138,7 +138,7 @@ def test_stored_conventions_hold_for_the_readings_if_nothing_else_is_said(tmp_pa
     np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
     assert c.to_dict()["conventions"]["angles"] == "against rotation"
     assert "nothing states the conventions of the readings" in c.warnings[0]
-    assert c.warnings[0].endswith("phase = lag and angles against rotation")
+    assert c.warnings[0].endswith("phase = lag and angles = against rotation")
 
 
 def test_stated_conventions_hold_for_the_readings_alone(tmp_path, lag):

@@ -102,7 +102,7 @@ def test_options_replace_what_the_job_says(job):
     assert (trials.errors.amplitude, trials.errors.phase) == (0.05, math.radians(3))
     with pytest.raises(ValueError, match="phase must be 'lead' or 'lag', not 'late'"):
         job(phase="late")
-    with pytest.raises(ValueError, match="amplitude_percent"):
+    with pytest.raises(ValueError, match="errors of a reading must be finite numbers ≥ 0"):
         job(amplitude_error_percent=-1.0)
 
 

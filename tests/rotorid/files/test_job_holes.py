@@ -42,7 +42,7 @@ def test_equal_holes_with_pieces(job):
     assert (holes.per_hole, holes.step, holes.max_weight) == (2, 0.0, 0.06)
     assert holes.stock.tolist() == [3, 8]
     assert holes.names == tuple("12345678")
-    assert (read.removed, read.trial_radii, read.slow_roll) == ([], {}, None)
+    assert (read.planes["1"].remove, read.planes["1"].trial_radius, read.slow_roll) == (False, None, None)
 
 
 def test_listed_holes_with_a_step(job):
@@ -70,7 +70,7 @@ def test_holes_count_in_the_direction_of_the_jobs_angles(job):
 def test_removal_turns_holes_and_forbidden_arcs_by_half_a_turn(job, direction):
     lines = EQUAL + "forbidden_deg = [50, 60]"
     added, removed = job(lines, HEAD + direction), job(lines + "\nremove = true", HEAD + direction)
-    assert removed.removed == ["1"]
+    assert removed.planes["1"].remove
     assert added.holes["1"].names == removed.holes["1"].names == ("1", *"345678")
     turned = np.exp(1j * removed.holes["1"].angles)
     np.testing.assert_allclose(turned, -np.exp(1j * added.holes["1"].angles), atol=1e-14)
@@ -119,7 +119,7 @@ def test_trial_weights_at_another_radius(job, folder):
     """A mass at 200 mm does what 4/3 of it do at 150 mm."""
     plain = job("radius_mm = 150")
     read = job("radius_mm = 150\ntrial_radius_mm = 200")
-    assert read.trial_radii == {"1": pytest.approx(0.2)}
+    assert read.planes["1"].trial_radius == pytest.approx(0.2)
     expected = plain.trials.weights * [4 / 3, 1]
     np.testing.assert_allclose(read.trials.weights, expected, rtol=1e-14)
     ours, theirs = (correct(estimate_influence(each.trials)).weights for each in (read, plain))
@@ -129,7 +129,9 @@ def test_trial_weights_at_another_radius(job, folder):
         found, "job.toml", None, "planes.1.trial_radius_mm", "200", "the correction radius too, radius_mm"
     )
     write_csv(folder / "weights.csv", UNBALANCES)
-    np.testing.assert_array_equal(job("trial_radius_mm = 200").trials.weights, job().trials.weights)
+    np.testing.assert_array_equal(
+        job("radius_mm = 150\ntrial_radius_mm = 200").trials.weights, job().trials.weights
+    )
 
 
 def test_a_largest_weight_of_the_command_line_holds_for_the_holes(job):
@@ -143,8 +145,8 @@ def test_a_largest_weight_of_the_command_line_holds_for_the_holes(job):
 
 BAD = [
     ("holes = 4\nholes_deg = [0, 90]", "holes", "4", "either holes, equally spaced, or holes_deg"),
-    ("holes = 0", "holes", "0", "the number of holes, equally spaced, a whole number from 1 to 1000"),
-    ("holes = 2.5", "holes", "2.5", "a whole number from 1"),
+    ("holes = 0", "holes", "0", "a number of 1 or more: a number of equally spaced holes, up to 1,000"),
+    ("holes = 2.5", "holes", "2.5", "a whole number: a number of equally spaced holes, up to 1,000"),
     ("holes = 4\nfirst_hole_deg = 400", "first_hole_deg", "400", "a number up to 360"),
     ("holes_deg = [0]\nfirst_hole_deg = 5", "first_hole_deg", "5", "equally spaced holes too, holes = 12"),
     ("holes_deg = [0, 45, 45]", "holes_deg", "[0, 45, 45]", "holes 2 and 3 stand at the same angle"),
@@ -158,7 +160,12 @@ BAD = [
     ),
     ("available_g = [5]", "available_g", "[5]", "the holes of the plane too, holes = 12"),
     ("per_hole = 2", "per_hole", "2", "the holes of the plane too"),
-    ("holes = 4\navailable_g = [5, 0]", "available_g", "0", "a number above 0: weights of which"),
+    (
+        "holes = 4\navailable_g = [5, 0]",
+        "available_g",
+        "0",
+        "a number above 0: weights, in any unit, of which",
+    ),
     ("holes = 4\navailable_g = [5, 5]", "holes", "4", "a piece is listed twice"),
     ("holes = 4\navailable_g = 5\nstep_g = 1", "holes", "4", "either pieces or a smallest step"),
     ("holes = 4\nstep_g = 0", "step_g", "0", "a number above 0"),

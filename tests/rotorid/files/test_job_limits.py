@@ -60,7 +60,7 @@ def sensor(lines):
 def test_limits_and_weights_of_a_job_file(job):
     read = job()
     assert tuple(read.planes) == read.trials.planes == ("1", "2")
-    assert (read.left_out, read.used, read.radii) == (("2",), ("1",), {"1": 0.15})
+    assert (read.used, read.radii) == (("1",), {"1": 0.15})
     np.testing.assert_array_equal(read.limits.max_weight, [0.02, np.inf])
     um_pp = 0.5e-6
     np.testing.assert_allclose(
@@ -75,16 +75,10 @@ def test_limits_and_weights_of_a_job_file(job):
 
 def test_a_job_without_any(job):
     read = job(HEAD)
-    assert (read.limits, read.row_weights, read.left_out, read.check, read.rotor) == (
-        None,
-        None,
-        (),
-        None,
-        None,
-    )
+    assert (read.limits, read.row_weights, read.check, read.rotor) == (None, None, None, None)
     assert read.limits_of(["1"]) is None
     assert job(sensor("weight = 1")).row_weights is None
-    assert job(plane("use = true")).left_out == ()
+    assert job(plane("use = true")).used == ("1", "2")
 
 
 @pytest.mark.parametrize(
@@ -162,8 +156,8 @@ def test_bad_planes(job, lines, key, value, words):
 
 
 BAD_SENSORS = [
-    ("limit = 0", "limit", "0", "an amplitude above 0"),
-    ('limit = "3 um"', "limit", "3 um", "in a sheet"),
+    ("limit = 0", "limit", "0", "largest amplitude above 0"),
+    ('limit = "3 um"', "limit", "3 um", "the unit stands in the name of the key"),
     (
         'limit = { "1500" = 3 }',
         "limit",
@@ -176,7 +170,7 @@ BAD_SENSORS = [
         'limit = { "1000" = 0 }',
         "limit.1000",
         "0",
-        "a number above 0: an amplitude above 0 in the unit of the readings",
+        "a number above 0: largest amplitude above 0, in the unit of the readings",
     ),
     ('limit = "1000: 3; 1000: 4"', "limit", "1000: 3; 1000: 4", "each name once"),
     ("weight = -1", "weight", "-1", "0 or more"),

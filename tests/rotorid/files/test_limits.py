@@ -40,7 +40,6 @@ def words(path):
     [
         ("MOST_CELLS", 30, "at most 30 cells"),
         ("MOST_UNPACKED", 1000, "unpacked"),
-        ("MOST_SECONDS", -1.0, "can be read in"),
     ],
 )
 def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
@@ -48,15 +47,14 @@ def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
     assert expected in words(book)
 
 
-@pytest.mark.parametrize(("size", "most"), [(1_000_000, 500_000), (20_000_000, excel_workbook.MOST_UNPACKED)])
-def test_a_bomb_is_not_unpacked(book, monkeypatch, size, most):
+def test_a_bomb_is_not_unpacked(book, monkeypatch):
     stream = io.BytesIO(book.read_bytes())
     with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("xl/media/x.bin", b"\0" * size)
+        archive.writestr("xl/media/x.bin", b"\0" * 1_000_000)
     book.write_bytes(stream.getvalue())
-    monkeypatch.setattr(excel_workbook, "MOST_UNPACKED", most)
+    monkeypatch.setattr(excel_workbook, "MOST_UNPACKED", 500_000)
     monkeypatch.setattr(excel_workbook, "_sheets", lambda *_: pytest.fail("read"))
-    assert f"{size // 10**6} MB" in words(book)
+    assert "this one has 1 MB" in words(book)
 
 
 def test_a_formula_without_its_value_is_refused_and_one_with_it_is_read(tmp_path):

@@ -18,7 +18,7 @@ from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, as_workbook,
 from balancing import correct, estimate_influence
 from rotorid.files import job_from_files, read_job, write_influence
 from rotorid.files.job_excel import NAMED, template_bytes
-from rotorid.files.job_models import Errors, JobSettings
+from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
 from rotorid.samples import sample_data
 
 DATA = sample_data()
@@ -137,7 +137,7 @@ def with_values(path):
 
 def test_the_columns_of_the_form_are_keys():
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
-    for sheet, (first, model) in NAMED.items():
+    for (sheet, first), model in zip(NAMED.items(), (Plane, Sensor), strict=True):
         names = [cell.value for cell in book[sheet][1] if cell.value not in (first, "note")]
         assert names
         known = model.known_keys()

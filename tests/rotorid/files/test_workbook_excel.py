@@ -96,7 +96,7 @@ def test_the_form_with_settings(tmp_path):
         book["settings"].cell(keys.index(key) + 1, 2).value = value
     book.save(path)
     job = read_job(path)
-    assert (job.conventions.labels.phase, job.left_out) == ("lag", ("1",))
+    assert (job.conventions.labels.phase, job.used) == ("lag", ("2",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
 
 

@@ -115,12 +115,12 @@ def test_the_head_is_that_of_the_job(tmp_path):
         (tmp_path / name).write_text((DATA / "turbo_job" / name).read_text())
     more = (
         'machine = "fan 7"\ndate = 2026-03-17\n[sheet]\nplace = "hall <3>"\nengineer = "A. Rotor"\n'
-        'date = 2026-03-18\nzero = "top"\n'
+        'zero = "top"\n'
     )
     (tmp_path / "job.toml").write_text('runs = "runs.csv"\nweights = "weights.csv"\n' + more)
     text, _, report, _ = sheet_of(tmp_path / "job.toml")
     row = cells(text, ("machine", "place"))[1]
-    assert row == ["fan 7", "hall &lt;3&gt;", "2026-03-18", "A. Rotor", ""]
+    assert row == ["fan 7", "hall &lt;3&gt;", "2026-03-17", "A. Rotor", ""]
     assert text.index("A. Rotor") < text.index('id="judgement"') < text.index('id="weights"')
     # 0° at the top: the mark stands there, and the wanted weight a quarter of a turn further on
     for zero, turned in ((1.0, 0.0), (1j, 90.0)):
