@@ -66,7 +66,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     Parameters
     ----------
     data : RECORD|VECTORS
-        A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); or a runs
+        A record, .wav, .mat, .npz, or .csv with --tacho; a waveforms file (.toml); or a runs
         table with time_s, .csv or .xlsx: what `vectors` writes.
     options
         What differs from the defaults.
