@@ -80,7 +80,6 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     options = options or VectorsOptions()
     given = {
         "tacho": options.tacho,
-        "sensors": None,
         "unit": options.unit,
         "phase": options.phase,
         "orders": _orders(options.orders),

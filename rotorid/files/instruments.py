@@ -232,7 +232,7 @@ def _check_size(path: Path, size: int) -> None:
 def _of_arrays(path: Path, stored: Mapping[str, object]) -> Sampled:
     """Vectors by their names, or a matrix (N, C) with its `channels`; times, a rate or `dt` beside them."""
     arrays = {name: np.squeeze(np.asarray(values)) for name, values in stored.items() if name[:2] != "__"}
-    numbers = {name: array for name, array in arrays.items() if array.dtype.kind in "biuf" and array.size}
+    numbers = {name: array * 1 for name, array in arrays.items() if array.dtype.kind in "biuf" and array.size}
     channels = {name: array for name, array in numbers.items() if array.ndim == 1}
     matrices = [array for array in numbers.values() if array.ndim > 1]
     count, fit = len(channels), True

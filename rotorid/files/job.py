@@ -311,7 +311,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
             from rotorid.files.waveforms import read_vectors_grid
 
-            grid, phase, read = problems.need(read_vectors_grid(path, phase, problems))
+            grid, phase, read = read_vectors_grid(path, phase)
             tables[key], records = grid, (*records, *read)
             overrides = replace(overrides, phase=phase)
     readings = _readings(settings, tables, overrides, problems)
