@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base import result
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import polar, turned
 from rotorid.base.suggestions import did_you_mean
@@ -102,7 +101,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         warnings.warn(message, TableWarning, stacklevel=2)
     rows = replace(
         rows,
-        signals=_unread(model, len(table)) | rows.signals,
+        signals={**_unread(model, len(table)), **rows.signals},
         free=free,
         errors=errors,
         varying={name: table.numbers(name) for name in model.varying},
@@ -149,14 +148,14 @@ def read_amplitudes(path: str | Path) -> Experiments:
     return replace(rows, signals=signals, units=shown)
 
 
-def measurement_columns(data: Experiments, signals: Sequence[str]) -> tuple[result.Column, ...]:
+def measurement_columns(data: Experiments, signals: Sequence[str]) -> dict[str, FloatArray]:
     """The table of some amplitudes as `read_measurements` reads it, frequencies in rad/s."""
     columns = {"frequency_rad_s": data.frequencies, **data.varying}
     for name in signals:
         columns[f"{name}_re"] = data.signals[name].real
         if not data.free.all():
             columns[f"{name}_im"] = data.signals[name].imag
-    return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
+    return columns
 
 
 def _grid(path: str | Path) -> tuple[Grid, Problems]:

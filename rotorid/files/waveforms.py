@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator, Field
 
 from balancing import Labels
 from rotorid.base.arrays import AnyArray, significant
@@ -44,31 +45,16 @@ from rotorid.waveforms.vectors import Vectors, find_vectors
 SAME_RATE = 1e-3
 """A stated rate may be more exact than that of the file, but not another one."""
 DIGITS = 6
+_ROWS = ("times", "speeds", "vectors", "radial", "tangential", "turns", "overall", "gap", "end")
+"""Of `Vectors`: what has a row an instant."""
 _NAMED_UNIT = re.compile(rf"(.+?)(?:_| *[\[(] *)({'|'.join(sorted(VIBRATION, key=len))}) *[\])]?")
-_RECORDS = 'files by the names of their runs, such as { BASE = "base.wav" }, or a list of files'
-
-
-def _by_stem(value: object) -> object:
-    """Files by run; those of a list by their names without suffix."""
-    if not isinstance(value, list) or not value or not all(isinstance(file, str) for file in value):
-        return value
-    stems = [Path(file).stem for file in value]
-    if twice := [file for file, stem in zip(value, stems, strict=True) if stems.count(stem) > 1]:
-        expected = f"files of different names, which are those of the runs, not {listing(twice, 'and')}"
-        raise ValueError(f'{expected}; or [records] with RUN = "FILE"')
-    return dict(zip(stems, value, strict=True))
+_RECORDS = 'files by the names of their runs, such as { BASE = "base.wav" }'
 
 
 if TYPE_CHECKING:
     Vibration = Unit
 else:
     Vibration = Annotated[Text, AfterValidator(units.vibration)]
-Records = Annotated[
-    Annotated[dict[str, Text], Field(min_length=1)],
-    BeforeValidator(_by_stem, json_schema_input_type=dict[str, str] | list[str]),
-]
-
-
 Order = Annotated[Whole, Field(ge=1)]
 
 
@@ -122,7 +108,9 @@ class WaveformsFile(Settings):
         units=units.SPEED,
         example="speeds_rpm = [900, 1200]",
     )
-    records: Records = key(f"{_RECORDS}, relative to this file", expected=f"a file for each run: {_RECORDS}")
+    records: dict[str, Text] = key(
+        f"{_RECORDS}, relative to this file", expected=f"a file for each run: {_RECORDS}", min_length=1
+    )
     channels: dict[str, ChannelKeys] = key(
         "sensors by name, default all channels but the tacho's", default={}
     )
@@ -177,17 +165,20 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     """
     problems, paths = Problems(), [Path(file) for file in files]
     settings = next((path for path in paths if path.suffix.lower() == ".toml"), None)
-    data: dict[str, Any] = {"records": [str(path) for path in paths]}
+    data: dict[str, Any] = {"records": {path.stem: str(path) for path in paths}}
+    source = str(settings or "the options")
     if settings is not None:
         data = dict(problems.need(read_toml(settings, problems)))
-        if len(paths) > 1:
-            words = "one waveforms file alone, whose [records] are files; or records without it"
-            problems.add(str(settings), None, None, None, words)
+    if len(paths) > (1 if settings else len(data["records"])):
+        words = "records of different names, which are those of the runs; or one waveforms file alone"
+        problems.add(source, None, None, None, words)
     options = {key: value for key, value in (stated or {}).items() if value is not None}
     if "speeds_rad_s" in options:
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}
-    source, folder = str(settings or "the options"), (settings or Path()).parent
-    file = problems.need(read_settings(WaveformsFile, data | options, source, problems))
+    file, folder = (
+        problems.need(read_settings(WaveformsFile, data | options, source, problems)),
+        (settings or Path()).parent,
+    )
     problems.stop()
     records, amplitude = list[WaveformRecord](), file.amplitude
     for run, name in file.records.items():
@@ -297,48 +288,37 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
 
 def vectors_columns(each: Sequence[Vectors], labels: Labels) -> tuple[Column, ...]:
     """A runs table of records of the same sensors and orders, one row an instant and a sensor."""
-    records = [_vectors(one, labels) for one in each]
-    columns = []
-    for name, (_, shown, heading) in records[0].items():
-        wide = (
-            np.broadcast_to(record[name][0], one.gap.shape) for record, one in zip(records, each, strict=True)
-        )
-        cells = np.concatenate([values.ravel() for values in wide])
-        if cells.dtype.kind == "f":
-            cells = significant(cells, DIGITS)
-        columns.append(Column(name, cells.tolist(), shown.format if shown else None, heading))
-    return tuple(columns)
-
-
-def _vectors(one: Vectors, labels: Labels) -> dict[str, tuple[AnyArray, str | None, str | None]]:
-    """Columns of a record: values (P, C) or one for all of these, how they are shown, headings."""
-    unit, scale = labels.vibration_unit, labels.vibration_scale
+    rows: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in each]) for name in _ROWS}
+    whole = replace(each[0], **rows)
+    runs = np.repeat([one.run for one in each], [len(one.times) for one in each])
+    unit, scale, columns = labels.vibration_unit, labels.vibration_scale, list[Column]()
     plain, end = unit.removesuffix("_pp").removesuffix("_rms"), f"_{unit}" if unit else ""
-    columns: dict[str, tuple[AnyArray, str | None, str | None]] = {
-        "run": (np.array(one.run), "{}", None),
-        "time_s": (one.times[:, None], None, None),
-        "speed_rpm": (one.speeds[:, None] * RPM, "{:.1f}", "rpm"),
-        "sensor": (np.array(one.sensors), "{}", None),
-    }
-    for k, order in enumerate(one.orders):
+
+    def column(name: str, values: ArrayLike, form: str = "", heading: str | None = None) -> None:
+        """Values (P, C), (P, 1) of all sensors or (C,) of all instants."""
+        cells = np.broadcast_to(values, whole.gap.shape).ravel()
+        shown = significant(cells, DIGITS) if cells.dtype.kind == "f" else cells
+        columns.append(Column(name, shown.tolist(), form.format if form else None, heading))
+
+    column("run", runs[:, None], "{}")
+    column("time_s", whole.times[:, None])
+    column("speed_rpm", whole.speeds[:, None] * RPM, "{:.1f}", "rpm")
+    column("sensor", whole.sensors, "{}")
+    for k, order in enumerate(whole.orders):
         name, about = ("", unit.replace("_", " ")) if order == 1 else (f"order{order}_", f"{order}×")
-        vectors, radial, tangential = one.vectors[..., k], one.radial[..., k], one.tangential[..., k]
+        vectors = whole.vectors[..., k]
         amplitudes, phases = labels.vibration(vectors)
-        turned = np.minimum(tangential / np.maximum(np.abs(vectors), 1e-300), np.pi)
-        columns |= {
-            f"{name}amplitude{end}": (amplitudes, "{:.4g}", about),
-            f"{name}phase_deg": (phases, "{:.1f}°", "phase"),
-            f"{name}amplitude_std{end}": (radial * scale, "{:.2g}", "±"),
-            f"{name}phase_std_deg": (np.degrees(turned), "{:.2g}°", "±"),
-        }
-    overall = one.overall[..., int(unit.endswith("_rms"))] * scale
-    gap = one.gap * (scale if plain == unit else VIBRATION[plain].scale)
-    return columns | {
-        f"overall{end}": (overall, "{:.4g}", "all"),
-        f"gap_{plain}" if plain else "gap": (gap, "{:.4g}", "gap"),
-        "turns": (one.turns[:, None], "{:.0f}", None),
-        "note": (np.where(one.end[:, None], "end of the record", ""), None, None),
-    }
+        turned = np.minimum(whole.tangential[..., k] / np.maximum(np.abs(vectors), 1e-300), np.pi)
+        column(f"{name}amplitude{end}", amplitudes, "{:.4g}", about)
+        column(f"{name}phase_deg", phases, "{:.1f}°", "phase")
+        column(f"{name}amplitude_std{end}", whole.radial[..., k] * scale, "{:.2g}", "±")
+        column(f"{name}phase_std_deg", np.degrees(turned), "{:.2g}°", "±")
+    column(f"overall{end}", whole.overall[..., int(unit.endswith("_rms"))] * scale, "{:.4g}", "all")
+    read = whole.gap * (scale if plain == unit else VIBRATION[plain].scale)
+    column(f"gap_{plain}" if plain else "gap", read, "{:.4g}", "gap")
+    column("turns", whole.turns[:, None], "{:.0f}")
+    column("note", np.where(whole.end[:, None], "end of the record", ""))
+    return tuple(columns)
 
 
 def read_vectors_grid(
