@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import polar, turned
+from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
@@ -291,19 +291,25 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
     Frequencies of excitation are set, not read; a shape that is 1 everywhere is the reference of the others.
     Nothing where a cell of a reading is blank, or a natural frequency shows no end of its digits.
     """
+    from rotorid.identify.amplitudes import real_matrices
+
     covariances: dict[str, FloatArray] = {}
-    one = np.ones(len(rows), dtype=complex)
     for name in outputs:
-        z, stems = rows.signals[name], _stems(table, name)
-        if any(table.is_blank(stem).any() for stem in stems):
+        z, there = rows.signals[name], _stems(table, name)
+        if any(table.is_blank(stem).any() for stem in there):
             return {}
-        if not stems or (rows.free.all() and (z == 1).all()):
-            exact = 1e-24 * np.maximum(np.nan_to_num(np.abs(z)), 1e-12) ** 2
-            covariances[name] = turned(one, exact, exact)
+        if not there or (rows.free.all() and (z == 1).all()):
+            exact = 1e-12 * np.maximum(np.nan_to_num(np.abs(z)), 1e-12)
+            covariances[name] = exact[:, None, None] ** 2 * np.eye(2)
             continue
-        first, second = (table.steps(stem) ** 2 / 12.0 for stem in (stems[0], stems[-1]))
-        along = z if stems[0] == f"{name}_amplitude" else one
-        covariances[name] = turned(along, first, second * np.abs(along) ** 2)
+        turn, spread = (
+            np.ones(len(z), dtype=complex),
+            np.stack([table.steps(there[0]), table.steps(there[-1])]),
+        )
+        if there[0] == f"{name}_amplitude":
+            turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * np.abs(z)
+        root = real_matrices(turn) * (spread.T / np.sqrt(12.0))[:, None]
+        covariances[name] = root @ np.swapaxes(root, 1, 2)
     steps = table.steps("frequency" if "frequency" in table else "speed")
     if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
         return {}
