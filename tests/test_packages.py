@@ -13,7 +13,7 @@ import rotorid
 from rotorid.samples import sample_data
 
 HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba")
-HEAVY += ("pyuff", "nptdms", "scipy.io")
+HEAVY += ("pyuff", "scipy.io")
 
 
 def run_python(code):

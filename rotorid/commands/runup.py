@@ -66,7 +66,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     Parameters
     ----------
     data : RECORD|VECTORS
-        A record, .wav, .mat, .npz, .uff, .tdms, or .csv with --tacho; a waveforms file (.toml); or a runs
+        A record, .wav, .mat, .npz, or .csv with --tacho; a waveforms file (.toml); or a runs
         table with time_s, .csv or .xlsx: what `vectors` writes.
     options
         What differs from the defaults.
@@ -145,13 +145,11 @@ def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Se
 
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
-    from rotorid.files.problems import Problems
     from rotorid.files.vectors_table import read_vectors
     from rotorid.files.waveforms import read_vectors_grid
 
-    given = {"tacho": options.tacho, "sensors": None, "unit": options.unit, "phase": options.phase}
-    problems = Problems()
-    grid, phase, read = problems.need(read_vectors_grid(file, None, problems, given, moving=True))
+    given = {"tacho": options.tacho, "unit": options.unit, "phase": options.phase}
+    grid, phase, read = read_vectors_grid(file, None, given, moving=True)
     return read_vectors(grid, phase), read
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from rotorid.base import result
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
 from rotorid.commands.amplitude_errors import Errors, amplitude_errors
@@ -91,7 +90,7 @@ class SimulateOptions:
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
-_Simulated = tuple[dict[str, float], tuple[result.Column, ...], str, tuple[str, ...]]
+_Simulated = tuple[dict[str, float], "Mapping[str, FloatArray]", str, tuple[str, ...]]
 """Parameters, columns, what they are, notes."""
 
 
@@ -133,7 +132,7 @@ def simulate(
     values, simulated, about, notes = solve(model, options, noisy)
     about += f", with errors (seed {options.seed or 0})" if noisy else ""
     about += "" if options.digits is None else f", {counted(options.digits, 'significant digit')}"
-    columns = tuple(Column(each.name, [*each.values], each.shown or str) for each in simulated)
+    columns = tuple(Column(name, cells, "{:.6g}".format) for name, cells in simulated.items())
     first, *others = columns
     blocks = [(first, *others[k : k + BESIDE]) for k in range(0, len(others), BESIDE)]
     listed = listing((f"{name} = {value:g}" for name, value in values.items()), "and")

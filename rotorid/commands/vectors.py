@@ -63,7 +63,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     Parameters
     ----------
     records : RECORD…
-        Records, .csv, .wav, .mat, .npz, .uff or .tdms, a run each; or one waveforms file (.toml).
+        Records, .csv, .wav, .mat or .npz, a run each; or one waveforms file (.toml).
     options
         What a waveforms file does not say, or instead of it.
 
@@ -80,7 +80,6 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     options = options or VectorsOptions()
     given = {
         "tacho": options.tacho,
-        "sensors": None,
         "unit": options.unit,
         "phase": options.phase,
         "orders": _orders(options.orders),

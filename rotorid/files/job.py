@@ -260,7 +260,7 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
             from rotorid.files.waveforms import read_vectors_grid
 
-            grid, phase, read = problems.need(read_vectors_grid(path, settings.phase, problems))
+            grid, phase, read = read_vectors_grid(path, settings.phase)
             tables[key], records = grid, (*records, *read)
             # vectors know their sign, so that nothing is assumed: a job that says nothing writes lead
             settings = settings.model_copy(update={"phase": phase})

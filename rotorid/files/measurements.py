@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base import result
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.complex_numbers import polar
 from rotorid.base.suggestions import did_you_mean
@@ -21,6 +20,7 @@ from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN
+from rotorid.files.instruments import DERIVATIVE, read_responses
 from rotorid.files.modes import read_modes
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import Unit, UnitError, UnitReader, one_of, spelt
@@ -30,13 +30,7 @@ if TYPE_CHECKING:
     from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
     from rotorid.identify.operator_model import HarmonicModel
 
-FREQUENCIES = ("frequency", "speed")
-"""Stems of the columns that may hold the frequency."""
 PARTS = ("amplitude", "phase", "re", "im")
-DERIVATIVE = {"length": 0, "velocity": 1, "acceleration": 2}
-"""How often a displacement is differentiated, by the kind of its unit."""
-_SPEED = one_of(units.SPEED)
-_MICRONS = Shown(vibration_unit_words("um"), 1e6)
 _FREE = "a free vibration has real amplitudes"
 _AMPLITUDE = re.compile(r"(.+)_(?:amplitude|phase|re|im)(?:_.*)?")
 
@@ -86,9 +80,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     grid, problems = _grid(path)
     if {"mode", "node", "shape"} <= {*grid.header}:
         return _free_vibrations(path, model, errors)
-    table, rows = _rows(
-        make_table(grid, _columns(model.signals, model.varying), problems), problems, model.signals
-    )
+    table, rows = _rows(grid, problems, model.signals, model.varying)
     measured = rows.signals.keys() & {*model.outputs}
     if not measured:
         table.in_header(None, f"measured amplitudes: columns {listing(map(_forms, model.outputs))}")
@@ -101,17 +93,19 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         free &= rows.signals[name] == 0
     lost = next((f", or columns {_forms(name)}" for name in model.inputs if name not in rows.signals), "")
     for name in measured:
-        turned = free & (np.abs(rows.signals[name].imag) > 0)
-        table.complain_where(
-            turned, _stems(table, name)[-1], f"0{lost}: nothing excites this row, and {_FREE}"
-        )
+        expected = f"0{lost}: nothing excites this row, and {_FREE}"
+        table.complain_where(free & (np.abs(rows.signals[name].imag) > 0), _stems(table, name)[-1], expected)
     problems.stop()
     if lacking := [name for name in model.outputs if name not in measured | unmeasured]:
         message = f"{table.source}: the table has no {listing(lacking, 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=2)
-    varying = {name: table.numbers(name) for name in model.varying}
-    signals = {**_unread(model, len(table)), **rows.signals}
-    rows = replace(rows, signals=signals, free=free, errors=errors, varying=varying)
+    rows = replace(
+        rows,
+        signals={**_unread(model, len(table)), **rows.signals},
+        free=free,
+        errors=errors,
+        varying={name: table.numbers(name) for name in model.varying},
+    )
     return replace(rows, rounding=_rounding(table, rows, model.outputs))
 
 
@@ -123,18 +117,22 @@ def read_amplitudes(path: str | Path) -> Experiments:
     """
     from rotorid.identify.amplitudes import Experiments
 
+    microns = Shown(vibration_unit_words("um"), 1e6)
     if Path(path).suffix.lower() in (".uff", ".unv"):
-        from rotorid.files.instruments import read_responses
-
-        omega, signals = read_responses(Path(path))
-        shown, n = dict.fromkeys(signals, _MICRONS), len(omega)
-        labels = tuple(str(row + 1) for row in range(n))
-        signals["F"], axis = np.ones(n, dtype=complex), speed_axis("frequency", "Hz")
-        return Experiments(labels, omega, signals, np.zeros(n, dtype=bool), axis=axis, units=shown)
+        omega, points = read_responses(Path(path))
+        free = np.zeros(len(omega), dtype=bool)
+        return Experiments(
+            tuple(map(str, range(1, len(omega) + 1))),
+            omega,
+            {**points, "F": np.ones(len(omega), dtype=complex)},
+            free,
+            axis=speed_axis("frequency", "Hz"),
+            units=dict.fromkeys(points, microns),
+        )
     grid, problems = _grid(path)
-    points = tuple(dict.fromkeys(match[1] for name in grid.header if (match := _AMPLITUDE.fullmatch(name))))
-    table, rows = _rows(make_table(grid, _columns(points, ()), problems), problems, points)
-    if not {*points} - {"F"}:
+    names = dict.fromkeys(match[1] for name in grid.header if (match := _AMPLITUDE.fullmatch(name)))
+    table, rows = _rows(grid, problems, [*names])
+    if not {*names} - {"F"}:
         table.in_header(None, f"amplitudes of points: columns {_forms('X')}")
     signals, shown = {**rows.signals}, {**rows.units}
     for name, z in rows.signals.items():
@@ -145,19 +143,19 @@ def read_amplitudes(path: str | Path) -> Experiments:
             table.as_whole(table.fields[size].name, "a number that is not 0 in at least one row")
         if order := DERIVATIVE.get(table.unit(size).kind, 0):
             signals[name] = z / (1j * np.where(bad, 1.0, rows.frequencies)) ** order
-            shown[name] = _MICRONS
+            shown[name] = microns
     problems.stop()
     return replace(rows, signals=signals, units=shown)
 
 
-def measurement_columns(data: Experiments, signals: Sequence[str]) -> tuple[result.Column, ...]:
+def measurement_columns(data: Experiments, signals: Sequence[str]) -> dict[str, FloatArray]:
     """The table of some amplitudes as `read_measurements` reads it, frequencies in rad/s."""
     columns = {"frequency_rad_s": data.frequencies, **data.varying}
     for name in signals:
         columns[f"{name}_re"] = data.signals[name].real
         if not data.free.all():
             columns[f"{name}_im"] = data.signals[name].imag
-    return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
+    return columns
 
 
 def _grid(path: str | Path) -> tuple[Grid, Problems]:
@@ -177,21 +175,24 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
     from rotorid.identify.amplitudes import Experiments
 
     modes, problems = read_modes(path), Problems()
-    nodes, count = [str(node) for node in modes.nodes], len(modes.frequencies)
-    for node in {*nodes} - {*model.outputs}:
+    shapes, count = dict(zip(map(str, modes.nodes), modes.shapes, strict=True)), len(modes.frequencies)
+    for node in shapes.keys() - {*model.outputs}:
         expected = f"an amplitude of the model: {listing(model.outputs)}{did_you_mean(node, model.outputs)}"
         problems.add(str(path), None, "node", node, expected)
     if model.varying or model.has_constant_terms:
         problems.add(str(path), None, None, None, f"a model of amplitudes and parameters only, for {_FREE}")
     problems.stop()
-    covariances, std = {}, modes.frequency_std
+    std, covariances = modes.frequency_std, {}
     if errors is None and modes.shape_std is not None:
-        variances = (modes.shape_std * modes.shapes)[..., None, None] ** 2 * np.diag([1.0, 0.0])
-        covariances = dict(zip(nodes, variances, strict=True))
+        variances = (modes.shape_std * modes.shapes) ** 2
+        covariances = {
+            name: variance[:, None, None] * np.diag([1.0, 0.0])
+            for name, variance in zip(shapes, variances, strict=True)
+        }
     return Experiments(
         tuple(f"mode {mode}" for mode in range(1, count + 1)),
         modes.frequencies,
-        _unread(model, count) | dict(zip(nodes, modes.shapes.astype(complex), strict=True)),
+        _unread(model, count) | {name: shape.astype(complex) for name, shape in shapes.items()},
         np.ones(count, dtype=bool),
         errors,
         covariances,
@@ -199,29 +200,15 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
     )
 
 
-def _columns(signals: Sequence[str], varying: Sequence[str]) -> tuple[Column, ...]:
-    readers = dict.fromkeys(varying, _model_or({**units.SPEED, "re": Unit("re", "model")}))
-    vibration = _model_or(units.VIBRATION)
-    for name in signals:
-        readers |= {f"{name}_{part}": vibration for part in ("amplitude", "re", "im")}
-        readers[f"{name}_phase"] = one_of(units.ANGLE)
-    return (
-        Column("experiment", required=False),
-        Column("frequency", _SPEED, ("frequency_rad_s", "frequency_Hz"), required=False),
-        Column("speed", _SPEED, ("speed_rpm",), required=False),
-        Column("repeat", required=False),
-        *(Column(name, unit, (), required=False, blank=True) for name, unit in readers.items()),
-    )
-
-
 def _model_or(known: Mapping[str, Unit]) -> UnitReader:
     """No unit, which is the model's own, or a known one, which becomes SI (and peak)."""
 
     def read(name: str) -> Unit:
-        if name and spelt(name) not in known:
+        unit = Unit("", "model") if not name else known.get(spelt(name))
+        if unit is None:
             usual = listing([*known][:3])
             raise UnitError(f"no unit (the model's own) or one such as {usual}, not {name!r}")
-        return known[spelt(name)] if name else Unit("", "model")
+        return unit
 
     return read
 
@@ -235,21 +222,31 @@ def _stems(table: Table, name: str) -> list[str]:
     return [stem for part in PARTS if (stem := f"{name}_{part}") in table]
 
 
-def _rows(table: Table | None, problems: Problems, names: Sequence[str]) -> tuple[Table, Experiments]:
+def _rows(
+    grid: Grid, problems: Problems, names: Sequence[str], varying: Sequence[str] = ()
+) -> tuple[Table, Experiments]:
     """Amplitudes by name, NaN where a row does not have them, all taken as forced."""
     from rotorid.identify.amplitudes import Experiments
 
-    table = problems.need(table)
-    stem = table.only(FREQUENCIES, "frequency_rad_s", "one column frequency_rad_s, frequency_Hz or speed_rpm")
-    stem = problems.need(stem)
+    speed, vibration, angle = one_of(units.SPEED), _model_or(units.VIBRATION), one_of(units.ANGLE)
+    readers = dict.fromkeys(varying, _model_or({**units.SPEED, "re": Unit("re", "model")}))
+    readers |= {f"{name}_{part}": angle if part == "phase" else vibration for name in names for part in PARTS}
+    columns = (
+        Column("experiment", required=False),
+        Column("repeat", required=False),
+        Column("frequency", speed, ("frequency_rad_s", "frequency_Hz"), required=False),
+        Column("speed", speed, ("speed_rpm",), required=False),
+        *(Column(name, unit, (), required=False, blank=True) for name, unit in readers.items()),
+    )
+    table = problems.need(make_table(grid, columns, problems))
+    expected = "one column frequency_rad_s, frequency_Hz or speed_rpm"
+    stem = problems.need(table.only(("frequency", "speed"), "frequency_rad_s", expected))
     table.must_be(stem, table.numbers(stem) >= 0, "a frequency of 0 or more")
     problems.stop()
-    n = len(table)
-    labels = tuple(str(row + 1) for row in range(n))
+    labels = tuple(map(str, range(1, len(table) + 1)))
     if "experiment" in table:
-        labels = table.texts("experiment")
-        if "repeat" in table:
-            labels = tuple(map(", ".join, zip(labels, table.texts("repeat"), strict=True)))
+        texts = (table.texts(stem) for stem in ("experiment", "repeat") if stem in table)
+        labels = tuple(map(", ".join, zip(*texts, strict=True)))
         expected = "another name than in row {}; repeated readings of one experiment need a column repeat"
         table.once("experiment", labels, expected)
     signals = {name: _amplitude(table, name) for name in names if _stems(table, name)}
@@ -259,7 +256,7 @@ def _rows(table: Table | None, problems: Problems, names: Sequence[str]) -> tupl
         labels,
         table.numbers(stem),
         signals,
-        np.zeros(n, dtype=bool),
+        np.zeros(len(table), dtype=bool),
         axis=speed_axis(stem, table.unit(stem).name),
         units={name: Shown(vibration_unit_words(u.name), u.scale) for name, u in shown.items() if u.name},
     )
@@ -268,17 +265,17 @@ def _rows(table: Table | None, problems: Problems, names: Sequence[str]) -> tupl
 def _amplitude(table: Table, name: str) -> ComplexArray:
     """An amplitude, NaN where a row does not have it."""
     size, *others = _stems(table, name)
-    is_polar = [size, *others] == [f"{name}_amplitude", f"{name}_phase"]
-    if not is_polar and [size, *others] not in ([f"{name}_re"], [f"{name}_re", f"{name}_im"]):
+    parts = [stem.removeprefix(f"{name}_") for stem in (size, *others)]
+    if parts not in (["amplitude", "phase"], ["re", "im"], ["re"]):
         table.in_header(table.fields[size].name, f"columns {_forms(name)}")
-    first, blank = table.numbers(size), table.is_blank(size)
+        return np.zeros(len(table), dtype=complex)
+    first, blank, is_polar = table.numbers(size), table.is_blank(size), parts[0] == "amplitude"
     second = np.zeros(len(table))
     for other in others:
         half = table.is_blank(other)
         second = np.where(half, 0.0, table.numbers(other))
-        expected = f"a number, as {size} is given (0 for a real amplitude)"
-        table.complain_where(half & ~blank & ~(is_polar & (first == 0)), other, expected)
-        table.complain_where(blank & ~half, size, f"a number, or {other} blank too: it was not measured")
+        wrong = np.where(blank, ~half, half & ~(is_polar & (first == 0)))
+        table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
     if blank.all():
         table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
     if not is_polar:
@@ -286,10 +283,6 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
     table.must_be(size, (first >= 0) | blank, "an amplitude of 0 or more (a real part may be negative)")
     table.must_be(others[0], np.abs(second) <= FULL_TURN, "a phase from -360 to 360 degrees")
     return polar(first, second)
-
-
-def _frequency_column(table: Table) -> str:
-    return next(stem for stem in FREQUENCIES if stem in table)
 
 
 def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[str, FloatArray]:
@@ -317,7 +310,7 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
             turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * np.abs(z)
         root = real_matrices(turn) * (spread.T / np.sqrt(12.0))[:, None]
         covariances[name] = root @ np.swapaxes(root, 1, 2)
-    steps = table.steps(_frequency_column(table))
+    steps = table.steps("frequency" if "frequency" in table else "speed")
     if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
         return {}
     return {**covariances, "": np.where(rows.free, steps**2 / 12.0, 0.0)}

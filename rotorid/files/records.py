@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base import result
+from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
-from rotorid.files.columns import Column, read_table
+from rotorid.files.cells import show
+from rotorid.files.columns import Column, make_table, read_grid
 from rotorid.files.problems import Problems
 from rotorid.files.units import TIME, one_of, ratio
 
@@ -65,54 +67,51 @@ def read_record(
 
     taken = {*model.outputs, *model.inputs}
     deviations = {name: name + STD for name in model.outputs if name + STD not in taken}
-    problems, needed = Problems(), {} if allow_missing or not measured else dict.fromkeys(model.outputs, True)
+    problems, needed = Problems(), measured and not allow_missing
     columns = [Column("t", one_of(TIME), ("t_s",)), *(Column(name, ratio) for name in model.inputs)]
-    columns += [
-        Column(name, ratio, (), name in needed, blank=True, lenient=allow_missing)
-        for name in (*model.outputs, *deviations.values())
-        if name not in model.inputs
-    ]
-    table = problems.need(read_table(Path(path), "record", columns, problems))
+    for names, required in ((model.outputs, needed), (deviations.values(), False)):
+        more = [name for name in names if name not in model.inputs]
+        columns += [Column(name, ratio, (), required, blank=True) for name in more]
+    grid = problems.need(read_grid(path, "record", problems, first=True))
+    if allow_missing:
+        rows = (
+            (at, ["" if show(cell).casefold() in MISSING else cell for cell in row]) for at, row in grid.rows
+        )
+        grid = replace(grid, rows=tuple((at, tuple(row)) for at, row in rows))
+    table = problems.need(make_table(grid, columns, problems))
     clear = not len(problems)  # otherwise a misspelt column would be called missing
-    for name in table.fields if allow_missing else ():
-        for row in np.flatnonzero(np.isnan(table.numbers(name)) & ~table.is_blank(name)):
-            if table.shown(name, row).strip().casefold() not in MISSING:
-                table.complain(row, name, "a number")
     t, outputs = table.numbers("t"), {name: table.numbers(name) for name in model.outputs if name in table}
     for late in np.flatnonzero(np.diff(t) <= 0) + 1:
         before = f"{table.shown('t', late - 1)} of row {table.rows[late - 1]}"
         table.complain(late, "t", f"a time above {before}: sort the rows; repeated runs are other records")
     if measured and clear and not outputs:
         table.in_header(None, f"a column for at least one output of the model: {listing(model.outputs)}")
-    for name, values in outputs.items() if measured else ():
+    for name in outputs if measured else ():
+        blank = table.is_blank(name)
         if not allow_missing:
-            expected = "a number (--allow-missing: blanks were not measured)"
-            table.complain_where(table.is_blank(name), name, expected)
-        elif np.isnan(values).all():
+            table.complain_where(blank, name, "a number (--allow-missing: blanks were not measured)")
+        elif blank.all():
             table.as_whole(name, "a number in at least one row, or no such column")
     stated = {name: table.numbers(column) for name, column in deviations.items() if column in table}
     if stated and clear and (sigma is not None or stated.keys() != outputs.keys()):
         expected = "standard deviations of all outputs or none, and no such column together with --sigma"
         table.in_header(deviations[next(iter(stated))], expected)
     for name in stated.keys() & outputs.keys():
-        std = stated[name]
-        unknown = np.isnan(std) & (table.is_blank(deviations[name]) | allow_missing)
-        wrong = ~np.isnan(outputs[name]) & ((std <= 0) | unknown)
+        wrong = ~np.isnan(outputs[name]) & ((stated[name] <= 0) | table.is_blank(deviations[name]))
         expected = f"a standard deviation above 0 wherever {name} was measured"
         table.complain_where(wrong, deviations[name], expected)
     problems.stop()
     unit = table.unit("t")
-    alike = {} if sigma is None else {name: value for name, value in sigma.items() if name in table}
+    alike = {name: value for name, value in (sigma or {}).items() if name in table}
     axis = Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale)
     return Record(
         t, outputs, {k: table.numbers(k) for k in model.inputs}, stated or alike or None, str(path), axis
     )
 
 
-def record_columns(record: Record) -> tuple[result.Column, ...]:
+def record_columns(record: Record) -> dict[str, FloatArray]:
     """The table as `read_record` reads it: times in s, outputs, their standard deviations, inputs."""
-    columns = {"t_s": record.t, **record.outputs}
-    for name, std in (record.sigma or {}).items():
-        columns[f"{name}{STD}"] = np.broadcast_to(std, record.t.shape)
-    columns |= record.inputs
-    return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
+    stated = {
+        f"{name}{STD}": np.broadcast_to(std, record.t.shape) for name, std in (record.sigma or {}).items()
+    }
+    return {"t_s": record.t, **record.outputs, **stated, **record.inputs}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -78,7 +80,7 @@ def test_modes_of_a_file_are_those_of_the_masses(tmp_path, cli):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"func_type": 1, "data": np.ones(401)}, "frequency responses (function type 4) in a dataset 58"),
+        ({"func_type": 1, "data": np.ones(401)}, "frequency responses (function type 4) in datasets 58"),
         ({"ordinate_spec_data_type": 0}, "responses of a displacement, velocity or acceleration by a force"),
         ({"ordinate_axis_units_lab": "furlong"}, "found 'furlong by no unit'"),
     ],
@@ -93,5 +95,19 @@ def test_what_is_no_response_is_refused(tmp_path, changed, words):
 def test_responses_to_two_forces_are_refused(tmp_path):
     path = write(tmp_path / "f.uff", receptances())
     write(path, receptances(0), ref_node=1)
-    with pytest.raises(InputError, match="responses to one force"):
+    with pytest.raises(InputError, match="of each point, to one force"):
+        read_amplitudes(path)
+
+
+def test_without_the_extra_it_is_said_how_to_install_it(tmp_path, monkeypatch):
+    path = write(tmp_path / "f.uff", receptances())
+    monkeypatch.setitem(sys.modules, "pyuff", None)
+    with pytest.raises(InputError, match="pip install pyuff"):
+        read_amplitudes(path)
+
+
+def test_a_file_without_its_end_is_refused(tmp_path):
+    path = write(tmp_path / "f.uff", receptances())
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match="a whole file"):
         read_amplitudes(path)

@@ -78,8 +78,9 @@ def test_without_a_list_all_other_channels_are_sensors_with_the_units_of_their_n
         "B1Y [mm/s]": channels["B1Y"],
         "T_degC": channels["B1X"],
     }
-    wishes = {"tacho": "KEY", "sensors": ["B1X", "B1Y"]}
-    found = read_waveforms([write(tmp_path / "base.csv", named)], wishes)
+    text = 'tacho = "KEY"\nrecords = { base = "base.csv" }\n[channels.B1X]\n[channels.B1Y]\n'
+    write(tmp_path / "base.csv", named)
+    found = read_waveforms([settings(tmp_path, text)])
     (record,) = found.records
     assert [(s.name, s.derivative, s.factor) for s in record.sensors] == [("B1X", 0, 1e-6), ("B1Y", 1, 1e-3)]
     assert found.labels == Labels("um", 1e6)
@@ -108,7 +109,7 @@ def test_integers_of_a_wav_are_shares_of_full_scale_and_so_is_the_level_of_the_t
 
     values = np.array([[0.5, 0.25], [0.0, -0.5], [0.0, 0.125]])
     wavfile.write(tmp_path / "a.wav", 5120, (values * 2**15).astype(np.int16))
-    text = 'tacho = "1"\nrecords = ["a.wav"]\n[channels.A]\nchannel = "2"\nunit = "g"\nscale = 20\n'
+    text = 'tacho = "1"\nrecords = { a = "a.wav" }\n[channels.A]\nchannel = "2"\nunit = "g"\nscale = 20\n'
     (record,) = read_waveforms([settings(tmp_path, text)]).records
     np.testing.assert_array_equal(record.tacho.samples, values[:, 0])
     (sensor,) = record.sensors
@@ -120,7 +121,7 @@ def test_integers_of_a_wav_are_shares_of_full_scale_and_so_is_the_level_of_the_t
 def test_the_command_line_replaces_what_the_file_says(folder):
     wishes = {
         "tacho": "B1Y",
-        "sensors": ("probe", "KEY"),
+        "channels": {"probe": {"channel": "B1X", "unit": "mil", "scale": 5.0}, "KEY": {}},
         "unit": "um",
         "amplitude": "mm_s_rms",
         "pulses": 3,
@@ -162,7 +163,7 @@ OPTIONS = {
         "column KEI: expected a channel of this name (did you mean 'KEY'?)",
     ),
     "another sensor": (
-        {"tacho": "KEY", "sensors": ("B1YY",)},
+        {"tacho": "KEY", "channels": {"B1YY": {}}},
         "B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
     ),
     "another rate": (
@@ -200,10 +201,8 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
     'tacho = "KEY"\nrecords = []\n': "expected a table, [records]: a file for each run",
-    'tacho = "KEY"\nrecords = ["base.npz", "base.csv"]\n': "files of different names, which are those of "
-    'the runs, not base.npz and base.csv; or [records] with RUN = "FILE"',
     'tacho = "KEY"\nrecords = { A = 2 }\n': "key records",
-    'tacho = "KEY"\nrecords = ["bas.npz"]\n': "bas.npz: expected a file that exists (did you mean",
+    'tacho = "KEY"\nrecords = { a = "bas.npz" }\n': "bas.npz: expected a file that exists (did you mean",
     FILE + 'uni = "um"\n': "key channels.B1Y.uni: found 'um', expected a known key (did you mean 'unit'?)",
     FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
     FILE.replace("mm/s", "mm_s_pk"): "key channels.B1Y.unit",
@@ -223,10 +222,12 @@ def test_units_in_names_and_settings_agree(tmp_path):
     path = write(tmp_path / "a.npz", channels)
     for unit in ("um", "mil", None):  # those of channels that state none
         assert read_waveforms([path], {"tacho": "KEY", "unit": unit}).labels.vibration_unit == "um"
-    text = 'tacho = "KEY"\nrecords = ["a.npz"]\n[channels.A]\nunit = "mil"\n'
+    text = 'tacho = "KEY"\nrecords = { a = "a.npz" }\n[channels.A]\nunit = "mil"\n'
     assert "column A_um: expected the unit um of its name, not mil" in complaint([settings(tmp_path, text)])
     twice = write(tmp_path / "b.npz", {**channels, "A_mil": drawn()["B1Y"]})
-    assert "the channels are KEY, A_um and A_mil" in complaint([twice], {"tacho": "KEY", "sensors": ["A"]})
+    assert "the channels are KEY, A_um and A_mil" in complaint(
+        [twice], {"tacho": "KEY", "channels": {"A": {}}}
+    )
     only = write(tmp_path / "c.npz", {"KEY": drawn()["KEY"]})
     assert "a channel besides that of the tacho" in complaint([only], {"tacho": "KEY"})
 
@@ -237,7 +238,7 @@ def test_several_files(folder):
     assert [record.run for record in found.records] == ["base", "t1"]
     assert "one waveforms file alone" in complaint([settings(folder), folder / "base.npz"], wishes)
     write(folder / "base.csv")
-    assert "files of different names" in complaint([folder / "base.npz", folder / "base.csv"], wishes)
+    assert "records of different names" in complaint([folder / "base.npz", folder / "base.csv"], wishes)
     both = complaint([folder / "x.csv", folder / "y.csv"], wishes)
     assert both.count("a file that exists") == 2
 
@@ -246,15 +247,18 @@ def test_a_gap_in_a_channel_that_nobody_wants_is_no_problem(tmp_path):
     channels = drawn()
     channels["B1Y"][7] = np.nan
     path = write(tmp_path / "a.npz", channels)
-    read_waveforms([path], {"tacho": "KEY", "sensors": ["B1X"]})
+    read_waveforms([path], {"tacho": "KEY", "channels": {"B1X": {}}})
     words = complaint([path], {"tacho": "KEY"})
     assert "row 8, column B1Y: found nothing (a blank), expected a number in each sample" in words
 
 
-def test_a_tacho_of_true_and_false_is_one_of_numbers(tmp_path):
-    path = write(tmp_path / "a.npz", {"KEY": drawn()["KEY"] > 1, "A": drawn()["B1X"]})
+def test_channels_of_true_and_false_are_numbers(tmp_path):
+    pulses = drawn()["KEY"] > 1
+    path = write(tmp_path / "a.npz", {"KEY": pulses, "A": pulses})
     (record,) = read_waveforms([path], {"tacho": "KEY"}).records
-    assert record.tacho.samples.dtype.kind == "i"
+    for channel in (record.tacho, *record.sensors):
+        assert channel.samples.dtype.kind in "if"
+        np.testing.assert_array_equal(channel.samples, pulses)
 
 
 def test_a_hash_is_that_of_what_was_read_or_of_a_file_of_any_size(tmp_path):
