@@ -28,6 +28,7 @@ extensions = [
     "methods",
     "names",
     "results",
+    "tables",
 ]
 exclude_patterns = ["_build", "_ext"]
 source_suffix = {".md": "markdown"}
