@@ -86,7 +86,7 @@ golden-mutations: $(VENV)/.dev
 golden-exact: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
 
-# Printed numbers of the books beside what is computed now: docs/book_numbers.md, after a change of either.
+# Printed numbers of the books beside what is computed now: build/book/numbers.md.
 book: $(VENV)/.dev
 	PYTHONPATH=tests:tests/helpers:. $(BIN)/python -m book
 

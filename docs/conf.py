@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -28,6 +30,7 @@ extensions = [
     "methods",
     "names",
     "results",
+    "tables",
 ]
 exclude_patterns = ["_build", "_ext"]
 source_suffix = {".md": "markdown"}
@@ -60,3 +63,9 @@ smartquotes = False
 html_show_copyright = False
 html_copy_source = False
 html_show_sourcelink = False
+
+
+def setup(app: Any) -> None:  # noqa: ANN401 - what Sphinx calls
+    """Links to the course, which is no page here, are files to take along."""
+    course = re.compile(r"\]\(((?:\.\./)+examples/book/\w+\.md)\)")
+    app.connect("source-read", lambda app, page, text: text.append(course.sub(r"](path:\1)", text.pop())))

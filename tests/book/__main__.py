@@ -1,4 +1,4 @@
-"""`python -m book` writes `docs/book_numbers.md`."""
+"""`python -m book` writes every printed number beside what is computed now."""
 
 from book.page import write
 

@@ -1,7 +1,4 @@
-"""The page "every printed number beside what is computed now", `docs/book_numbers.md`.
-
-What stands above the mark is written by hand.
-"""
+"""Every printed number beside what is computed now; examples/book/numbers.md says how they compare."""
 
 import math
 from collections import Counter
@@ -10,8 +7,7 @@ from pathlib import Path
 from book.printed import STATUSES, WHY, half_unit
 from book.tables import TABLES, computed, rows
 
-PAGE = Path(__file__).parents[2] / "docs" / "book_numbers.md"
-MARK = "% From here on `make book` writes this page.\n"
+PAGE = Path(__file__).parents[2] / "build" / "book" / "numbers.md"
 TITLES = {
     "s_rotor": "[S] task 9.1: the rotor of 23 elements",
     "s_masses": "[S] tasks 9.1 and 9.2: its equivalent masses, formula (50)",
@@ -86,7 +82,7 @@ def _source(source, part):
 
 
 def generated():
-    """What stands below the mark."""
+    """The page."""
     every = judged()
     shown = Counter((row.why, status) for _, row, _, status in every)
     head = ("", *STATUSES, "all")
@@ -94,7 +90,11 @@ def generated():
         (WORDS[why], *(shown[why, s] for s in STATUSES), sum(shown[why, s] for s in STATUSES)) for why in WHY
     ]
     counts.append(("all", *(sum(shown[w, s] for w in WHY) for s in STATUSES), len(every)))
-    lines = ["", "## Counts\n", f"{sentence(every)}.\n", *_table(head, counts)]
+    lines = [
+        "# Every printed number beside what is computed now\n",
+        f"{sentence(every)}.\n",
+        *_table(head, counts),
+    ]
     for name in TABLES:
         lines.append(f"## {TITLES[name]}\n")
         sources = {}
@@ -107,5 +107,7 @@ def generated():
 
 
 def write():
-    by_hand = PAGE.read_text(encoding="utf-8").partition(MARK)[0]
-    PAGE.write_text(by_hand + MARK + generated(), encoding="utf-8")
+    """Write the page, and say where it is."""
+    PAGE.parent.mkdir(parents=True, exist_ok=True)
+    PAGE.write_text(generated(), encoding="utf-8")
+    print(f"{sentence(judged())}:\n{PAGE}")

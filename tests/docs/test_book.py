@@ -1,16 +1,19 @@
-"""The table of `docs/book/index.md`: no number of the three texts is missing, every command runs."""
+"""The course of `examples/book`: no number of the three texts is missing, every command runs; its schemes."""
 
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from docs_blocks import blocks, commands
+from docs_blocks import blocks, check_formulas, check_links, commands
 
 from rotorid.samples import sample_data
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "book" / "index.md"
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "book"
+PAGE = FOLDER / "covered.md"
 
 
 def _to(last, first=1, text="({})"):
@@ -66,10 +69,10 @@ def numbers(cell):
 
 TEXT_OF_PAGE = PAGE.read_text(encoding="utf-8")
 ROWS = {source: rows(TEXT_OF_PAGE, source) for source in (*NUMBERED, "In words")}
-COMMANDS = dict.fromkeys(re.findall(r"`(rotorid [^`]+)`", TEXT_OF_PAGE.split("## What is covered")[1]))
+COMMANDS = dict.fromkeys(re.findall(r"`(rotorid [^`]+)`", TEXT_OF_PAGE))
 TYPED = {
     command
-    for page in PAGE.parent.glob("*.md")
+    for page in FOLDER.glob("*.md")
     for block in blocks(page)
     if block.kind == "console"
     for command, _ in commands(block)
@@ -86,9 +89,7 @@ def test_every_number_of_the_texts_is_in_the_table_once(source):
 def test_every_row_has_a_command_or_a_page_or_says_why_not():
     for row in [row for table in ROWS.values() for row in table]:
         assert len(row) == 3, row
-        assert re.fullmatch(
-            r"`rotorid [^`]+`|\[book numbers\]\(../book_numbers.md\)|not computed, because .+", row[2]
-        ), row
+        assert re.fullmatch(r"`rotorid [^`]+`|`make book`|not computed, because .+", row[2]), row
 
 
 @pytest.mark.full
@@ -97,3 +98,20 @@ def test_every_command_that_no_other_page_has_runs(command, tmp_path, monkeypatc
     shutil.copytree(sample_data(), tmp_path / "sample_data")
     monkeypatch.chdir(tmp_path)
     assert cli(*shlex.split(command)[1:]).code == 0
+
+
+def test_the_schemes_are_those_that_the_module_draws(tmp_path):
+    """Ten, all of them on a page, as `python examples/book/schemes.py` writes them."""
+    subprocess.run([sys.executable, FOLDER / "schemes.py", tmp_path], check=True)
+    drawn = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
+    stored = {path.name: path.read_text(encoding="utf-8") for path in (FOLDER / "schemes").iterdir()}
+    assert drawn == stored
+    pages = "".join(page.read_text(encoding="utf-8") for page in FOLDER.glob("*.md"))
+    assert set(re.findall(r"\]\(schemes/(\w+\.svg)\)", pages)) == set(drawn)
+    assert len(drawn) == 10
+
+
+@pytest.mark.parametrize("page", sorted(FOLDER.glob("*.md")), ids=lambda page: page.stem)
+def test_links_of_a_page_lead_somewhere_and_its_formulas_become_mathml(page):
+    check_links(page)
+    check_formulas(page)

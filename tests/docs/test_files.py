@@ -1,20 +1,29 @@
 """docs/files.md names every column and every key that the readers know."""
 
 import re
+import sys
+from importlib import import_module
 from pathlib import Path
 
 from cases import each_of
-from keys_in_files import with_tables
 
 from rotorid.files import bearing, influence, modes, rotor, runs, unbalance, weights
 from rotorid.files import job_excel as jobbook
 from rotorid.files import job_models as jobkeys
+from rotorid.files.settings import Settings
 from rotorid.identify.expressions import FUNCTIONS
 
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
-WORDS = {
-    word for code in re.findall(r"`([^`]+)`", TEXT.replace("```", "")) for word in re.findall(r"\w+", code)
-}
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+
+from tables import key_lines, settings_of  # noqa: E402 - of docs/_ext
+
+TEXT = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+SHOWN = [settings_of(line.split()) for line in re.findall(r"^```\{keys\} (.+)$", TEXT, re.MULTILINE)]
+"""Settings whose keys the page lists, made with the pages."""
+KEYS = [cells for settings in SHOWN for cells in key_lines(settings)]
+CODE = re.findall(r"`([^`]+)`", TEXT.replace("```", "")) + [cells[0] for cells in KEYS]
+WORDS = {word for code in CODE for word in re.findall(r"\w+", code)}
 TABLES = {
     "rotor": rotor.COLUMNS,
     "bearing": bearing.COLUMNS,
@@ -39,9 +48,18 @@ def test_every_sheet_of_a_workbook_is_described():
     assert {*jobkeys.TABLES, *(*jobbook.NAMED, "settings")} <= WORDS
 
 
-def test_the_tables_of_keys_of_a_job_are_those_of_the_code():
-    """`python tests/helpers/keys_in_files.py` writes them."""
-    assert with_tables(TEXT) == TEXT
+def test_the_settings_of_every_file_are_on_the_page():
+    """All that are defined where one of them is, but those from which others are made."""
+    modules = {settings.__module__ for settings in SHOWN}
+    defined = {
+        value
+        for module in modules
+        for value in vars(import_module(module)).values()
+        if isinstance(value, type) and issubclass(value, Settings) and value.__module__ == module
+    }
+    made_from = {base for settings in defined | set(SHOWN) for base in settings.__mro__[1:]}
+    assert {one.__name__ for one in defined - made_from - set(SHOWN)} == {"SealKeys"}  # as those of a bearing
+    assert all(about and names for names, about, _ in KEYS)
 
 
 def test_every_function_of_expressions_is_named():

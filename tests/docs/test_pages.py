@@ -15,7 +15,13 @@ from rotorid.samples import sample_data
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
-BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
+BOOK = sorted(
+    set((DOCS.parent / "examples" / "book").glob("*.md"))
+    - {
+        DOCS.parent / "examples" / "book" / name
+        for name in ("README.md", "covered.md", "numbers.md", "words.md")
+    }
+)
 SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "fleet.md"]
 EVERY_TIME = ("getting_started/balancing", "getting_started/identification", "book/rotor")
 """Pages of which `make test` runs the blocks; `make docs` runs all."""

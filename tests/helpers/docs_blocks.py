@@ -8,10 +8,15 @@ import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import openpyxl
+from latex2mathml.converter import convert
 
-FENCE = re.compile(r"^```(.*)\n((?::\w+:.*\n)*)((?:(?!```).*\n)*)```$", re.MULTILINE)
+FENCE = re.compile(
+    r"^(?:(?:Prints|`([\w./]+)`):\n\n)?```(.*)\n((?::\w+:.*\n)*)((?:(?!```).*\n)*)```$", re.MULTILINE
+)
+INLINE_CODE = re.compile(r"`[^`\n]*`")
 SHEET = re.compile(r"^\*\*Sheet `(\w+)`\*\*.*\n(?:.+\n)*\n((?:\|.*\n)+)", re.MULTILINE)
 SKIPPED = ("...", "…")
 
@@ -27,13 +32,18 @@ class Block:
 
 
 def blocks(page: Path) -> list[Block]:
-    """All fenced blocks of a page, in their order."""
+    """All fenced blocks of a page, in their order.
+
+    Their caption is that of the directive, or what the line before the block says: a file's name in
+    backquotes, or "Prints:".
+    """
     text = page.read_text(encoding="utf-8")
     found = []
     for match in FENCE.finditer(text):
-        caption = re.search(r"^:caption: (.*)$", match[2], re.MULTILINE)
+        caption = re.search(r"^:caption: (.*)$", match[3], re.MULTILINE)
         line = text.count("\n", 0, match.start()) + 1
-        found.append(Block(match[1].strip(), caption[1].strip() if caption else "", match[3], line))
+        name = caption[1].strip() if caption else match[1] or "prints" * match[0].startswith("Prints:")
+        found.append(Block(match[2].strip(), name, match[4], line))
     found += [
         Block("sheet", match[1], match[2], text.count("\n", 0, match.start()) + 1)
         for match in SHEET.finditer(text)
@@ -149,3 +159,38 @@ def run_page(page: Path, folder: Path, cli, capsys, renewals: dict[str, str] | N
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(block.text, encoding="utf-8")
     return ran
+
+
+def formulas(page: Path) -> tuple[list[str], list[str]]:
+    """Displayed and inline formulas of a page, without its code."""
+    text = INLINE_CODE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
+    shown = re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL)
+    rest = re.sub(r"\$\$.*?\$\$", "", text, flags=re.DOTALL)
+    assert rest.count("$") % 2 == 0, page
+    return shown, re.findall(r"\$([^$]+)\$", rest)
+
+
+def check_formulas(page: Path) -> int:
+    """Each becomes well-formed MathML, as docs/_ext/mathml.py writes it; how many."""
+    shown, within = formulas(page)
+    for formula, display in [(f, "block") for f in shown] + [(f, "inline") for f in within]:
+        tree = ElementTree.fromstring(convert(formula.strip(), display=display))
+        assert "\\" not in "".join(tree.itertext()), formula
+        assert "$" not in formula
+    return len(shown) + len(within)
+
+
+def check_links(page: Path) -> None:
+    """Links to files lead somewhere, and those to sections of pages to a heading."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    for link, section in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#([^)]*))?\)", text):
+        target = page.parent / link if link else page
+        assert target.exists(), f"{page.name}: {link}"
+        if section and target.suffix == ".md" and not section.startswith("rotorid-"):
+            heads = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert section in {anchor(head) for head in heads}, f"{page.name}: {link}#{section}"
+
+
+def anchor(heading: str) -> str:
+    """What GitHub and MyST call a heading in addresses."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

@@ -107,7 +107,7 @@ def test_held_rigidly_is_a_simply_supported_shaft():
 
 
 def test_frequencies_from_soft_to_stiff_bearings():
-    """Rigid bearings: those of the reduction; else the errors that docs/book/motion.md states."""
+    """Rigid bearings: those of the reduction; else the errors that examples/book/motion.md states."""
     model, found = reduced(on_films()), reduce(held_rigidly(on_films()), NODES)
     stiff = planes(model, {2: 1e13, 22: 1e13})
     np.testing.assert_allclose(stiff[:3], found.frequencies, rtol=1e-5)

@@ -1,0 +1,65 @@
+"""Tables of keys, `{keys}`, from the typed settings themselves."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from docutils import nodes
+from pieces import table
+from sphinx.util.docutils import SphinxDirective
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+
+class Keys(SphinxDirective):
+    """`{keys} MODULE.NAME [ENTRY]`: the keys of typed settings; the line below heads their column."""
+
+    required_arguments = 1
+    optional_arguments = 1
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        """One row per key."""
+        return [table((self.content[0], "meaning", "such as"), key_lines(settings_of(self.arguments)))]
+
+
+def settings_of(words: Sequence[str]) -> Any:  # noqa: ANN401  a model of pydantic
+    """Typed settings by the name of their module and their own, or of a table of them and their kind."""
+    module, _, name = words[0].rpartition(".")
+    value = getattr(import_module(module), name)
+    return value[words[1]] if words[1:] else value
+
+
+def key_lines(settings: Any) -> list[tuple[str, str, str]]:  # noqa: ANN401  a model of pydantic
+    """Names of each key as a file writes them, what it means, and how its values are written."""
+    schema = settings.model_json_schema()["properties"]
+    lines = []
+    for name, field in settings.model_fields.items():
+        key = settings.known_keys()[field.alias or name]
+        kinds = (field.annotation, *typing.get_args(field.annotation))
+        inner = any(hasattr(kind, "known_keys") for kind in kinds)
+        origin = typing.get_origin(field.annotation)
+        header = "[{}]" if inner or dict in kinds else "{}"
+        if inner and origin is list:
+            header = "[[{}]]"
+        elif origin is dict:
+            header = (
+                "[{}.NAME]" if inner else "{}" if any(hasattr(m, "func") for m in field.metadata) else "[{}]"
+            )
+        names = ", ".join(f"`{header.format(one)}`" for one in key.names)
+        choices = schema.get(field.alias or name, {})
+        words = [
+            f'"{word}"' for one in (choices, *choices.get("anyOf", ())) for word in one.get("enum", ())
+        ] or (field.examples or [])
+        lines.append((names, key.about, ", ".join(f"`{word}`" for word in words)))
+    return lines
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directive."""
+    app.add_directive("keys", Keys)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
