@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -104,6 +105,18 @@ def test_more_samples_continue_a_study(tmp_path, threads):
     assert grown.to_dict() == at_once.to_dict()
     fewer = study(file, StudyOptions(samples=50, results=tmp_path / "grown.parquet"), threads)
     assert fewer.to_dict() == study(file, StudyOptions(samples=50), threads).to_dict()
+
+
+def test_a_study_that_breaks_before_its_file_is_written_loses_nothing(tmp_path, threads, monkeypatch):
+    file = tmp_path / "x.parquet"
+    monkeypatch.setattr(results, "write_bytes", Mock(side_effect=OSError("disk full")))
+    with pytest.raises(OSError, match="full"):
+        run(task(), 12, file, threads, 1)
+    monkeypatch.undo()
+    assert not file.exists()
+    run(task(), 12, file, threads, 1)
+    assert len(pq.read_table(file)) == 12
+    assert not list(tmp_path.glob("*.part"))
 
 
 def test_a_file_of_another_study_is_refused_as_it_is(tmp_path, threads):
