@@ -99,9 +99,7 @@ def run(task: Task, samples: int, file: Path | None, executor: Executor | None, 
             raise ValueError(f"{words} ({type(error).__name__}: {error})") from error
         kept = journal.execute("SELECT sample, row FROM samples ORDER BY sample").fetchall()
         table = _table(task, [{"sample": number, **json.loads(row)} for number, row in kept])
-        if (
-            file is not None
-        ):  # even if nothing was missing: a study may have ended before its file was written
+        if file is not None:  # also when nothing was missing: a study may break just before this
             write_bytes(file, _parquet(table))
     if file is not None:
         _beside(file).unlink(missing_ok=True)
