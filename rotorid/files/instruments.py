@@ -130,11 +130,13 @@ def _rate(path: Path, clock: str, times: AnyArray, first_row: int) -> float:
     unit = time_unit(clock) or TIME["s"]
     number = np.arange(len(times)) - (len(times) - 1) / 2
     step = float(number @ times / (number @ number))
-    if step > 0 and (np.abs(times - np.mean(times) - step * number) <= LARGEST_SHIFT * step).all():
+    in_place = np.abs(times - np.mean(times) - step * number) <= LARGEST_SHIFT * step
+    if step > 0 and in_place.all():
         return 1.0 / unit.to_si(step)
     jumps = np.diff(times)
     usual = float(np.nanmedian(jumps))
-    at = 1 + int(np.argmin(np.abs(jumps - usual) <= LARGEST_SHIFT * abs(usual)))
+    even = np.abs(jumps - usual) <= LARGEST_SHIFT * abs(usual)
+    at = 1 + int(np.argmin(in_place[1:] if even.all() else even))
     expected = f"times in even steps, {usual:.6g} {unit.name} here, or no such column and a stated rate"
     value = "" if np.isnan(times[at]) else f"{times[at]:.9g}"
     raise refusal(path, expected, at + first_row, clock, value)

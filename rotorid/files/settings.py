@@ -405,7 +405,7 @@ def entries(value: object) -> object:
 
 def _day(value: object) -> object:
     try:
-        return datetime.date.fromisoformat(str(value).strip().partition(" ")[0])  # without a time of the day
+        return datetime.datetime.fromisoformat(str(value).strip()).date()
     except ValueError:
         raise ValueError("a date, such as 2026-03-17") from None
 

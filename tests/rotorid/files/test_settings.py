@@ -134,6 +134,7 @@ def test_a_field_with_a_unit_is_in_si():
         ({"taken": "3: 1; 3: 2"}, "taken", "3: 1; 3: 2", "each name once"),
         ({"taken": {"3": 0}}, "taken.3", "0", "a number above 0"),
         ({"day": "tomorrow"}, "day", "tomorrow", "a date, such as 2026-03-17"),
+        ({"day": "2026-03-17 or so"}, "day", "2026-03-17 or so", "a date, such as 2026-03-17"),
         ({"file": " "}, "file", " ", "a text in quotes"),
         ({"model": {}}, "model.size", None, "the size"),
         ({"model": 3}, "model", "3", "a table of settings, [model]"),

@@ -126,6 +126,16 @@ def test_a_sample_that_is_missing_is_found_and_rounded_times_are_even(tmp_path):
         refused(csv(tmp_path, "\n".join(["t_s,KEY", *rows[:at], *rows[at + 1 :]])), "times in even steps")
 
 
+def test_times_whose_steps_grow_slowly_are_named_where_they_leave_their_places(tmp_path):
+    times = np.arange(400) + 4e-5 * np.arange(400) ** 2
+    rows = [f"{time:.6f},1" for time in times]
+    number = np.arange(400) - 199.5
+    off = times - times.mean() - number * (number @ times) / (number @ number)
+    step = number @ times / (number @ number)
+    row = 1 + int(np.flatnonzero(np.abs(off[1:]) > 0.3 * step)[0]) + 2
+    refused(csv(tmp_path, "\n".join(["t_s,KEY", *rows])), f"row {row}, column t_s")
+
+
 NO_TABLES = {
     "": "the file is empty",
     "a,b\nc,d\n": "a table: a column a channel, a row a sample",
