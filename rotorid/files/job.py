@@ -332,7 +332,7 @@ def _readings(settings: JobSettings, tables: Mapping[str, Source], problems: Pro
         )
         settings.complain(problems, "weights", expected)
     before, runs, stored, name = len(problems), tables["runs"], None, ""
-    phase, angles = settings.phase or stated_phase(runs, settings.columns), settings.angles
+    phase, angles = settings.phase or stated_phase(runs), settings.angles
     settings = settings.model_copy(update={"phase": phase})
     if "influence" in tables:
         name = source_name(tables["influence"])
@@ -382,7 +382,7 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = Non
         labels,
         settings.speed_tolerance_percent,
         tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
-        settings.columns,
+        settings.exchanged,
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),

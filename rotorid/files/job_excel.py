@@ -102,7 +102,7 @@ def _job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pr
     for name in (name for name in SHEETS[:-1] if name in titles):
         rows = sheets[titles[name]]
         if name in (*READINGS, *WEIGHT_TABLES):
-            rows = rows_from_header(rows, {}, weights=name in WEIGHT_TABLES)
+            rows = rows_from_header(rows, weights=name in WEIGHT_TABLES)
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
         source = sheet_source(path, titles[name])
         grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)
