@@ -15,7 +15,7 @@ from rotorid.base.text import listing
 from rotorid.files.cells import Grid, clean
 from rotorid.files.excel_workbook import SUFFIXES, is_workbook
 from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
-from rotorid.files.job_excel import open_job
+from rotorid.files.job import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.table_writing import write_files
