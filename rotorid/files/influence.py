@@ -17,10 +17,9 @@ import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
 from rotorid.base.arrays import ComplexArray
-from rotorid.base.json import plain
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
+from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.base.text import listing
-from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
 from rotorid.files.cells import Grid, read_bytes
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.cells import Cell, Grid, Row, below_title, show
 from rotorid.files.columns import REMARKS, Source, read_grid
