@@ -11,8 +11,7 @@ import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import off_axis
+from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import ROTATIONS, Conventions, as_angles, as_phase, resolve_angles

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell as as_json
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, make_grid, read_bytes, show

@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from balancing import Placement, ReadingErrors, RunScatter, Trials
-from rotorid.base.text import listing
-from rotorid.base.words import Angles, Phase, Rotation, View
+from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
 from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rotorid.files.further_runs import subtract_slow_roll
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, Trials, correct, estimate_influence
 from balancing.errors import reading_covariance
 from rotorid.files import read_job
+from rotorid.files.further_runs import subtract_slow_roll
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 VECTORS = """[slow_roll.A]
