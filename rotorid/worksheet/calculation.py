@@ -177,7 +177,7 @@ def trial(job: str | None, options: dict[str, Any]) -> dict[str, Any]:
 def convention(phase: str, angles: str) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
     from balancing import Labels
-    from balancing.plots.discs import weight_figure
+    from balancing.plots import weight_figure
     from rotorid.files.conventions import as_angles, as_phase
     from rotorid.report.conventions_explained import phase_figure
 
