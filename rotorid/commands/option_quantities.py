@@ -117,8 +117,7 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.files.units import Quantity
-    from rotorid.files.weights_with_units import in_job_units
+    from rotorid.files.units import Quantity, in_job_units
 
     unit = labels.weight_unit
     amount = _weight(given, what, example) if isinstance(given, str) else (given, _si(unit))
