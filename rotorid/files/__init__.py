@@ -23,27 +23,27 @@ if TYPE_CHECKING:
     from rotorid.files.model import HarmonicFile as HarmonicFile
     from rotorid.files.model import read_harmonic_model as read_harmonic_model
     from rotorid.files.model import read_ode_model as read_ode_model
-    from rotorid.files.modes import MeasuredModes as MeasuredModes
-    from rotorid.files.modes import read_compliance as read_compliance
-    from rotorid.files.modes import read_modes as read_modes
+    from rotorid.files.node_tables import MeasuredModes as MeasuredModes
+    from rotorid.files.node_tables import read_bow as read_bow
+    from rotorid.files.node_tables import read_compliance as read_compliance
+    from rotorid.files.node_tables import read_modes as read_modes
+    from rotorid.files.node_tables import read_unbalance as read_unbalance
     from rotorid.files.problems import InputError as InputError
     from rotorid.files.problems import Problem as Problem
     from rotorid.files.problems import TableWarning as TableWarning
     from rotorid.files.records import read_record as read_record
     from rotorid.files.rotor import read_rotor as read_rotor
     from rotorid.files.rotor import rotor_files as rotor_files
-    from rotorid.files.rotor_writing import write_rotor as write_rotor
+    from rotorid.files.rotor import write_rotor as write_rotor
     from rotorid.files.runs import read_trials as read_trials
     from rotorid.files.small_model import read_small_model as read_small_model
     from rotorid.files.table_writing import write_table as write_table
-    from rotorid.files.unbalance import read_bow as read_bow
-    from rotorid.files.unbalance import read_unbalance as read_unbalance
 
 _HOME = {
     "read_measurements": "measurements",
-    "MeasuredModes": "modes",
-    "read_compliance": "modes",
-    "read_modes": "modes",
+    "MeasuredModes": "node_tables",
+    "read_compliance": "node_tables",
+    "read_modes": "node_tables",
     "read_record": "records",
     "Job": "job",
     "job_from_files": "job",
@@ -56,11 +56,11 @@ _HOME = {
     "Problem": "problems",
     "TableWarning": "problems",
     "write_table": "table_writing",
-    "read_bow": "unbalance",
+    "read_bow": "node_tables",
     "read_rotor": "rotor",
     "rotor_files": "rotor",
-    "write_rotor": "rotor_writing",
-    "read_unbalance": "unbalance",
+    "write_rotor": "rotor",
+    "read_unbalance": "node_tables",
     "influence_frame": "influence",
     "read_influence": "influence",
     "write_influence": "influence",
