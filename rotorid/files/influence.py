@@ -22,14 +22,14 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes
+from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.disk import read_bytes, table_bytes, write_files
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.runs import SPEED, nearest_speed, show_speed, show_speeds
-from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
@@ -359,7 +359,7 @@ def write_influence(path: str | Path, influence: Influence) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_files({Path(path): influence_bytes(path, influence)})
 
 
 def influence_bytes(path: str | Path, influence: Influence) -> bytes:

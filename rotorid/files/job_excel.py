@@ -14,8 +14,9 @@ from rotorid.base.json import cell as as_json
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
-from rotorid.files.cells import BadCell, Cell, Grid, Row, make_grid, read_bytes, show
+from rotorid.files.cells import BadCell, Cell, Grid, Row, make_grid, show
 from rotorid.files.columns import REMARKS, Source, sheet_source
+from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, JobSettings
 from rotorid.files.layout import rows_from_header

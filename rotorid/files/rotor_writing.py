@@ -11,8 +11,8 @@ import numpy as np
 from fem import STEEL_POISSON, Calibration, Rotor
 from rotorid.base.tables import csv_bytes
 from rotorid.files.bearing import support_tables
+from rotorid.files.disk import each_file_once, write_files
 from rotorid.files.forces import force_tables, in_si
-from rotorid.files.input_file import each_file_once
 from rotorid.files.problems import InputError, Problem
 from rotorid.files.rotor import (
     OF_ELEMENTS,
@@ -23,7 +23,6 @@ from rotorid.files.rotor import (
     Parameter,
     read_rotor,
 )
-from rotorid.files.table_writing import write_files
 from rotorid.files.toml_writing import toml_bytes
 
 _OF_ELEMENTS = {column.stem: column.names[0] for column in OF_ELEMENTS}
