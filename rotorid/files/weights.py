@@ -21,7 +21,7 @@ from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
 from rotorid.files.headings import WEIGHT, find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, long_rows
+from rotorid.files.layout import NUMBER, long_rows
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
 
