@@ -116,8 +116,8 @@ class BalanceOptions:
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
         from rotorid.commands.app import check_targets
+        from rotorid.files.disk import write_files
         from rotorid.files.job_excel import template_bytes
-        from rotorid.files.table_writing import write_bytes
 
         path = self.template
         if job and path is None:
@@ -130,7 +130,7 @@ class BalanceOptions:
         check_targets([(path, (".xlsx",))])
         if path.exists():
             raise ValueError(f"{path}: exists already, and may be filled in; choose another name")
-        write_bytes(path, template_bytes())
+        write_files({path: template_bytes()})
         return f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}"
 
 

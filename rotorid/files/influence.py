@@ -19,15 +19,15 @@ from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunEr
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes
+from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.disk import read_bytes, table_bytes, write_files
 from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.runs import SPEED, nearest_speed, show_speed
-from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
@@ -345,7 +345,7 @@ def write_influence(path: str | Path, influence: Influence) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_files({Path(path): influence_bytes(path, influence)})
 
 
 def influence_bytes(path: str | Path, influence: Influence) -> bytes:

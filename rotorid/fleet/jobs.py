@@ -24,7 +24,7 @@ import numpy as np
 from balancing import Labels, UndeterminedError, estimate_influence
 from rotorid.base.logs import progress
 from rotorid.files import InputError, read_job
-from rotorid.files.input_file import each_file_once, file_content
+from rotorid.files.disk import each_file_once, file_content
 from rotorid.files.problems import Problems
 from rotorid.files.toml_file import read_toml
 from rotorid.files.units import vibration

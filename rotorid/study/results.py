@@ -22,7 +22,7 @@ import numpy as np
 
 from rotorid.base.logs import progress
 from rotorid.base.worker_processes import single_threads, worker_pool
-from rotorid.files.table_writing import write_bytes
+from rotorid.files.disk import write_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,7 +100,7 @@ def run(task: Task, samples: int, file: Path | None, executor: Executor | None, 
         kept = journal.execute("SELECT sample, row FROM samples ORDER BY sample").fetchall()
         table = _table(task, [{"sample": number, **json.loads(row)} for number, row in kept])
         if file is not None:  # also when nothing was missing: a study may break just before this
-            write_bytes(file, _parquet(table))
+            write_files({file: _parquet(table)})
     if file is not None:
         _beside(file).unlink(missing_ok=True)
     frame: pd.DataFrame = table.slice(0, samples).to_pandas()

@@ -109,7 +109,7 @@ def test_more_samples_continue_a_study(tmp_path, threads):
 
 def test_a_study_that_breaks_before_its_file_is_written_loses_nothing(tmp_path, threads, monkeypatch):
     file = tmp_path / "x.parquet"
-    monkeypatch.setattr(results, "write_bytes", Mock(side_effect=OSError("disk full")))
+    monkeypatch.setattr(results, "write_files", Mock(side_effect=OSError("disk full")))
     with pytest.raises(OSError, match="full"):
         run(task(), 12, file, threads, 1)
     monkeypatch.undo()
