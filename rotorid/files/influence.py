@@ -32,6 +32,8 @@ from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
@@ -167,25 +169,22 @@ def _tidied(grid: Grid) -> Grid:
 
 def _is_sound(table: Table) -> bool:
     """Whether the cells can be coefficients, each once; else problems."""
-    problems, header = table.problems, table.in_header
-    size, unit, before = table.numbers("influence"), table.unit("influence"), len(problems)
+    before, size, unit = len(table.problems), table.numbers("influence"), table.unit("influence")
     if unit == UNCLEAR:
         return False
+    reciprocal, keys, name = _units(unit.name)[2], _keys(table), table.fields["influence"].name
+    least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
+    table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
     table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
-    keys = _keys(table)
-    if not _units(unit.name)[2]:
-        table.must_be("influence", size >= 0, "a coefficient of 0 or more")
-        if "std" in table and table.unit("std") != unit:
-            header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
-    else:
-        table.must_be("influence", size > 0, "a weight above 0")
-        if len({key[1:] for key in keys}) > 1 or "std" in table:
-            expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
-            header(table.fields["influence"].name, expected)
+    if reciprocal and ("std" in table or len({key[1:] for key in keys}) > 1):
+        alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
+        table.in_header(name, alone)
+    elif "std" in table and table.unit("std") != unit:
+        table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
     table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
-    return len(table) > 0 and not problems.of(table.source) and len(problems) == before
+    return len(table) > 0 and not table.problems.of(table.source) and len(table.problems) == before
 
 
 def _keys(table: Table) -> list[tuple[float, str, str]]:
@@ -235,33 +234,36 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
     try:
         whole = json.loads(data)
         problems.refuse_newer(str(path), whole["schema_version"])
-        stored = whole["influence"]
-        reading, run = stored["reading"], stored["run_errors"]
-        sizes, chances = (np.array(run[key], dtype=float) for key in ("sizes", "probability"))
-        if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
-            raise ValueError("sizes of errors and probabilities must be 0 or more")
-        run = RunErrors(**{**run, "sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()})
-        errors = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
-        reading = Reading(errors, reading["source"], dof=reading["dof"] or np.inf)
-        own = np.array(stored["covariance"], dtype=float)
-        common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
-        influence = Influence(
-            speeds=np.array(stored["speeds_rad_s"], dtype=float),
-            sensors=tuple(stored["sensors"]),
-            planes=tuple(stored["planes"]),
-            W=_complex(stored["W"]),
-            baseline=_complex(stored["baseline"]),
-            errors=Gaussian(own, common, reading, run),
-            labels=Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])}),
-        )
-        covariance = influence.channels() if own.shape[:2] == influence.W.shape[:2] else own[:0]
-        if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
-            raise ValueError("a covariance is none")
-        return influence
+        return _of_document(whole["influence"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         problems.add(str(path), None, None, None, f"coefficients as rotorid balance writes them ({reason})")
     return None
+
+
+def _of_document(stored: Mapping[str, Any]) -> Influence:
+    """The coefficients of `_document`, as they were."""
+    reading, run, labels = stored["reading"], stored["run_errors"], stored["labels"]
+    sizes, chances, own = (
+        np.array(part, dtype=float) for part in (run["sizes"], run["probability"], stored["covariance"])
+    )
+    if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
+        raise ValueError("sizes of errors and probabilities must be 0 or more")
+    if not np.linalg.eigvalsh(own).min() >= -1e-6 * np.abs(own).max():
+        raise ValueError("a covariance is none")
+    stated = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
+    run = run | {"sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()}
+    common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
+    reading = Reading(stated, reading["source"], dof=reading["dof"] or np.inf)
+    return Influence(
+        speeds=np.array(stored["speeds_rad_s"], dtype=float),
+        sensors=tuple(stored["sensors"]),
+        planes=tuple(stored["planes"]),
+        W=_complex(stored["W"]),
+        baseline=_complex(stored["baseline"]),
+        errors=Gaussian(own, common, reading, RunErrors(**run)),
+        labels=Labels(**labels | {"assumed": tuple(labels["assumed"])}),
+    )
 
 
 def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON document

@@ -24,7 +24,7 @@ from rotorid.files.rotor import (
     read_rotor,
 )
 from rotorid.files.table_writing import write_files
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.toml_file import toml_bytes
 
 _OF_ELEMENTS = {column.stem: column.names[0] for column in OF_ELEMENTS}
 """Full names by attribute of a rotor."""

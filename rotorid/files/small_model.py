@@ -21,8 +21,7 @@ from rotorid.files.bearing import Attached, read_attached, support_tables
 from rotorid.files.forces import Place, Places, each, force_tables, whole
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rotorid.files.further_runs import subtract_slow_roll
 from tables_data import RUNS, WEIGHTS, csv_text, replaced, write_book, write_csv
 
 from balancing import ReadingErrors, estimate_influence, refine
 from rotorid.files import read_job, read_trials
 from rotorid.files.cells import Shown
 from rotorid.files.columns import written_steps
+from rotorid.files.further_runs import subtract_slow_roll
 
 
 @pytest.mark.parametrize(

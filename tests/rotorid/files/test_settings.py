@@ -30,7 +30,6 @@ from rotorid.files.settings import (
 )
 
 WEIGHT = {**units.MASS, **units.UNBALANCE}
-ANY = units.vibration
 
 
 class Inner(Settings):
@@ -44,7 +43,7 @@ class Top(Settings):
     )
     radius: Positive | None = key("radius", "radius_mm", None, units=units.LENGTH)
     amplitude: Annotated[units.Quantity, of(NotNegative)] | None = key(
-        "", "amplitude", None, units=units.vibration
+        "", "amplitude amplitude_um", None, units=units.VIBRATION
     )
     kind: Literal["one", "two"] = key("which", default="one")
     use: bool = key("`false`: not used", default=True)
@@ -121,7 +120,7 @@ def test_a_field_with_a_unit_is_in_si():
     [
         ({"most_g": 0}, "most_g", "0", "a number above 0"),
         ({"most_kg": 1, "most_g_mm": 2}, "most_g_mm", "2", "one key of them; most_kg says it already"),
-        ({"amplitude_MM": 3}, "amplitude_MM", "3", "the unit written mm, not MM"),
+        ({"amplitude_MM": 3}, "amplitude_MM", "3", "a known key (did you mean 'amplitude_um'?)"),
         ({"radius_mm": True}, "radius_mm", "true", "a number"),
         ({"radius_mm": "1,350"}, "radius_mm", "1,350", "a number; the cell holds text, whose comma may"),
         ({"radius_mm": 10**40}, "radius_mm", str(10**40), "a finite number, up to"),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rotorid.files.further_runs import subtract_slow_roll
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, Trials, correct, estimate_influence
 from balancing.errors import reading_covariance
 from rotorid.files import read_job
+from rotorid.files.further_runs import subtract_slow_roll
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 VECTORS = """[slow_roll.A]
@@ -178,7 +178,6 @@ BAD = [
     ),
     ("amplitude = 2.0", "amplitude = -2", "slow_roll.A.amplitude", "-2", "0 or more"),
     ("amplitude = 2.0", "amplitude_mm_s = 2", "slow_roll.A.amplitude_mm_s", "2", "an amplitude in um_pp"),
-    ("amplitude = 2.0", "amplitude_um_pk = 2", "slow_roll.A.amplitude_um_pk", "2", "um (peak)"),
     ("amplitude = 2.0\n", "", "slow_roll.A.amplitude", None, "the amplitude at slow speed"),
     (
         "amplitude = 2.0",
