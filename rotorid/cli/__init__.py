@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rotorid.base.answer import COLUMNS
-from rotorid.base.suggestions import one_of
+from rotorid.base.choices import one_of
 from rotorid.cli.choices import Command, Commands, whole_paragraphs
 from rotorid.cli.demo import demo
 from rotorid.commands.app import json_text, run, typer_command, written_help

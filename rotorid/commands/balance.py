@@ -212,7 +212,7 @@ def _answer(
 
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
-    return replace(answer, found="", tables=(answer.found, *answer.tables))
+    return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
 
 
 def _figure(

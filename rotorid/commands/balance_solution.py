@@ -20,7 +20,7 @@ from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
-    from rotorid.base.registry import Method
+    from rotorid.base.choices import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files import Job
     from rotorid.fleet.type_coefficients import TypeKnowledge

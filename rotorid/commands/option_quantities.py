@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from typing import TYPE_CHECKING, get_args
 
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.words import Angles
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number

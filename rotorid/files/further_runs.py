@@ -21,7 +21,7 @@ import numpy as np
 
 from balancing import Influence, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted, listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name

@@ -17,8 +17,7 @@ import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
 from rotorid.base.arrays import ComplexArray
-from rotorid.base.json import plain
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.files import units
 from rotorid.files.cells import Grid, read_bytes
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid

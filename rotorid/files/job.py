@@ -11,8 +11,7 @@ import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import off_axis
+from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import ROTATIONS, Conventions, as_angles, as_phase, resolve_angles
@@ -326,7 +325,7 @@ def _readings(
         )
         settings.complain(problems, "weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
-    phase, angles = settings.phase or stated_phase(runs, settings.columns), settings.angles
+    phase, angles = settings.phase or stated_phase(runs), settings.angles
     stated = dict[str, str]()
     settings = settings.model_copy(update={"phase": phase})
     if source is not None:
@@ -384,7 +383,7 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = Non
         labels,
         settings.speed_tolerance_percent,
         tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
-        settings.columns,
+        settings.exchanged,
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell as as_json
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, make_grid, read_bytes, show
@@ -49,7 +49,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
     for name in (name for name in SHEETS[:-1] if name in titles):
         rows = sheets[titles[name]]
         if name in (*READINGS, *WEIGHT_TABLES):
-            rows = rows_from_header(rows, {}, weights=name in WEIGHT_TABLES)
+            rows = rows_from_header(rows, weights=name in WEIGHT_TABLES)
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
         source = sheet_source(path, titles[name])
         grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)

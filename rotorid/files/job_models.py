@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from balancing import Placement, ReadingErrors, RunScatter, Trials
-from rotorid.base.text import listing
-from rotorid.base.words import Angles, Phase, Rotation, View
+from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
 from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
@@ -318,27 +317,6 @@ class Vector(Settings):
     )
 
 
-class Columns(Settings):
-    """`[columns]`."""
-
-    run: Text | None = optional("name in the file of the column `run`, and so on")
-    speed: Annotated[Quantity, of(Text)] | None = optional(
-        "or another unit of a speed", "speed_rpm", units=units.SPEED
-    )
-    sensor: Text | None = optional("not where each sensor has columns of its own")
-    amplitude: Annotated[Quantity, of(Text)] | None = optional(
-        "or, with its unit, `amplitude_um_pp` and the like",
-        "amplitude amplitude_um amplitude_mm_s amplitude_m_s2",
-        units=units.VIBRATION,
-    )
-    phase: Annotated[Quantity, of(Text)] | None = optional("or `phase_rad`", "phase_deg", units=units.ANGLE)
-    repeat: Text | None = optional("of repeated readings")
-
-    def in_file(self) -> dict[str, str]:
-        """Fields by the names that the columns have in the file."""
-        return {str(getattr(v, "value", v)): name for name, v in self if v is not None}
-
-
 class Sheet(Settings):
     """`[sheet]`."""
 
@@ -405,7 +383,11 @@ class JobSettings(Settings):
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
     )
-    columns: Columns | None = optional("other names of the columns of runs tables, see below")
+    exchanged: bool | None = optional(
+        "whether the columns of amplitudes and phases of the runs tables hold each other's numbers; answers "
+        "the question whether they do",
+        example="true",
+    )
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")

@@ -18,7 +18,7 @@ import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials, from_list
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Source

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.files.cells import read_bytes
 from rotorid.files.problems import Problems
 

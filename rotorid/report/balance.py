@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.plot_style import new_figure
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table, html
-from rotorid.base.text import figures, sentence
+from rotorid.base.text import RPM, figures, sentence
 from rotorid.files import units
 from rotorid.report import conventions_explained
 from rotorid.report.page import block, inline_svg, render_report
@@ -110,7 +109,9 @@ def balance_report(
         holes="" if plain else _holes(document, labels, "mounting" if left is None else "left_to_do"),
         stays=_if_run_stays(result) if plain else "",
         readings=_readings(document, result, check),
-        verdict="" if verdict is None else block("\n\n".join([verdict.answer.found, *verdict.answer.tables])),
+        verdict=""
+        if verdict is None
+        else block("\n\n".join([verdict.answer.numbers, *verdict.answer.tables])),
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),

@@ -105,7 +105,7 @@ def in_words(outcome: Outcome) -> dict[str, Any]:
     answer = outcome.answer
     return {
         "judgement": answer.judgement,
-        "lines": answer.found,
+        "lines": answer.numbers,
         "warnings": list(answer.warnings),
         "notes": list(answer.notes),
         "document": outcome.document,
