@@ -88,8 +88,9 @@ class Key:
     @cached_property
     def variants(self) -> dict[str, Unit]:
         """All its names, with their units."""
-        out = {name: Unit("", "") for name in self.names}
+        out = dict[str, Unit]()
         for name in self.names:
+            out[name] = Unit("", "")
             for usual, unit in self.units.items():
                 if name.endswith(f"_{usual}"):
                     stem, alike = (
