@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import asdict, fields, replace
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,9 +122,9 @@ def load_influence(
         if influence is not None:
             stated = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
     else:
-        grid = read_grid(source, "influence", problems)
+        before, grid = len(problems), read_grid(source, "influence", problems)
         table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
-        if table is None or not _is_sound(table):
+        if table is None or table.unit("influence") == UNCLEAR:
             return None
         text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
         stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
@@ -132,7 +132,7 @@ def load_influence(
             phase=as_phase(stated.get("phase") or phase or "lead"),
             angles=as_angles(stated.get("angles") or angles or "with rotation"),
         )
-        influence = _from_table(table, written)
+        influence = _from_table(table, written, before)
     if influence is None:
         return None
     its = influence.labels
@@ -166,54 +166,45 @@ def _tidied(grid: Grid) -> Grid:
     return replace(grid, header=tuple(header), rows=rows)
 
 
-def _is_sound(table: Table) -> bool:
-    """Whether the cells can be coefficients, each once; else problems."""
-    before, size, unit = len(table.problems), table.numbers("influence"), table.unit("influence")
-    if unit == UNCLEAR:
-        return False
-    reciprocal, keys, name = _units(unit.name)[2], _keys(table), table.fields["influence"].name
+def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
+    """The coefficients with these conventions, or None and more problems than `before`."""
+    size, angle, unit, std = (
+        *map(table.numbers, ("influence", "phase")),
+        table.unit("influence"),
+        "std" in table,
+    )
+    vibration, weight, reciprocal = _units(unit.name)
+    keys = [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
     least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
     table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    table.must_be("phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
-    if reciprocal and ("std" in table or len({key[1:] for key in keys}) > 1):
+    if reciprocal and (std or len({key[1:] for key in keys}) > 1):
         alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
-        table.in_header(name, alone)
-    elif "std" in table and table.unit("std") != unit:
+        table.in_header(table.fields["influence"].name, alone)
+    elif std and table.unit("std") != unit:
         table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
     table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
-    return len(table) > 0 and not table.problems.of(table.source) and len(table.problems) == before
-
-
-def _keys(table: Table) -> list[tuple[float, str, str]]:
-    """Speed, sensor and plane of each row."""
-    return [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
-
-
-def _from_table(table: Table, labels: Labels) -> Influence | None:
-    """The coefficients of a sound table with these conventions, or None and problems."""
-    vibration, weight, reciprocal = _units(table.unit("influence").name)
-    size, angle, keys = table.numbers("influence"), table.numbers("phase"), _keys(table)
-    values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
+    if not keys or len(table.problems) > before:
+        return None
     speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*keys, strict=True))
     speeds.sort()
-    place = {key: row for row, key in enumerate(keys)}
-    missing = [key for key in product(speeds, sensors, planes) if key not in place]
-    for speed, sensor, plane in missing[:MOST_LINES]:
-        at_speed = show_speed(speed, table.unit("speed"))
-        table.as_whole("plane", f"a coefficient of sensor {sensor!r} and plane {plane!r} at {at_speed}")
-    if missing:
+    row = {key: k for k, key in enumerate(keys)}
+    for place in islice((key for key in product(speeds, sensors, planes) if key not in row), MOST_LINES):
+        words = f"sensor {place[1]!r} and plane {place[2]!r} at {show_speed(place[0], table.unit('speed'))}"
+        table.as_whole("plane", f"a coefficient of {words}")
+    if len(table.problems) > before:
         return None
     S, C, P = len(speeds), len(sensors), len(planes)
-    at = np.reshape([place[key] for key in product(speeds, sensors, planes)], (S, C, P))
+    at = np.reshape([row[key] for key in product(speeds, sensors, planes)], (S, C, P))
+    values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
     errors = Gaussian.none(S, C, P)
-    if "std" in table:
+    if std:
         own = np.zeros((S, C, 2 * P + 2))
         own[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
-        errors = Gaussian(
-            own[..., None] * np.eye(2 * P + 2), errors.noise.columns, errors.reading, errors.run
-        )
+        covariance = own[..., None] * np.eye(2 * P + 2)
+        errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
     labels = replace(
         labels,
         vibration_unit=vibration.name,
