@@ -29,8 +29,7 @@ from rotorid.files.attached import (
 )
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"
