@@ -236,12 +236,10 @@ def small_equations(path: Path) -> dict[str, Any]:
             [name for name in inputs if name.removeprefix(FORCE) in names],
             [name for name in shown if name in names],
         )
+        merged = {name: equations.get(name, {}) | more.get(name, {}) for name in ("force", "bounds")}
     except (ValueError, TypeError) as error:
         raise InputError([Problem(str(path), None, "equations", None, str(error))]) from None
-    for name, value in more.items():
-        added = isinstance(value, dict) and name != "outputs"
-        equations[name] = {**equations.get(name, {}), **value} if added else value
-    return equations
+    return equations | more | merged
 
 
 def small_model_files(
