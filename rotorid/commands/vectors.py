@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
-from rotorid.base.text import counted, listing
+from rotorid.base.text import RPM, counted, listing
 from rotorid.commands.quantities import Speeds, speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 

@@ -18,14 +18,18 @@ if TYPE_CHECKING:
     from rotorid.files.job_models import Errors
     from rotorid.files.measurements import read_measurements
     from rotorid.files.model import HarmonicFile, read_harmonic_model, read_ode_model
-    from rotorid.files.modes import MeasuredModes, read_compliance, read_modes
+    from rotorid.files.node_tables import (
+        MeasuredModes,
+        read_bow,
+        read_compliance,
+        read_modes,
+        read_unbalance,
+    )
     from rotorid.files.problems import InputError, Problem, TableWarning
     from rotorid.files.records import read_record
-    from rotorid.files.rotor import read_rotor, rotor_files
-    from rotorid.files.rotor_writing import write_rotor
+    from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
     from rotorid.files.runs import read_trials
     from rotorid.files.small_model import read_small_model
-    from rotorid.files.unbalance import read_bow, read_unbalance
 
 _NAMES = {
     "conventions": "Conventions",
@@ -35,14 +39,12 @@ _NAMES = {
     "job_models": "Errors",
     "measurements": "read_measurements",
     "model": "HarmonicFile read_harmonic_model read_ode_model",
-    "modes": "MeasuredModes read_compliance read_modes",
+    "node_tables": "MeasuredModes read_bow read_compliance read_modes read_unbalance",
     "problems": "InputError Problem TableWarning",
     "records": "read_record",
-    "rotor": "read_rotor rotor_files",
-    "rotor_writing": "write_rotor",
+    "rotor": "read_rotor rotor_files write_rotor",
     "runs": "read_trials",
     "small_model": "read_small_model",
-    "unbalance": "read_bow read_unbalance",
 }
 __all__ = [
     "Conventions",

@@ -14,9 +14,9 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell
 from rotorid.base.logs import files as log
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table, csv, excel
 from rotorid.files.problems import STANDARD_INPUT, Problems, refusal
 

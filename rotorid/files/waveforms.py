@@ -16,11 +16,9 @@ from pydantic import AfterValidator, Field
 
 from balancing import Labels
 from rotorid.base.arrays import significant
-from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import listing
-from rotorid.base.words import Phase
+from rotorid.base.text import RPM, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase
