@@ -22,7 +22,7 @@ from balancing.plots import (
     trial_figure,
 )
 from balancing.plots.correction import weights
-from rotorid.fleet.plots import type_figure
+from rotorid.fleet.fit import type_figure
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 AGAINST = replace(GRAMS, angles="against rotation")

@@ -11,7 +11,7 @@ from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import read_job
 from rotorid.fleet import FleetFitOptions, fleet_fit
 from rotorid.fleet.jobs import read_fleet
-from rotorid.fleet.type_coefficients import type_coefficients
+from rotorid.fleet.posterior import type_coefficients
 from rotorid.samples import sample_data
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
@@ -95,7 +95,7 @@ def address(fleet):
 def test_a_fit_gives_back_what_was_drawn(fleet):
     found = fleet_fit(fleet[0] / "tree")
     table = found.to_frame()
-    assert len(found.result.kind.machines) == 25
+    assert len(found.result.machines) == 25
     mean = Machine.MEAN.ravel()
     W = table["influence"] * np.exp(1j * np.radians(table["phase_deg"]))
     assert np.abs(W.to_numpy() / mean - 1).max() < 0.12  # 0.1/√25 and 10°/√25, four deviations
@@ -138,7 +138,7 @@ def test_own_jobs_of_a_machine_count_but_never_the_same_runs(fleet, tmp_path):
     copy = shutil.copytree(own.parent, tmp_path / "elsewhere")
     assert type_coefficients(read_job(copy / "job.toml"), address(fleet)).earlier == 0
     alone = folder / "tree" / "fan" / "F7" / "2026-01-01" / "job.toml"
-    assert len(type_coefficients(read_job(alone), address(fleet)).known.kind.machines) == 24
+    assert len(type_coefficients(read_job(alone), address(fleet)).kind.machines) == 24
     new = machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1)
     first, other = (
         type_coefficients(read_job(new), address(fleet)),
@@ -175,8 +175,8 @@ def test_copies_count_once(tmp_path):
         job = copy / "2026-02-03" / "job.toml"
         job.write_text(job.read_text() + f"floor = 0.0{k + 1}\n")
     known = fit(tmp_path / "tree", tmp_path / "f.parquet").result
-    assert set(known.kind.machines) == {"P1", "P2", "P3"}
-    assert known.notes[0] == "2 jobs with the same coefficients as another left out"
+    assert set(known.machines) == {"P1", "P2", "P3"}
+    assert known.notes[0] == "2 jobs of a left out: copies of others, or without all of these coefficients"
 
 
 def test_a_machine_of_another_kind_is_told(fleet, tmp_path):
@@ -220,7 +220,7 @@ def test_masses_at_other_radii_are_converted(tmp_path):
     more = "[planes.L]\nradius_mm = 200\n[planes.R]\nradius_mm = 200\n"
     job = read_job(new.job(tmp_path / "new", runs=1, more=more))
     found = type_coefficients(job, f"{tmp_path / 'f.parquet'}:fan")
-    assert len(found.known.kind.machines) == 8
+    assert len(found.kind.machines) == 8
     W = found.influence.W[0] * 1e3  # µm pp per g
     assert np.abs(W / (2 * Machine.MEAN * 0.5) - 1).max() < 0.1
 
@@ -303,6 +303,6 @@ def test_assumed_errors_do_not_lower_the_scatter_between_machines(tmp_path, stat
         text = job.read_text()
         job.write_text(text if stated else text[: text.index("[errors]")])
     found = fit(tmp_path / "tree", tmp_path / "f.parquet")
-    assert (read_fleet(tmp_path / "f.parquet")["var_re"] > 0).all() == stated
+    assert (read_fleet(tmp_path / "f.parquet")["std"] > 0).all() == stated
     between = np.sqrt((found.to_frame()["between_percent"] ** 2).mean())
     assert between > (0 if stated else 1.5)
