@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, figures
+from rotorid.base.text import RPM, counted, figures, rpm_text
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ import numpy as np
 from balancing import Labels, UndeterminedError, estimate_influence
 from rotorid.base.logs import progress
 from rotorid.files import InputError, read_job
-from rotorid.files.input_file import each_file_once, file_content
+from rotorid.files.disk import each_file_once, file_content
 from rotorid.files.problems import Problem, Problems
 from rotorid.files.toml_file import read_toml
 from rotorid.files.units import vibration
@@ -127,14 +127,18 @@ def table_of(job: Job, path: str = "", machine_type: str = "") -> pd.DataFrame:
     """Rows of one job, of this type unless it says another; UndeterminedError without coefficients."""
     import pandas as pd
 
-    influence, labels = job.influence or estimate_influence(job.trials), job.trials.labels
-    quantity, weight_kind = kind_of(labels)
+    influence, labels, keys = job.influence or estimate_influence(job.trials), job.trials.labels, job.settings
     s, c, p = np.indices(influence.W.shape).reshape(3, -1)
     W, planes = influence.W.ravel(), [influence.planes[k] for k in p]
     variances = np.diagonal(influence.channels(known=True), axis1=-2, axis2=-1)[..., 2:]
     values = (
-        *(path, machine_of(job), job.machine_type or machine_type, "" if job.date is None else str(job.date)),
-        *(quantity, weight_kind, labels.vibration_unit, labels.weight_unit, runs_of(job)),
+        *(
+            path,
+            machine_of(job),
+            keys.machine_type or machine_type,
+            "" if keys.date is None else str(keys.date),
+        ),
+        *(*kind_of(labels), labels.vibration_unit, labels.weight_unit, runs_of(job)),
         *([influence.sensors[k] for k in c], planes, influence.speeds[s]),
         *([job.radii.get(plane, np.nan) for plane in planes], W.real, W.imag),
         np.sqrt(variances.reshape(-1, 2).mean(axis=-1)),
@@ -157,7 +161,7 @@ def runs_of(job: Job) -> str:
 def machine_of(job: Job) -> str:
     """As the job says; else its folder, or the first above it whose name is not a date alone."""
     folders = (folder.name for folder in _printable(job.files[0].resolve()).parents)
-    return job.machine or next((name for name in folders if _DATE.sub("", name).strip(" _-")), "")
+    return job.settings.machine or next((name for name in folders if _DATE.sub("", name).strip(" _-")), "")
 
 
 def _printable(path: Path) -> Path:

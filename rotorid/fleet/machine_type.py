@@ -23,7 +23,7 @@ import numpy as np
 
 from balancing import Gaussian, Influence, Labels, UndeterminedError, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted, listing
 from rotorid.files.conventions import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight

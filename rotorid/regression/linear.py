@@ -14,17 +14,21 @@ variance of the residuals and Student's t; without degrees of freedom there is n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import Column, text
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.undetermined_combinations import WORD_TOLERANCE
+from rotorid.base.json import plain
+from rotorid.regression.estimate import WORD_TOLERANCE, Estimate, unit_columns
 
 RCOND = 1e-12
 """Singular values below RCOND times the largest count as zero (after column scaling)."""
+JACOBIAN_RCOND = 1e-10
+"""The same for derivatives, which carry more rounding than a table."""
 
 
 def stretch(a: ArrayLike) -> FloatArray:
@@ -153,10 +157,9 @@ def least_squares(
     m, n = A.shape
     white = _whitened(np.column_stack((A, y)), weights, sigma, m // len(np.asarray(Y)))
     white_A, white_y = white[:, :n], white[:, n]
-    norms = np.linalg.norm(white_A, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    U, s, Vt = np.linalg.svd(white_A / scale, full_matrices=False)
-    rank = int(np.count_nonzero(s > rcond * s[0])) if s[0] > 0 else 0
+    unit, scale = unit_columns(white_A)
+    U, s, Vt = np.linalg.svd(unit, full_matrices=False)
+    rank = int(np.count_nonzero(s > rcond * s[0]))
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
@@ -202,10 +205,8 @@ def gain(A: ArrayLike, *, rcond: float = 1e-14) -> Any:  # noqa: ANN401
     -------
     (…, n, m), real where A is.
     """
-    K = np.asarray(A)
-    size = np.linalg.norm(K, axis=-2, keepdims=True)
-    scale = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.pinv(K / scale, rcond=rcond) / np.swapaxes(scale, -1, -2))
+    unit, scale = unit_columns(np.asarray(A))
+    return np.asarray(np.linalg.pinv(unit, rcond=rcond) / scale[..., None])
 
 
 def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noqa: ANN401
@@ -234,10 +235,8 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
 
 def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tuple[Any, int]:
     """As `solution`, and the rank of A: below n the equations leave combinations of x open."""
-    K = np.asarray(A)
-    size = np.linalg.norm(K, axis=0)
-    scale = np.where(size > 0, size, 1.0)
-    x, _, rank, _ = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)
+    unit, scale = unit_columns(np.asarray(A))
+    x, _, rank, _ = np.linalg.lstsq(unit, np.asarray(y), rcond=rcond)
     return (x.T / scale).T, int(rank)
 
 
@@ -257,7 +256,7 @@ def _real_problem(
     if A.ndim != 2 or A.shape[:1] != y.shape or 0 in A.shape:
         raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
     n = A.shape[1]
-    labels = tuple(names) if names is not None else tuple(f"θ{i + 1}" for i in range(n))
+    labels = tuple(names or (f"θ{i + 1}" for i in range(n)))
     if len(labels) != n or len(set(labels)) != n:
         raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
     if np.iscomplexobj(A) or np.iscomplexobj(y):
@@ -275,16 +274,46 @@ def _whitened(rows: FloatArray, weights: ArrayLike | None, sigma: ArrayLike | No
         return rows
     if weights is not None and sigma is not None:
         raise ValueError("give either weights or errors of Y, not both")
-    each = np.asarray(weights if sigma is None else sigma, dtype=np.float64)
-    m, lowest = len(rows), each.min(initial=np.inf)
-    good = np.isfinite(each).all() and each.any()
-    if not good or (each.ndim < 2 and (lowest < 0 or (sigma is not None and lowest == 0))):
+    m, stated = len(rows), sigma is not None
+    each = np.asarray(sigma if stated else weights, dtype=np.float64)
+    right = each > 0 if stated and each.ndim < 2 else (each >= 0) | stated
+    if not (np.isfinite(each) & right).all() or not each.any():
         raise ValueError(
             "errors must be finite and greater than zero, weights finite, not negative, not all 0"
         )
-    if each.ndim == 2 and each.shape == (m, m) and sigma is not None:
+    if stated and each.shape == (m, m):
         return np.asarray(np.linalg.solve(np.linalg.cholesky(each), rows))
-    if each.ndim > 1 or (each.ndim and len(each) * parts != m):
+    if each.shape not in ((), (m // parts,)):
         raise ValueError(f"weights and errors need one entry per row of Y, {m // parts}; got {each.shape}")
-    each = np.broadcast_to(np.repeat(each, parts) if each.ndim else each, m)
-    return np.asarray(rows * (np.sqrt(each) if sigma is None else 1.0 / each)[:, None])
+    each = np.repeat(np.broadcast_to(each, m // parts), parts)
+    return np.asarray(rows * (1.0 / each if stated else np.sqrt(each))[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMatrix:
+    """KᵀK (n, n) of the data's rows, [Q] (2.28), to look at: nothing is solved by it.
+
+    Rows are taken over their errors where these are known, in the units of the unknowns. The condition number
+    has four digits; it is infinite where the rows do not determine all unknowns.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    condition_number: float
+
+    def text(self) -> str:
+        """As a table."""
+        columns = (Column(n, row, "{:.6g}".format) for n, row in zip(self.names, self.matrix, strict=True))
+        title = f"normal matrix of the last step, condition number {self.condition_number:.4g}"
+        return f"{title}\n{text((Column('', self.names, str), *columns), width=10_000)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        return plain(vars(self))
+
+
+def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
+    """That of rows K (m, n)."""
+    s = np.linalg.svd(K, compute_uv=False)
+    full = least_squares(K, np.zeros(len(K)), rcond=JACOBIAN_RCOND).full_rank
+    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)

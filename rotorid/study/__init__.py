@@ -79,7 +79,7 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         import pyarrow
     except ImportError as error:
         raise ValueError("a study needs pyarrow: pip install pyarrow") from error
-    from rotorid.files.input_file import sha256
+    from rotorid.files.disk import sha256
     from rotorid.study.samples import draw_all, draw_machine, nominal
     from rotorid.study.study_file import read_study
 

@@ -29,7 +29,7 @@ from fem.parameters import with_parameters
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.logs import progress
 from rotorid.base.worker_processes import single_threads, worker_pool
-from rotorid.files.table_writing import write_bytes
+from rotorid.files.disk import write_files
 from rotorid.study.study_file import Study
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def draw_all(
             if file is not None:
                 buffer = io.BytesIO()
                 pq.write_table(whole, buffer, write_page_checksum=True)
-                write_bytes(file, buffer.getvalue())
+                write_files({file: buffer.getvalue()})
             return whole
 
         missing, due = [k for k in range(samples) if k not in rows], time.monotonic() + KEPT

@@ -15,7 +15,7 @@ from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.commands.calibrate import outcome
-from rotorid.regression import nonlinear, search
+from rotorid.regression import nonlinear
 
 ERRORS = ReadingErrors(0.02, 0.02)
 
@@ -275,7 +275,7 @@ def test_numbers_that_may_be_negative_are_not_stopped_at_zero():
 def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
     once = functools.partial(nonlinear.nonlinear_least_squares, max_iterations=1)
     monkeypatch.setattr(sys.modules[calibrate.__module__], "nonlinear_least_squares", once)
-    monkeypatch.setattr(search, "POLISH", 0)
+    monkeypatch.setattr(nonlinear, "POLISH", 0)
     runs = Runs()
     data = runs.data(runs.readings(machine()), errors=ERRORS)
     far = [Unknown("bearing[1].kxx", start=1e7), Unknown("bearing[2].kyy", start=1e8)]

@@ -73,7 +73,7 @@ def test_what_the_runs_determine_and_what_not():
     one = found(SPEEDS)
     assert one.explained
     assert one.other_ends == ()
-    share = dict(zip(one.prior.rows.own, one.prior.share, strict=True))
+    share = dict(zip(one.prior.rows.parameters, one.prior.share, strict=True))
     determined = {name for name, value in share.items() if value > 0.85}
     gains = {f"probe[{name}].gain" for name in example().PROBES}
     assert determined == {*gains, "bearing.tilting_stiffness", "key_phasor.angle"}

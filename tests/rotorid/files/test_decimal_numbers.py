@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rotorid.files import units
-from rotorid.files.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
+from rotorid.files.cells import NotANumber, parse_number, thousands_or_decimals
 from rotorid.files.problems import InputError, Problem, Problems
 
 

@@ -174,7 +174,7 @@ def test_decimal_commas_in_a_comma_separated_file_are_explained(tmp_path, weight
     path = tmp_path / "runs.csv"
     path.write_text(COMMA.replace("7.2", "7,2"))
     problems = complaints(read_trials, path, weights)
-    assert [(p.row, p.value) for p in problems if "need ; between" in p.expected] == [(2, "6 cells")]
+    assert [(p.row, p.value) for p in problems if "need ; between" in p.expected] == [(2, "238")]
     path.write_text(COMMA.replace("7.2", '"7,2"'))
     words = "in a comma-separated file a comma is not a decimal sign"
     the_only(complaints(read_trials, path, weights), "runs.csv", 2, "amplitude_um_pp", "7,2", words)

@@ -81,7 +81,7 @@ def test_modes_of_a_file_are_those_of_the_masses(tmp_path, cli):
     ("changed", "words"),
     [
         ({"func_type": 1, "data": np.ones(401)}, "frequency responses (function type 4) in datasets 58"),
-        ({"ordinate_spec_data_type": 0}, "responses of a displacement, velocity or acceleration by a force"),
+        ({"ordinate_spec_data_type": 0}, "displacements, velocities or accelerations by a force"),
         ({"ordinate_axis_units_lab": "furlong"}, "found 'furlong by no unit'"),
     ],
 )

@@ -12,7 +12,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import estimate_influence
 from rotorid.files import read_influence, read_trials, write_influence, write_table
-from rotorid.files.table_writing import write_bytes
+from rotorid.files.disk import write_files
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
 TABLE = [
@@ -166,7 +166,7 @@ def test_nothing_half_written(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("pathlib.Path.replace", full)
-    problems = complaints(write_bytes, path, b"after")
+    problems = complaints(write_files, {path: b"after"})
     the_only(problems, "a.csv", None, None, None, "No space left on device")
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]

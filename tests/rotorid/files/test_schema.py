@@ -47,7 +47,6 @@ ROTOR = 'shaft = "shaft.csv"\n'
         ROTOR + "[material]\npoisson_ratio = 0.6",
         ROTOR + "[[disc]]\nnode = 2\nmass_kg = -1",
         ROTOR + "[[bearing]]\nnode = 1\nkind = 'seel'",
-        ROTOR + "[[bearing]]\nnode = 1\npedestal_stiffness_N_per_m = [1, 2, 3]",
         ROTOR + "[[seal]]\nnode = 1\nkind = 'bearing'",
     ],
 )

@@ -9,7 +9,7 @@ from cases import each_of
 from waveform_files import RATE, drawn, write
 
 from balancing import Labels
-from rotorid.files.input_file import each_file_once, sha256
+from rotorid.files.disk import each_file_once, sha256
 from rotorid.files.problems import InputError
 from rotorid.files.waveforms import read_waveforms
 from rotorid.waveforms.record import SignalPath, TachoSettings

@@ -115,7 +115,7 @@ def test_a_study_that_breaks_before_its_file_is_written_is_whole_the_next_time(
     tmp_path, threads, monkeypatch
 ):
     file = tmp_path / "x.parquet"
-    monkeypatch.setattr(samples, "write_bytes", Mock(side_effect=OSError("disk full")))
+    monkeypatch.setattr(samples, "write_files", Mock(side_effect=OSError("disk full")))
     with pytest.raises(OSError, match="full"):
         drawn(number, file, threads)
     monkeypatch.undo()
