@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import RPM, counted, figures, rpm_text
+from rotorid.base.text import RPM, counted, figures
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.fleet.machine_type import MachineType
 
 _HEADS = ("rpm", "sensor", "plane", "influence", "°", "± % between", "± °", "± % within", "± ° ")
 """Of the table, on a terminal."""
-MOST_SHOWN = 4
-"""Sensors and planes of the picture."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +62,11 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         fewer than three machines.
     """
     from rotorid.files.problems import printable
-    from rotorid.fleet.jobs import parquet, read_tree
+    from rotorid.fleet.jobs import arrow, parquet, read_tree
     from rotorid.fleet.machine_type import type_of_fleet
 
     options = options or FleetFitOptions()
-    fleet, undetermined, damaged = read_tree(Path(tree), options.machine_type)
+    fleet, undetermined, damaged = read_tree(Path(tree), options.machine_type or "")
     unreadable = [f"{printable(file)} cannot be read: {why}" for file, why in damaged.items()]
     types = fleet.drop_duplicates("job")["machine_type"].value_counts().drop("", errors="ignore")
     if types.empty:
@@ -90,36 +89,36 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         notes.append(f"{counted(len(types) - 1, 'other type')} in the tree (--type NAME)")
     odd, warnings = list[dict[str, object]](), list[str]()
     for record, far in kind.odd:
-        reason, times = kind.why_odd(record), far**0.5
-        why = f"it would fit if {reason}" if reason else "nothing that was tried makes it fit"
-        warnings.append(
-            f"{record.machine} ({record.job}) is odd, {times:.2g} times as far off as machines of a type "
-            f"are, and was left out: {why}"
+        reason, times = kind.why_odd(record) or None, far**0.5
+        words = (
+            f"{record.machine} ({record.job}) is odd, {times:.2g} times as far off as machines of a type are"
         )
-        each = {"machine": record.machine, "path": record.job, "times_the_limit": times}
-        odd.append({**each, "reason": reason or None})
+        why = f"it would fit if {reason}" if reason else "nothing that was tried makes it fit"
+        warnings.append(f"{words}, and was left out: {why}")
+        each = {"machine": record.machine, "path": record.job, "times_the_limit": times, "reason": reason}
+        odd.append(each)
     unit = f"{kind.labels.vibration_unit or '1'}/{kind.labels.weight_unit}"
     return Outcome(
         result=kind,
         sentences=(f"{head}. In {unit}, phases lead, angles with the rotation:",),
         tables=(table.only(shown),),
         file=table,
-        files={".parquet": lambda path: parquet(fleet)},
+        files={".parquet": lambda _: parquet(arrow("a fleet").Table.from_pandas(fleet))},
         keys={
             "machine_type": name,
-            "types": {str(one): int(count) for one, count in types.items()},
+            "types": types.to_dict(),
             "machines": list(kind.machines),
             "jobs": jobs,
             "unit": unit,
             "phase": "lead",
             "angles": "with rotation",
-            "rows": [dict(zip(table.headings, row, strict=True)) for row in table.rows],
+            "rows": table.records,
             "odd": odd,
             "left_out": kind.left_out,
             "undetermined": undetermined,
             "damaged": damaged,
         },
-        pictures={"Coefficients of all machines over their mean.": partial(type_figure, kind)},
+        pictures={"Coefficients of all machines over their mean, by plane.": partial(type_figure, kind)},
         warnings=(*warnings, *unreadable),
         notes=tuple(notes),
         title="Type of machines",
@@ -139,12 +138,12 @@ def _table(kind: MachineType) -> Table:
         Column("influence", np.abs(W) * kind.labels.vibration_scale / kind.labels.weight_scale, digits),
         Column("phase_deg", np.degrees(np.angle(W)) % 360.0, tenths),
     ]
-    for name, covariance in (("between", kind.effects.between), ("within", kind.effects.within)):
-        std = np.sqrt(np.diag(covariance)).reshape(-1, 2) / np.abs(W)[:, None]
-        if name == "within" and kind.effects.jobs.max() == 1:
-            std[:] = np.nan  # not determined
-        columns.append(Column(f"{name}_percent", 100 * std[:, 0], tenths))
-        columns.append(Column(f"{name}_deg", np.degrees(np.arctan(std[:, 1])), tenths))
+    scatter = {"between": kind.effects.between}
+    scatter["within"] = kind.effects.within if kind.effects.jobs.max() > 1 else np.nan * kind.effects.within
+    for name, covariance in scatter.items():
+        along, across = np.sqrt(np.diag(covariance)).reshape(-1, 2).T / np.abs(W)
+        columns.append(Column(f"{name}_percent", 100 * along, tenths))
+        columns.append(Column(f"{name}_deg", np.degrees(np.arctan(across)), tenths))
     return Table("coefficients", tuple(columns))
 
 
@@ -158,31 +157,18 @@ def _typical(table: Table, name: str) -> str:
 
 
 def type_figure(kind: MachineType) -> Figure:
-    """Coefficients of all machines over their mean, a field for each plane and sensor, with 95 % regions."""
-    from balancing import region_edge
-    from rotorid.base.plot_style import legend_below, look, new_figure, plain
+    """Coefficients of all machines over their mean, those of a plane alike, and of odd machines."""
+    from rotorid.base.plot_style import legend_above, look, on_figure, plain
 
-    mean, effects = kind.mean, kind.effects
-    machines = 100 * (kind.coefficients(effects.groups) / mean - 1)
-    n = mean.size
-    pairs = np.einsum("ninj->nij", (effects.new_group + effects.within).reshape(n, 2, n, 2))
-    relative = pairs.reshape(*mean.shape, 2, 2) / (np.abs(mean) ** 2)[..., None, None]
-    edges = 100 * region_edge(np.zeros_like(mean), relative * kind.widening, 91)
-    shape = min(len(kind.planes), MOST_SHOWN), min(len(kind.sensors), MOST_SHOWN)
-    figure = new_figure(2.6 * shape[0] + 0.8)
-    axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
-    for (p, c), ax in np.ndenumerate(axes):
+    def draw(ax: Axes) -> None:
         plain(ax)
-        for s, speed in enumerate(map(rpm_text, kind.speeds)):
-            style, dots, edge = look(s), machines[:, s, c, p], edges[s, c, p]
-            ax.plot(dots.real, dots.imag, ".", color=style["color"], label=f"machines, {speed}")
-            ax.plot(edge.real, edge.imag, **style, label=f"95 % of machines, {speed}")
-        for record, _ in kind.odd:
-            other = 100 * (record.W / mean - 1)[:, c, p]
-            ax.plot(other.real, other.imag, "x", color="black", label=f"odd: {record.machine}")
-        ax.set_title(f"{kind.planes[p]} on {kind.sensors[c]}", fontsize="medium")
+        relative = kind.coefficients(kind.effects.groups) / kind.mean
+        points = {plane: (".", relative[..., p]) for p, plane in enumerate(kind.planes)}
+        points |= {f"odd: {record.machine}": ("x", record.W / kind.mean) for record, _ in kind.odd}
+        for k, (name, (marker, ratio)) in enumerate(points.items()):
+            percent = 100 * (ratio.ravel() - 1)
+            ax.plot(percent.real, percent.imag, marker, color=look(k)["color"], label=name)
         ax.set(aspect="equal", xlabel="along the mean, % of it", ylabel="across, % of it")
-        ax.label_outer()
-    legend_below(figure, axes.flat)
-    figure.set_layout_engine("compressed")  # no gaps between square fields
-    return figure
+        legend_above(ax)
+
+    return on_figure(draw)

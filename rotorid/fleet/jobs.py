@@ -13,10 +13,9 @@ import os
 import re
 import warnings
 import zipfile
-from collections.abc import Collection
 from contextvars import Context
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from rotorid.files.units import vibration
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from rotorid.files import Job
 
@@ -42,7 +42,7 @@ _DATE = re.compile(r"(?<!\d)\d{4}-\d\d-\d\d(?!\d)")
 _SHEET = re.compile(rb'<(?:\w+:)?sheet\s[^>]*?\bname="([^"]*)"')
 
 
-def read_tree(tree: Path, machine_type: str | None) -> tuple[pd.DataFrame, list[str], dict[str, str]]:
+def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], dict[str, str]]:
     """The table of the jobs in a tree; jobs without coefficients; files that cannot be read, with reasons.
 
     Parameters
@@ -50,7 +50,7 @@ def read_tree(tree: Path, machine_type: str | None) -> tuple[pd.DataFrame, list[
     tree
         A folder with jobs at any depth, or a job. Hidden files are left out, links not followed out of it.
     machine_type
-        Of the jobs that neither say it nor lie at least two folders deep, in that of their type.
+        Of the jobs that neither say it nor lie at least two folders deep, in that of their type; "": none.
 
     Raises
     ------
@@ -59,85 +59,60 @@ def read_tree(tree: Path, machine_type: str | None) -> tuple[pd.DataFrame, list[
     """
     import pandas as pd
 
-    tables: list[pd.DataFrame] = []
-    undetermined: list[str] = []
-    damaged: dict[str, str] = {}
-    jobs = _jobs(tree, damaged)
-    for count, (file, path) in enumerate(jobs.items(), 1):
+    root, tables = tree.resolve(strict=True), [pd.DataFrame(columns=list(COLUMNS))]
+    undetermined, damaged = list[str](), dict[str, str]()
+    inputs: set[Path] = set()
+    files = sorted(tree.rglob("*")) if tree.is_dir() else [tree]
+    # settings first: the workbooks that they name as tables are no jobs
+    for count, file in enumerate(sorted(files, key=lambda file: file.suffix.lower() != ".toml"), 1):
+        path = _printable(file.relative_to(tree) if file != tree else Path(file.name)).as_posix()
+        hidden = re.search(r"(^|/)(\.|~\$)", path) or not file.resolve().is_relative_to(root)
+        if hidden or not file.is_file() or file.resolve() in inputs:
+            continue
+        folders = path.split("/")
         try:
             # apart from what the command keeps of files that it reads: those of a whole tree are too many
-            tables.append(Context().run(_table_of_file, file, path, machine_type or ""))
+            job = Context().run(_read_job, file)
+            if job is not None:
+                inputs |= {one.resolve() for one in job.files}
+                tables.append(table_of(job, path, folders[0] if len(folders) > 2 else machine_type))
         except UndeterminedError:
             undetermined.append(path)
         except (ValueError, OSError, ArithmeticError, MemoryError) as error:
-            damaged[path] = _first_line(error)
-        progress.info("%d of %d jobs", count, len(jobs))
-    table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(COLUMNS))
-    return table, undetermined, damaged
+            damaged[path] = str(error).partition("\n")[0] or type(error).__name__
+        progress.info("%d of %d files", count, len(files))
+    return pd.concat(tables[1:] or tables, ignore_index=True), undetermined, damaged
 
 
-def _jobs(tree: Path, damaged: dict[str, str]) -> dict[Path, str]:
-    """Files that are jobs, with their paths below the tree; not the workbooks that others name as tables."""
-    root, jobs, tables = tree.resolve(strict=True), dict[Path, str](), set[Path]()
-    for file in sorted(tree.rglob("*")) if tree.is_dir() else [tree]:
-        path = file.relative_to(tree) if file != tree else Path(file.name)
-        hidden = any(part.startswith((".", "~$")) for part in path.parts)
-        if hidden or file.suffix.lower() not in (".toml", ".xlsx") or not file.is_file():
-            continue
-        if not file.resolve().is_relative_to(root):
-            continue
-        name = _printable(path).as_posix()
-        try:
-            keys, values = Context().run(_settings, file)
-        except (OSError, ValueError) as error:
-            damaged[name] = _first_line(error)
-            continue
-        tables |= {(file.parent / value).resolve() for value in values if str(value).endswith(".xlsx")}
-        if {"runs", "weights"} & {*keys}:
-            jobs[file] = name
-    return {file: name for file, name in jobs.items() if file.resolve() not in tables}
-
-
-def _settings(file: Path) -> tuple[Collection[str], Collection[str]]:
-    """Keys and values of a settings file; names of the sheets of a workbook, and nothing else of it."""
-    if file.suffix.lower() == ".toml":
-        problems = Problems()
-        settings = problems.need(read_toml(file, problems))
-        return settings.keys(), [value for value in settings.values() if isinstance(value, str)]
-    try:
-        with zipfile.ZipFile(io.BytesIO(file_content(file))) as archive:
-            names = _SHEET.findall(archive.read("xl/workbook.xml"))
-    except Exception as error:  # of any kind, where it is damaged
-        raise ValueError(f"{file}: expected an intact Excel workbook") from error
-    return [name.decode("utf-8", "replace").strip().casefold() for name in names], ()
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).partition("\n")[0] or type(error).__name__
-
-
-def _table_of_file(file: Path, path: str, machine_type: str) -> pd.DataFrame:
-    with each_file_once(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        folders = path.split("/")
-        return table_of(read_job(file), path, folders[0] if len(folders) > 2 else machine_type)
+def _read_job(file: Path) -> Job | None:
+    """The job of settings with runs or weights, and of a workbook with such a sheet; None: no job."""
+    names: set[str] = set()
+    with each_file_once(), warnings.catch_warnings(action="ignore"):
+        if file.suffix.lower() == ".toml":
+            problems = Problems()
+            names = {*problems.need(read_toml(file, problems))}
+        elif file.suffix.lower() == ".xlsx":
+            try:
+                with zipfile.ZipFile(io.BytesIO(file_content(file))) as archive:
+                    sheets = _SHEET.findall(archive.read("xl/workbook.xml"))
+            except Exception as error:  # of any kind, where it is damaged
+                raise ValueError(f"{file}: expected an intact Excel workbook") from error
+            names = {name.decode("utf-8", "replace").strip().casefold() for name in sheets}
+        return read_job(file) if names & {"runs", "weights"} else None
 
 
 def table_of(job: Job, path: str = "", machine_type: str = "") -> pd.DataFrame:
     """Rows of one job, of this type unless it says another; UndeterminedError without coefficients."""
     import pandas as pd
 
-    influence, labels, keys = job.influence or estimate_influence(job.trials), job.trials.labels, job.settings
+    with warnings.catch_warnings(action="ignore"):
+        influence = job.influence or estimate_influence(job.trials)
+    labels, keys = job.trials.labels, job.settings
     s, c, p = np.indices(influence.W.shape).reshape(3, -1)
     W, planes = influence.W.ravel(), [influence.planes[k] for k in p]
     variances = np.diagonal(influence.channels(known=True), axis1=-2, axis2=-1)[..., 2:]
     values = (
-        *(
-            path,
-            machine_of(job),
-            keys.machine_type or machine_type,
-            "" if keys.date is None else str(keys.date),
-        ),
+        *(path, machine_of(job), keys.machine_type or machine_type, str(keys.date or "")),
         *(*kind_of(labels), labels.vibration_unit, labels.weight_unit, runs_of(job)),
         *([influence.sensors[k] for k in c], planes, influence.speeds[s]),
         *([job.radii.get(plane, np.nan) for plane in planes], W.real, W.imag),
@@ -169,37 +144,36 @@ def _printable(path: Path) -> Path:
     return Path(os.fsencode(path).decode("utf-8", "replace"))
 
 
-def parquet(table: pd.DataFrame) -> bytes:
-    """A table of jobs as a Parquet file; ValueError without the package for it."""
-    buffer = io.BytesIO()
+def arrow(what: str) -> Any:  # noqa: ANN401 - a module
+    """Pyarrow with `parquet`; ValueError without it: what needs it."""
     try:
-        table.to_parquet(buffer, engine="pyarrow", index=False)
+        import pyarrow.parquet
     except ImportError as error:
-        raise ValueError("the table of a fleet needs pyarrow: pip install pyarrow") from error
+        raise ValueError(f"{what} needs pyarrow: pip install pyarrow") from error
+    return pyarrow
+
+
+def parquet(table: pa.Table) -> bytes:
+    """A table as a Parquet file."""
+    buffer = io.BytesIO()
+    arrow("a Parquet table").parquet.write_table(table, buffer, write_page_checksum=True)
     return buffer.getvalue()
 
 
-def read_fleet(path: Path) -> pd.DataFrame:
-    """The table of jobs that `fleet fit --output` has written.
-
-    Raises
-    ------
-    InputError
-        For a file that is not there, damaged or another table.
-    """
-    import pandas as pd
-
-    lacking = None
+def read_parquet(path: Path, what: str) -> pa.Table:
+    """The table of a Parquet file; InputError, that `what` was expected, where it is not there or damaged."""
+    pa, reason = arrow(what), "it is damaged, or something else"
     try:
-        table = pd.read_parquet(io.BytesIO(file_content(path)), engine="pyarrow")
-        lacking = next((name for name in COLUMNS if name not in table), None)
-        if lacking is None:
-            return table
-        expected = f"the table that rotorid fleet fit TREE --output {path.name} writes, with {lacking}"
-    except ImportError as error:
-        raise ValueError("the table of a fleet needs pyarrow: pip install pyarrow") from error
-    except OSError as error:
-        expected = f"a table of a fleet ({error.strerror or error})"
-    except Exception:  # of any kind, where it is damaged
-        expected = "a whole Parquet table of a fleet"
-    raise InputError([Problem(str(path), None, lacking, None, expected)])
+        return pa.parquet.read_table(io.BytesIO(path.read_bytes()), page_checksum_verification=True)
+    except (OSError, pa.ArrowException) as error:
+        reason = getattr(error, "strerror", "") or reason
+        raise InputError([Problem(str(path), None, None, None, f"{what} ({reason})")]) from error
+
+
+def read_fleet(path: Path) -> pd.DataFrame:
+    """The table of jobs that `fleet fit --output` has written; InputError for what is none."""
+    table: pd.DataFrame = read_parquet(path, "a table of a fleet").to_pandas()
+    if lacking := [name for name in COLUMNS if name not in table]:
+        expected = f"the table that rotorid fleet fit TREE --output {path.name} writes, with {lacking[0]}"
+        raise InputError([Problem(str(path), None, lacking[0], None, expected)])
+    return table

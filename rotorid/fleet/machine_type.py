@@ -14,7 +14,7 @@ the phase of Σ conj(W) μ / |μ|², counts against one:
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
@@ -125,59 +125,60 @@ class MachineType:
 
     def influence(self, labels: Labels, machine: str = "") -> Influence:
         """Coefficients to expect of one of `machines`, whose own jobs count then; else of a further one."""
+        effects, W = self.effects, self.mean
+        covariance = effects.new_group + np.diag(_doubt(effects))
         if machine in self.machines:
-            mean, covariance = self.effects.known(self.machines.index(machine))
-        else:
-            mean, covariance = self.effects.mean, self.effects.new_group + np.diag(self._doubt)
-        covariance = (covariance + self.effects.within) * self.widening
+            mean, covariance = effects.known(self.machines.index(machine))
+            W = self.coefficients(mean)
+        covariance = (covariance + effects.within) * self.widening
         columns = self.coefficients(covariance_root(covariance, np.diag(covariance)).T)
-        W = self.coefficients(mean)
         nothing = np.full(W.shape[:2], np.nan), Gaussian.none(*W.shape)
         expected = Influence(self.speeds, self.sensors, self.planes, W, *nothing, labels)
         return with_parameters(expected, columns, 0.0)
 
-    @property
-    def _doubt(self) -> FloatArray:
-        """By how much more variances between machines may be expected to be, (n,): the rest after errors.
-
-        Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
-        σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
-        """
-        from scipy.special import ndtr
-
-        M, B = len(self.machines), np.diag(self.effects.between)
-        total = M * (np.diag(self.effects.new_group) - B)
-        std = np.sqrt(2 * np.maximum(total**2 - B**2, 0.0) / (M - 1))
-        ratio = np.divide(B, std, out=np.full_like(std, np.inf), where=std > 0)
-        return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
-
     def why_odd(self, record: MachineRecord) -> str:
         """What would make a record fit the type best, in words; "" where nothing tried does."""
-        least, reason = min(self._changes(record))
-        return reason if least <= min(self.limit, self._distance(record.W, record.std)) else ""
-
-    def _changes(self, record: MachineRecord) -> Iterator[tuple[float, str]]:
-        """Squared distance of the coefficients as they would be, and what was changed."""
         W, std, share = record.W, record.std, self.mean / np.abs(self.mean) ** 2
-        turns = np.exp(1j * np.angle(np.sum(W * share, axis=(0, 1))))
-        lag = self._distance(np.conj(W) * turns, std) + _CHOSEN * len(turns)
-        yield lag, "its phases were of the other sense (lag for lead)"
         theta = np.angle(np.sum(np.conj(W) * share))
+        angles = np.angle(np.sum(W * share, axis=(0, 1)))
         degrees = round(np.degrees(theta))
-        words = (
-            f"its phases {'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
-        )
-        yield self._distance(W * np.exp(1j * theta), std) + _CHOSEN, words
+        mark = f"{'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
+        changes = [
+            (f"its phases {mark}", W * np.exp(1j * theta), std, 1),
+            (
+                "its phases were of the other sense (lag for lead)",
+                W.conj() * np.exp(1j * angles),
+                std,
+                len(angles),
+            ),
+        ]
         for names, axis, what in ((self.sensors, 1, "sensors"), (self.planes, 2, "planes")):
             for a, b in combinations(range(len(names)), 2):
                 order = np.arange(len(names))
                 order[[a, b]] = b, a
-                exchanged = self._distance(np.take(W, order, axis), np.take(std, order, axis))
-                yield exchanged, f"its {what} {names[a]} and {names[b]} were exchanged"
+                words = f"its {what} {names[a]} and {names[b]} were exchanged"
+                changes.append((words, W.take(order, axis), std.take(order, axis), 0))
+        least, reason = min((self._distance(*parts) + _CHOSEN * n, words) for words, *parts, n in changes)
+        return reason if least <= min(self.limit, self._distance(W, std)) else ""
 
     def _distance(self, W: ComplexArray, std: FloatArray) -> float:
         """Squared distance of coefficients measured in one job, to be compared with `limit`."""
         return self.effects.distance(*_rows(W, std, self.turn))
+
+
+def _doubt(effects: RandomEffects) -> FloatArray:
+    """By how much more variances between machines may be expected to be, (n,): the rest after errors.
+
+    Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
+    σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
+    """
+    from scipy.special import ndtr
+
+    M, B = len(effects.jobs), np.diag(effects.between)
+    total = M * (np.diag(effects.new_group) - B)
+    std = np.sqrt(2 * np.maximum(total**2 - B**2, 0) / (M - 1))
+    ratio = np.divide(B, std, out=np.full_like(B, np.inf), where=std > 0)
+    return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
 
 
 def _rows(W: ComplexArray, std: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -214,12 +215,10 @@ def fit_type(
             f"{counted(len(machines), 'machine')} with these speeds, sensors and planes: how machines of a "
             f"type differ shows with {LEAST_MACHINES} or more"
         )
-    notes, assumed = list[str](), int((~error[fits].any(axis=(1, 2, 3))).sum())
+    notes, assumed = list[str](), int((error[fits].max(axis=(1, 2, 3)) == 0).sum())
     if assumed:
-        notes.append(
-            f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none, and "
-            "± are too wide rather than too narrow"
-        )
+        none = f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none"
+        notes.append(f"{none}, and ± are too wide rather than too narrow")
     if np.isinf(limit):
         notes.append(f"with {counted(len(machines), 'machine')} nothing tells an odd one from the others")
     return MachineType(
@@ -261,14 +260,13 @@ def type_of_fleet(
         words = f"no job of {name} has coefficients of all these speeds, sensors and planes; there are"
         raise UndeterminedError(f"{words} {', '.join(there)}")
     kind = fit_type(records, grid.speeds, grid.sensors, grid.planes)
-    jobs = cells.drop_duplicates("job").set_index("job")
-    left_out = len(jobs) - len(records)
-    read, mounted = (str(jobs.at[records[0].job, unit]) for unit in ("vibration_unit", "weight_unit"))
-    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
-    notes = kind.notes
+    left_out, notes = cells["job"].nunique() - len(records), kind.notes
     if left_out:
         words = "left out: copies of others, or without all of these coefficients"
         notes = (f"{counted(left_out, 'job')} of {name} {words}", *notes)
+    first = cells[cells["job"] == records[0].job].iloc[0]
+    read, mounted = str(first["vibration_unit"]), str(first["weight_unit"])
+    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
     return replace(kind, name=name, labels=labels, left_out=left_out, notes=notes)
 
 
@@ -276,11 +274,10 @@ def records_at(cells: pd.DataFrame, grid: Grid) -> list[MachineRecord]:
     """Of each job that has all coefficients of a grid."""
     import pandas as pd
 
-    speeds, keys, values = cells["speed_rad_s"].to_numpy(), ["speed", "sensor", "plane"], ["re", "im", "std"]
-    nearest = grid.speeds[np.abs(speeds[:, None] - grid.speeds).argmin(axis=1)]
-    alike = np.abs(speeds - nearest) <= DEFAULT_TOLERANCE / 100 * nearest
-    alike &= (cells["quantity"] == grid.quantity) & (cells["weight_kind"] == grid.weight_kind)
-    cells = cells.assign(speed=nearest)[alike]
+    keys, values = ["speed", "sensor", "plane"], ["re", "im", "std"]
+    off = np.abs(cells["speed_rad_s"].to_numpy()[:, None] / grid.speeds - 1)
+    alike = (cells[["quantity", "weight_kind"]] == [grid.quantity, grid.weight_kind]).all(axis=1)
+    cells = cells.assign(speed=off.argmin(axis=1))[alike & (off.min(axis=1) <= DEFAULT_TOLERANCE / 100)]
     if grid.weight_kind == "mass":  # that at another radius does as much more, or less
         usual = cells.groupby("plane")["radius_m"].transform("median")
         wanted = (
@@ -289,22 +286,15 @@ def records_at(cells: pd.DataFrame, grid: Grid) -> list[MachineRecord]:
         factor = (wanted / cells["radius_m"].fillna(usual)).fillna(1.0)
         cells[values] = cells[values].mul(factor, axis=0)
     wide = cells.drop_duplicates(["job", *keys]).pivot(index=["machine", "job"], columns=keys, values=values)
-    every = pd.MultiIndex.from_product([values, grid.speeds, grid.sensors, grid.planes])
+    every = pd.MultiIndex.from_product([values, range(len(grid.speeds)), grid.sensors, grid.planes])
     wide = wide.reindex(columns=every).dropna()
-    parts = wide.to_numpy().reshape(len(wide), *every.levshape)
-    each = zip(wide.index, parts, strict=True)
+    each = zip(wide.index, wide.to_numpy().reshape(len(wide), *every.levshape), strict=True)
     return [MachineRecord(machine, job, re + 1j * im, std) for (machine, job), (re, im, std) in each]
 
 
 def _usual(cells: pd.DataFrame) -> Grid:
     """The grid of the first job of those with most coefficients."""
     part = cells[cells["job"] == cells["job"].mode().iloc[0]]
-    planes, first = part.drop_duplicates("plane"), part.iloc[0]
-    return Grid(
-        np.unique(part["speed_rad_s"]),
-        tuple(part["sensor"].unique()),
-        tuple(planes["plane"]),
-        tuple(planes["radius_m"]),
-        first["quantity"],
-        first["weight_kind"],
-    )
+    planes, sensors = part.drop_duplicates("plane"), tuple(part["sensor"].unique())
+    places = np.unique(part["speed_rad_s"]), sensors, tuple(planes["plane"]), tuple(planes["radius_m"])
+    return Grid(*places, *part[["quantity", "weight_kind"]].iloc[0])

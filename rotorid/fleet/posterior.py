@@ -54,21 +54,18 @@ _FEW = (
 class TypeKnowledge:
     """What a type says of a machine.
 
-    `influence` has what the job's own runs have added, `file` is the table of the fleet, and so many
-    `earlier` jobs of the machine count. `probability` is that of runs farther from the type, 1 where
-    nothing tells; if it is below `LEVEL`, `reason` would make the machine one of the type ("": not known).
+    `influence` has what the job's own runs have added, `files` are those of the job and the table of the
+    fleet, and so many `earlier` jobs of the machine count. `probability` is that of runs farther from the
+    type, 1 where nothing tells; if it is below `LEVEL`, `reason` would make the machine one of the type ("":
+    not known).
     """
 
     kind: MachineType
     influence: Influence
-    file: Path
+    files: tuple[Path, ...]
     earlier: int
     probability: float
     reason: str
-
-    def files_beside(self, job: Job) -> tuple[Path, ...]:
-        """Those of a job, and the fleet."""
-        return (*job.files, self.file)
 
     def judged(self, result: Correction) -> Correction:
         """A correction that is not to be mounted where the machine is not of its type."""
@@ -106,10 +103,11 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     radii = tuple(job.radii.get(plane, np.nan) for plane in planes)
     grid = Grid(trials.speeds, trials.sensors, planes, radii, *kind_of(trials.labels))
     # the job itself, by its runs, or at the same place as it was before it changed
-    place = "/" + job.files[0].resolve().as_posix()
-    here = np.array([place.endswith(f"/{path}") for path in fleet["job"]], dtype=bool)
-    itself = fleet["job"][(fleet["runs"] == runs_of(job)) | (fleet["machine"] == machine) & here]
+    place = f"/{job.files[0].resolve().as_posix()}"
+    here = fleet["job"].map(lambda path: place.endswith(f"/{path}")) & (fleet["machine"] == machine)
+    itself = fleet["job"][here | (fleet["runs"] == runs_of(job))]
     kind = type_of_fleet(fleet, name, grid, itself.unique())
+    machines = len(kind.machines)
     if not job.planes:  # nothing but a baseline: in the unit of the others' weights
         unit, scale = kind.labels.weight_unit, kind.labels.weight_scale
         trials = replace(trials, labels=replace(trials.labels, weight_unit=unit, weight_scale=scale))
@@ -118,27 +116,24 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
             raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
         trials = with_check_runs(trials, job.check)
     influence, probability = update(kind.influence(trials.labels, machine), trials)
-    warnings = list(influence.remarks.warnings)
-    if any(record.machine == machine for record, _ in kind.odd):
-        warnings.append(f"an earlier job of {machine!r} does not fit the type {name!r}, and does not count")
-    if len(kind.machines) < ENOUGH and not trials.weights.any():
+    warnings, reason, earlier = list(influence.remarks.warnings), "", 0
+    words = f"coefficients of the type {name!r}, {counted(machines, 'machine')}"
+    if machines < ENOUGH and not trials.weights.any():
         warnings.append(_FEW)
-    words = f"coefficients of the type {name!r}, {counted(len(kind.machines), 'machine')}"
-    earlier = int(kind.effects.jobs[kind.machines.index(machine)]) if machine in kind.machines else 0
-    if earlier:
+    if machine in kind.machines:
+        earlier = int(kind.effects.jobs[kind.machines.index(machine)])
         words += f", and of {counted(earlier, 'earlier job')} of {machine!r}"
         if kind.effects.jobs.max() == 1:
             warnings.append(
                 f"no machine of the type was balanced twice: the errors lack how {machine!r} changed"
             )
-    remarks = Remarks(tuple(warnings), (*influence.remarks.notes, words, *kind.notes))
-    reason = ""
     if probability < LEVEL and np.isfinite(kind.limit):
         with suppress(ValueError):  # runs that do not give coefficients tell no reason
             runs = table_of(replace(job, trials=trials, influence=None))
             reason = next(map(kind.why_odd, records_at(runs, grid)), "")
+    remarks = Remarks(tuple(warnings), (words, *kind.notes))
     influence = replace(influence, remarks=remarks)
-    return TypeKnowledge(kind, influence, Path(file), earlier, probability, reason)
+    return TypeKnowledge(kind, influence, (*job.files, Path(file)), earlier, probability, reason)
 
 
 def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
@@ -187,7 +182,6 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     moved = np.concatenate((unstretch(Y), np.tensordot(epsilon[:m].T, change, 1)), axis=-1)
     alone = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
     alone[..., :2, :2] = G @ np.swapaxes(G, -1, -2)
-    warnings = dict.fromkeys((*expected.remarks.warnings, *trials.warnings, *reading.warnings))
     mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
     result = replace(
         expected,
@@ -195,7 +189,7 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
         baseline=moved[0, ..., 0],
         errors=Gaussian(alone, moved[1:], reading, run, mounted),
         labels=trials.labels,
-        remarks=Remarks(tuple(warnings)),
+        remarks=Remarks(tuple(dict.fromkeys((*trials.warnings, *reading.warnings)))),
     )
     spare = 2 * S * C * (R - 1)
     return result, float(chdtrc(spare, np.sum((r - U @ (U.T @ r)) ** 2))) if spare else 1.0

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
@@ -75,11 +77,8 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         For files that cannot be, a result file of another study or of one that is running, a sample that
         fails, and workers that die.
     """
-    try:
-        import pyarrow
-    except ImportError as error:
-        raise ValueError("a study needs pyarrow: pip install pyarrow") from error
     from rotorid.files.disk import sha256
+    from rotorid.fleet.jobs import arrow
     from rotorid.study.samples import draw_all, draw_machine, nominal
     from rotorid.study.study_file import read_study
 
@@ -96,11 +95,9 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
     identity = {"version": made["version"], "seed": seed, "inputs": [*map(sha256, read.files)]}
     columns = {"sample": "int64"} | {f"ratio_{k}": "double" for k in range(read.corrections + 1)}
     columns |= {"runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
-    schema = pyarrow.schema([*columns.items()], {"study": json.dumps(identity)})
+    schema = arrow("a study").schema([*columns.items()], {"study": json.dumps(identity)})
     sample = partial(draw_machine, read, model.W)
-    with ExitStack() as stack:
-        if options.scheduler is not None:
-            executor = stack.enter_context(_cluster(options.scheduler))
+    with _cluster(options.scheduler) if options.scheduler else nullcontext(executor) as executor:
         table = draw_all(sample, seed, samples, schema, results, executor, options.workers)
     keys = {"kind": "balance", "samples": samples, "seed": seed, "warnings": list(model.warnings)}
     return _outcome(table.to_pandas(), len(read.planes), keys, made)
@@ -110,20 +107,19 @@ def _cluster(address: str) -> Any:  # noqa: ANN401 - of Dask
     """The executor of a Dask cluster."""
     try:
         from distributed import Client
+
+        return Client(address, timeout=10).get_executor()  # type: ignore[no-untyped-call]
     except ImportError as error:
         raise ValueError("--scheduler needs Dask: pip install dask[distributed]") from error
-    try:
-        return Client(address, timeout=10).get_executor()  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise ValueError(f"--scheduler {address}: no cluster answers there ({error})") from error
 
 
-def interval(k: int, n: int) -> tuple[float, float]:
+def interval(k: int, n: int) -> list[float]:
     """Of a probability at 95 % where k of n samples are so, exact (Clopper and Pearson)."""
     from scipy.stats import binomtest
 
-    ends = binomtest(k, n).proportion_ci()
-    return float(ends.low), float(ends.high)
+    return [float(end) for end in binomtest(k, n).proportion_ci()]
 
 
 def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Mapping[str, Any]) -> Outcome:
@@ -134,14 +130,14 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
     most = ratios.shape[1] - 1
     runs = [1, *range(planes + 2, planes + 2 + most)]
     met = [int((frame["runs_needed"] <= one).sum()) for one in runs]
-    low, high = zip(*(interval(k, n) for k in met), strict=True)
+    ends = np.array([interval(k, n) for k in met])
     columns = (
         Column("corrections", range(most + 1)),
         Column("runs", runs),
         Column("met", met),
-        Column("probability", [k / n for k in met], shown),
-        Column("low", low, shown),
-        Column("high", high, shown),
+        Column("probability", np.divide(met, n), shown),
+        Column("low", ends[:, 0], shown),
+        Column("high", ends[:, 1], shown),
     )
     table = Table("corrections", columns)
     head = f"The limit is met by {100 * met[0] / n:.4g} % as built"
@@ -150,15 +146,15 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
     reasons = frame["why"].dropna().where(lambda why: why == UNSTABLE, UNDETERMINED).value_counts().to_dict()
     notes = [f"{count} of {n} were not balanced: {why}" for why, count in reasons.items()]
     coverage = {}
-    for name, words, warned in (("silent", "no warning", False), ("warned", "a warning", True)):
-        held = frame["held"][frame["warned"] == warned].astype("boolean")
-        good, count = int(held.sum()), len(held)  # unknown where there is no region
+    for name, warned in (("silent", False), ("warned", True)):
+        held = frame["held"][frame["warned"] == warned]
+        good, count = int((held == 1).sum()), len(held)  # unknown where there is no region
         coverage[name] = {"held": good, "corrections": count}
         if count:
-            ends = " to ".join(f"{100 * end:.1f}" for end in interval(good, count))
+            low, high = (f"{100 * end:.1f}" for end in interval(good, count))
             notes.append(
-                f"first corrections with {words}: {good} of {count} of the 95 % regions hold the true one "
-                f"({ends} %)"
+                f"first corrections with {'a' if warned else 'no'} warning: {good} of {count} of the 95 % "
+                f"regions hold the true one ({low} to {high} %)"
             )
     return Outcome(
         result=frame,
@@ -168,8 +164,8 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
         keys={
             **keys,
             "probability": met[-1] / n,
-            "interval": [low[-1], high[-1]],
-            "rows": [dict(zip(table.headings, row, strict=True)) for row in table.rows],
+            "interval": ends[-1].tolist(),
+            "rows": table.records,
             "coverage": coverage,
             "not_balanced": reasons,
         },

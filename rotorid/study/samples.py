@@ -10,7 +10,6 @@ rotor and a trial in each plane; each check run joins them in the next fit, as i
 
 from __future__ import annotations
 
-import io
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
@@ -30,6 +29,7 @@ from rotorid.base.arrays import ComplexArray
 from rotorid.base.logs import progress
 from rotorid.base.worker_processes import single_threads, worker_pool
 from rotorid.files.disk import write_files
+from rotorid.fleet.jobs import arrow, parquet, read_parquet
 from rotorid.study.study_file import Study
 
 if TYPE_CHECKING:
@@ -90,21 +90,18 @@ def draw_all(
     ValueError
         For a file of another study or of one that is running, a sample that fails, and workers that die.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    rows: dict[int, Row] = {}
+
+    def table() -> pa.Table:
+        """The rows so far, which the file has then."""
+        whole = arrow("a study").Table.from_pylist([rows[k] for k in sorted(rows)], schema)
+        if file is not None:
+            write_files({file: parquet(whole)})
+        return whole
 
     with nullcontext() if file is None else _alone(file):
-        rows = {} if file is None else {row["sample"]: row for row in _read(file, schema)}
-
-        def table() -> pa.Table:
-            """The rows so far, which the file has then."""
-            whole = pa.Table.from_pylist([rows[k] for k in sorted(rows)], schema)
-            if file is not None:
-                buffer = io.BytesIO()
-                pq.write_table(whole, buffer, write_page_checksum=True)
-                write_files({file: buffer.getvalue()})
-            return whole
-
+        if file is not None and file.exists():
+            rows |= {row["sample"]: row for row in _read(file, schema)}
         missing, due = [k for k in range(samples) if k not in rows], time.monotonic() + KEPT
         chunks = [missing[k : k + CHUNK] for k in range(0, len(missing), CHUNK)]
         try:
@@ -145,16 +142,8 @@ def _alone(file: Path) -> Iterator[None]:
 
 
 def _read(file: Path, schema: pa.Schema) -> list[Row]:
-    """The samples of a file; none where there is no such file."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    if not file.exists():
-        return []
-    try:
-        table = pq.read_table(io.BytesIO(file.read_bytes()), page_checksum_verification=True)
-    except (OSError, pa.ArrowException) as error:
-        raise ValueError(f"{file}: no study is kept here, but something else: name another file") from error
+    """The samples of a file."""
+    table = read_parquet(file, "the samples of a study: name another file")
     if not table.schema.equals(schema, check_metadata=True):
         raise ValueError(
             f"{file}: another study is kept here (its file, its rotor, the seed or the version of rotorid "

@@ -22,7 +22,6 @@ from balancing.plots import (
     trial_figure,
 )
 from balancing.plots.correction import weights
-from rotorid.fleet.fit import type_figure
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 AGAINST = replace(GRAMS, angles="against rotation")
@@ -168,24 +167,3 @@ def test_readings_of_the_runs_and_trial_weights():
     tips = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
     assert [line.get_xdata()[-1] for line in tips] == pytest.approx([0.3, 2.0])
     assert figure.axes[0].get_rmax() >= weight.amount * 1e3
-
-
-def test_a_type_of_machines_shows_four_sensors_and_planes():
-    rng = np.random.default_rng(1)
-    mean = rng.normal(size=(1, 5, 2)) + 2j
-    effects = SimpleNamespace(groups=np.zeros(3), new_group=0.01 * np.eye(20), within=0.01 * np.eye(20))
-    kind = SimpleNamespace(
-        mean=mean,
-        effects=effects,
-        coefficients=lambda groups: np.stack([mean * f for f in (0.9, 1.0, 1.1)]),
-        widening=1.0,
-        sensors=tuple("abcde"),
-        planes=("P", "Q"),
-        speeds=np.array([100.0]),
-        odd=[(SimpleNamespace(machine="M7", W=1.5 * mean), None)],
-    )
-    figure = type_figure(kind)
-    assert [ax.get_title() for ax in figure.axes[:5:4]] == ["P on a", "Q on a"]
-    dots = next(line for line in figure.axes[0].lines if line.get_marker() == ".")
-    assert dots.get_xdata() == pytest.approx([-10, 0, 10])
-    assert "odd: M7" in [line.get_label() for line in figure.axes[0].lines]

@@ -138,7 +138,7 @@ def test_a_file_of_another_study_is_refused_as_it_is(tmp_path, threads):
     refused("another study is kept here")
     assert kept.read_bytes() == before
     kept.write_bytes(before[:-100])
-    refused("no study is kept here, but something else")
+    refused("expected the samples of a study: name another file")
     assert kept.read_bytes() == before[:-100]
     refused(r"must end in \.parquet", tmp_path)
     refused("cannot be written", tmp_path / "none" / "a.parquet")
