@@ -14,7 +14,7 @@ from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
-from rotorid.files.layout import read_runs_grid
+from rotorid.files.layout import joined, read_runs_grids
 from rotorid.files.problems import Problems
 from rotorid.files.units import one_of
 from rotorid.identify.modes_result import Readings
@@ -43,7 +43,7 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     problems = Problems()
     files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
     conventions = Conventions(Labels(phase=phase))
-    grid = problems.need(read_runs_grid(files, conventions, problems, first=True))
+    grid = problems.need(joined(read_runs_grids(files, conventions, problems, first=True), problems))
     table = problems.need(runs_table.readings_table(grid, problems, COLUMNS))
     _complain_about_twins(table)
     problems.stop()

@@ -20,9 +20,9 @@ from rotorid.files import units
 from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
-from rotorid.files.problems import Problems
+from rotorid.files.headings import WEIGHT, find_header, read_headings
+from rotorid.files.layout import NUMBER, long_rows
+from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
@@ -70,8 +70,10 @@ def read_weights(
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     if grid is None:
         return None
-    with explained(grid, problems):
+    try:
         grid = _one_weight_a_row(grid, conventions)
+    except InputError as error:
+        problems.extend(error.problems)
     if len(problems) > before:
         return None
     there = {name.partition("_")[0] for name in grid.header}
