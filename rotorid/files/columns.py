@@ -14,29 +14,27 @@ from typing import SupportsIndex
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.base.text import listing
 from rotorid.files.cells import (
     BadCell,
     Cell,
     Finder,
     Grid,
+    NotANumber,
     Shown,
     below_title,
+    check_size,
+    decimal_comma,
     decode,
     is_spreadsheet_error,
     make_grid,
-    parse_text,
-    read_bytes,
-    show,
-)
-from rotorid.files.decimal_numbers import (
-    NotANumber,
-    check_size,
-    decimal_comma,
     parse_number,
+    parse_text,
+    show,
     thousands_or_decimals,
 )
+from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader

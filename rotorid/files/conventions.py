@@ -9,12 +9,12 @@ from typing import cast, get_args
 import numpy as np
 
 from balancing import Labels
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Angles as Angles
+from rotorid.base.text import Phase as Phase
+from rotorid.base.text import Rotation as Rotation
+from rotorid.base.text import View as View
 from rotorid.base.text import listing
-from rotorid.base.words import Angles as Angles
-from rotorid.base.words import Phase as Phase
-from rotorid.base.words import Rotation as Rotation
-from rotorid.base.words import View as View
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 ANGLES: tuple[Angles, ...] = get_args(Angles)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.files import units
 from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import radians
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from balancing import Placement, ReadingErrors, RunScatter, Trials
-from rotorid.base.text import listing
-from rotorid.base.words import Angles, Phase, Rotation, View
+from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
+from rotorid.files.columns import Source
 from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
+from rotorid.files.problems import Problems
 from rotorid.files.settings import (
     Date,
     Label,
     NotNegative,
     Number,
+    Place,
     Positive,
     Settings,
     Text,
@@ -30,6 +33,7 @@ from rotorid.files.settings import (
     listed,
     of,
     optional,
+    read_settings,
 )
 from rotorid.files.units import Quantity
 
@@ -235,8 +239,8 @@ class Sensor(_Placed):
     limit: Annotated[Quantity, of(Limits)] | None = optional(
         "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
         "table by speed",
-        "limit",
-        units=units.vibration,
+        "limit limit_um limit_mm_s limit_m_s2",
+        units=units.VIBRATION,
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
@@ -304,8 +308,8 @@ class Vector(Settings):
 
     amplitude: Annotated[Quantity, of(NotNegative)] = key(
         "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
-        "amplitude",
-        units=units.vibration,
+        "amplitude amplitude_um amplitude_mm_s amplitude_m_s2",
+        units=units.VIBRATION,
     )
     phase: Turn = key(
         "the phase at slow speed, counted as the readings count it",
@@ -395,3 +399,41 @@ class JobSettings(Settings):
         """A direction without the rotation that is seen against it."""
         if self.rotation is None and (self.view or self.angles in ROTATIONS):
             yield "rotation", f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end"
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenJob:
+    """A job as it is written: settings nested as in a job file, and the tables of a workbook.
+
+    Attributes
+    ----------
+    path
+        The job file or workbook, None without one.
+    settings
+        As a job file holds them.
+    tables
+        Tables that are there already, by `TABLES`: cells of sheets, or files.
+    where
+        Sheet, row and column of each setting, by its dotted key.
+    """
+
+    path: Path | None
+    settings: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, Source] = field(default_factory=dict)
+    where: dict[str, Place] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """From which files are named."""
+        return (self.path or Path()).parent
+
+    def read(self, problems: Problems) -> JobSettings:
+        """All settings; a file that is named in place of a sheet is a problem."""
+        source = "" if self.path is None else str(self.path)
+        if not self.tables and "runs" not in self.settings:
+            problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
+            problems.stop()
+        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
+        for name in filter(settings.has, self.tables):
+            settings.complain(problems, name, f"the table in the sheet {name!r} of this workbook, not a file")
+        return settings

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.base.arrays import ComplexArray, FloatArray, off_axis, turned
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid

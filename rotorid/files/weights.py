@@ -14,13 +14,12 @@ from functools import partial
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.cells import Grid, show
+from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.layout import NUMBER, long_rows
 from rotorid.files.problems import InputError, Problems

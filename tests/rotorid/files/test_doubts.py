@@ -9,21 +9,13 @@ from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only,
 from balancing import correct, estimate_influence
 from rotorid.files import (
     InputError,
-    TableWarning,
     influence_frame,
     job_from_files,
     read_job,
     read_rotor,
     read_trials,
     write_influence,
-    write_table,
 )
-
-SHAFT = [
-    ["length_m", "diameter_m", "support_stiffness_N_per_m", "youngs_modulus_Pa", "density_kg_per_m3"],
-    [1.0, 0.1, 1e8, 2.1e11, 7800],
-    [1.0, 0.1, 1e8, 2.1e11, 7800],
-]
 
 
 @pytest.fixture
@@ -54,22 +46,6 @@ def test_different_values_and_scattered_rows():
     )
     many = [Problem("f.csv", row, f"c{row}", None, "x") for row in range(100)]
     assert str(InputError(many)).splitlines()[20:] == ["and 80 more problems"]
-
-
-@pytest.mark.parametrize(
-    ("column", "value", "words"),
-    [
-        ("length_m", 1000, "element 1: length 1000 m; is this in mm?"),
-        ("diameter_m", 110, "element 1: outer_diameter 110 m; is this in mm?"),
-        ("youngs_modulus_Pa", 210, "element 1: youngs_modulus 210 Pa; is this in GPa?"),
-        ("density_kg_per_m3", 7.8, "element 1: density 7.8 kg/m³; is this in g/cm³?"),
-    ],
-)
-def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):
-    path = write_csv(tmp_path / "rotor.csv", replaced(SHAFT, 2, column, value))
-    with pytest.warns(TableWarning) as caught:
-        read_rotor(path)
-    assert [words in str(w.message) for w in caught] == [True]
 
 
 def test_control_characters_in_the_name_of_a_file(tmp_path, files):
@@ -132,7 +108,7 @@ def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
     influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
     frame = influence_frame(influence)
     frame = frame.rename(columns=lambda name: name.replace("per_g", "per_kg_m"))
-    write_table(tmp_path / "si.csv", frame)
+    frame.to_csv(tmp_path / "si.csv", index=False)
     read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
     assert (read.trials.labels.weight_unit, read.trials.labels.weight_scale) == ("g_mm", 1e6)
     c = correct(read.influence, read.trials).to_dict()["corrections"][0]
