@@ -68,7 +68,9 @@ def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.ndim != 1 or not array.size or not (np.isfinite(array) & (array >= 0)).all():
-        raise ValueError("speeds must be numbers in rad/s, at least one, finite and not negative, in one list")
+        raise ValueError(
+            "speeds must be numbers in rad/s, at least one, in one list, finite and not negative"
+        )
     if ascending and (falls := np.diff(array) <= 0).any():
         before, after = array[(k := int(np.argmax(falls))) : k + 2]
         raise ValueError(f"speeds must ascend, but {after:.6g} rad/s follows {before:.6g} rad/s; sort them")
@@ -102,10 +104,7 @@ def off_axis(weights: ArrayLike) -> bool:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    size = np.abs(z)
-    unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
-    along, across = np.array([unit.real, unit.imag]), np.array([-unit.imag, unit.real])
-    return np.asarray(
-        np.einsum("...,i...,j...->...ij", radial, along, along)
-        + np.einsum("...,i...,j...->...ij", tangential, across, across)
-    )
+    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
+    parts = ((radial, along), (tangential, across))
+    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
