@@ -15,7 +15,7 @@ from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings, run_errors
-from rotorid.files.input_file import sha256
+from rotorid.files.disk import sha256
 
 if TYPE_CHECKING:
     from balancing import Influence

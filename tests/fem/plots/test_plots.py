@@ -12,7 +12,7 @@ import fem
 from fem import Peak, Peaks, Window, draw_rotor
 from fem.plots.campbell import campbell_figure, draw_speed_map
 from fem.plots.response import bode_figure, draw_orbits, draw_polar, influence_figure
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 from rotorid.plots import plot
 
 mpl.use("Agg")
