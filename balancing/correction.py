@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ from balancing.tables import (
 from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.text import capital, cut, figures, listing, wrap
+from rotorid.base.text import WIDTH, capital, cut, figures, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -361,7 +362,7 @@ class Correction(Prediction, Answered):
         lines = [self.method_in_words, self.conditioning.sentence()]
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
-        return "\n".join(wrap(line, "") for line in lines)
+        return "\n".join(fill(line, WIDTH) for line in lines)
 
 
 def _angle_width(half: float) -> str:

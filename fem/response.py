@@ -57,7 +57,7 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, phase_deg, range_text, rpm_text
 
-Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
+UnbalanceLike = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
 """`{node or station: m r e^{iφ}}`, kg·m."""
 NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
@@ -367,7 +367,7 @@ def speed_range(speeds: FloatArray) -> str:
 
 def unbalance_response(
     rotor: Rotor,
-    unbalance: Unbalance,
+    unbalance: UnbalanceLike,
     speeds: ArrayLike,
     *,
     nodes: Sequence[int] | None = None,

@@ -94,10 +94,10 @@ class Whirl:
 
     def at(self, *speeds: ArrayLike) -> Whirl:
         """Whirl at other speeds, rad/s, in this basis."""
-        return solve(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
+        return solve_modes(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
 
 
-def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
+def solve_modes(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`.
 
     Parameters
@@ -280,7 +280,7 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
-        whirl = solve(Q, some, m, scale)
+        whirl = solve_modes(Q, some, m, scale)
         x, r = _vectors_and_loads(whirl, spectrum.shift)
         missing = -r @ triangle.T
         error = float((np.abs(missing) ** 2).sum(axis=(2, 3)).max())
