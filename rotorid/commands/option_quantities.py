@@ -15,7 +15,7 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.text import Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
-from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
+from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:

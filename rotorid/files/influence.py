@@ -16,18 +16,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
+from rotorid.base import tables
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes
+from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.disk import read_bytes, write_files
 from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
-from rotorid.files.problems import MOST_LINES, Problems
+from rotorid.files.problems import MOST_LINES, Problems, refusal
 from rotorid.files.runs import SPEED, nearest_speed, show_speed
-from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
@@ -338,14 +339,20 @@ def write_influence(path: str | Path, influence: Influence) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_files({Path(path): influence_bytes(path, influence)})
 
 
 def influence_bytes(path: str | Path, influence: Influence) -> bytes:
     """What `write_influence` writes."""
-    if Path(path).suffix.lower() == ".json":
+    kind = Path(path).suffix.lower()
+    if kind == ".json":
         return json.dumps(_document(influence), ensure_ascii=False).encode()
-    return table_bytes(path, influence_frame(influence), sheet="influence")
+    if kind not in (".csv", ".xlsx"):
+        raise refusal(path, "a name that ends in .csv, .xlsx or .json")
+    frame = influence_frame(influence)
+    columns = (tables.Column(str(name), values.tolist()) for name, values in frame.items())
+    table = tables.Table("influence", tuple(columns))
+    return tables.csv(table) if kind == ".csv" else tables.excel(table)
 
 
 def fit_to_readings(

@@ -36,7 +36,7 @@ from pydantic_core import CoreSchema, ErrorDetails
 from rotorid.base.choices import did_you_mean
 from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
-from rotorid.files.decimal_numbers import LARGEST, NotANumber, decimal_comma, parse_number
+from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.problems import Problem, Problems
 from rotorid.files.units import Quantity, Unit
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.base.json import SCHEMA_VERSION
-from rotorid.files.cells import read_bytes
+from rotorid.files.disk import read_bytes
 from rotorid.files.problems import Problems
 
 MOST_BYTES = 2_000_000

@@ -10,7 +10,6 @@ import pytest
 from tables_data import complaints, the_only
 
 from rotorid.files import write_table
-from rotorid.files.table_writing import write_bytes
 
 
 def test_nothing_that_a_spreadsheet_would_run(tmp_path):
