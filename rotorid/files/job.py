@@ -30,7 +30,7 @@ from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_o
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
-from rotorid.files.toml_file import read_toml
+from rotorid.files.settings import read_toml
 
 if TYPE_CHECKING:
     from balancing import Mounted
