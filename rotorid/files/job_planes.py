@@ -68,9 +68,9 @@ def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Pl
     if rotor is None:
         part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
     elif station is not None and station not in rotor.stations:
-        known = listing(map(repr, rotor.stations), "and") or "none"
+        stations = listing(map(repr, rotor.stations), "and") or "none"
         hint = did_you_mean(station, rotor.stations)
-        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
+        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {stations}")
     elif (node := node or rotor.stations[str(station)]) > rotor.n_nodes:
         part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
     return part.model_copy(update={"node": node})
@@ -96,10 +96,10 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    for kind, known in (("planes", [*planes]), ("sensors", trials.sensors)):
-        for name, part in getattr(settings, kind).items() if known else ():
-            if name not in known:
-                expected = f"one of the job's {kind}, {listing(known, 'and')}{did_you_mean(name, known)}"
+    for kind, names in (("planes", [*planes]), ("sensors", trials.sensors)):
+        for name, part in getattr(settings, kind).items() if names else ():
+            if name not in names:
+                expected = f"one of the job's {kind}, {listing(names, 'and')}{did_you_mean(name, names)}"
                 if kind == "planes":
                     expected += f"; there is no trial weight in plane {name!r}: is its row missing?"
                 problems.append(replace(part.problem("", expected), value=name))
@@ -179,8 +179,8 @@ def _at_speeds(
             speed = unit.to_si(parse_number(word, comma="," in word))
             k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
         if k is None or k in near:
-            known = show_speeds(trials.speeds, unit)
-            expected = f"speeds of the runs table, each once, not {word}: there are {known}"
+            there = show_speeds(trials.speeds, unit)
+            expected = f"speeds of the runs table, each once, not {word}: there are {there}"
             part.complain(problems, field, expected)
         near[k] = numbers[word]
     return np.array([near.get(k, numbers.get("", default)) for k in range(len(trials.speeds))])

@@ -280,14 +280,14 @@ class Settings(BaseModel):
         ctx, kind, value = error.get("ctx", {}), error["type"], error["input"]
         if isinstance(ctx.get("error"), _Wrong):
             return list(ctx["error"].args)
-        known, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
-        words, key = known.get(usual, Key()).expected, table.keys.get(usual)
+        keys, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
+        words, key = keys.get(usual, Key()).expected, table.keys.get(usual)
         if key is None:
             return [table.problem(usual, words)]
         inside = table.data[key] if isinstance(table.data[key], dict) else {}
         key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
-            names = [name for each in known.values() for name in each.names]
+            names = [name for each in keys.values() for name in each.names]
             near = did_you_mean(usual, names)
             words = f"a known key{near}; known are {listing(names, 'and') or 'none yet'}"
             if not (table.name or near or len(table.keys) > 1):
