@@ -86,10 +86,10 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     free = np.full(len(table), not model.has_constant_terms)
     for name in {*model.inputs} & rows.signals.keys():
         free &= rows.signals[name] == 0
-    lost = next((f", or columns {_forms(name)}" for name in model.inputs if name not in rows.signals), "")
+    excited = f"0, or an amplitude of {listing(model.inputs)} that excites this row: {_FREE}"
     for name in measured:
-        expected = f"0{lost}: nothing excites this row, and {_FREE}"
-        table.complain_where(free & (np.abs(rows.signals[name].imag) > 0), _stems(table, name)[-1], expected)
+        unlike = free & (np.abs(rows.signals[name].imag) > 0)
+        table.complain_where(unlike, _stems(table, name)[-1], excited)
     problems.stop()
     if lacking := {*model.outputs} - {*measured} - unmeasured:
         message = f"{table.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"

@@ -121,13 +121,12 @@ class DiscKeys(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Neither of both, or some of both."""
-        sizes = self.model_fields_set & {"width", "outer_diameter", "inner_diameter", "density"}
+        both = {"width", "outer_diameter"}
+        sizes = self.model_fields_set & {*both, "inner_diameter", "density"}
         if bool(sizes) == self.has("mass"):
             yield "mass", "either the mass of the disc or its geometry: width_m, outer_diameter_m"
-        elif sizes and (self.polar_inertia or self.diametral_inertia):
-            yield "polar_inertia", "nothing beside the geometry, which gives it"
-        elif sizes and not {"width", "outer_diameter"} <= sizes:
-            yield "width", "the disc's width and outer diameter"
+        elif sizes and (self.has("polar_inertia") or self.has("diametral_inertia") or not both <= sizes):
+            yield "width", "the disc's width and outer diameter, and no moments of inertia beside them"
 
     def made(self, node: int, density: float) -> Disc:
         """The disc at a node, of the material's density."""

@@ -154,7 +154,9 @@ def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
     write_rotor(whole, rotor)
     model = small_model(rotor, (4, 8), (30.0, 20.0))
     small.write_bytes(small_model_files(small, model)[small])
-    table = write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]])
+    table = write_csv(
+        tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]]
+    )
     how = (
         "--unbalance",
         table,

@@ -260,9 +260,9 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
         (
             "mass_kg = 4",
             "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
-            "disc[1].polar_inertia_kg_m2",
+            "disc[1].width_m",
             "1",
-            "beside the geom",
+            "no moments of inertia beside",
         ),
         (
             "mass_kg = 4",
