@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from fem import GRAVITY, Motion, NodeForce, Support
+from fem import GRAVITY, Motion
 from rotorid.base.complex_numbers import polar
 from rotorid.files import units
 from rotorid.files.attached import (
@@ -132,22 +132,20 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     def vector(item: UnbalanceKeys) -> tuple[int, complex]:
         return at(item), complex(polar(item.size, item.angle))
 
-    attached = read_attached(file, at, path.parent, problems)
+    parts: dict[str, Any] = read_attached(file, at, path.parent, problems)
     unbalance = each(problems, file.unbalance, "unbalance", vector)
     bow = each(problems, file.bow, "bow", vector)
     if len(dict(bow)) < len(bow):
         file.complain(problems, "bow", "each node once")
     problems.stop()
-    parts: dict[str, Any] = {name: getattr(file, name) for name in ARRAYS}
+    parts |= {name: getattr(file, name) for name in ARRAYS}
     parts["weight"] = file.weight or GRAVITY * np.array(file.masses)
-    parts["supports"] = [one for one in attached if isinstance(one, Support)]
-    parts["forces"] = [one for one in attached if isinstance(one, NodeForce)]
     parts["unbalance"] = dict.fromkeys(dict(unbalance), 0j)
     for node, value in unbalance:
         parts["unbalance"][node] += value
     model = whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow)))
     held = float(model.stiffness.sum())
-    if abs(held) > _HELD * np.abs(model.stiffness).max() and attached:
+    if abs(held) > _HELD * np.abs(model.stiffness).max() and (model.supports or model.forces):
         words = (
             f"the shaft alone, with all digits: it resists a shift with {held:.4g} N/m, and what holds it "
             "stands in tables such as [[bearing]]"

@@ -182,7 +182,7 @@ def test_missing_column_and_no_element(table):
 @each_of(
     "column, value, words",
     [
-        ("length_m", 110, "row 3, column length_m: found '110', expected 5e-05 to 50 m; is this"),
+        ("length_m", 110, "row 3, column length_m: found '110', expected 5e-05 to 50 m; is this in mm"),
         ("diameter_m", 110, "row 3, column diameter_m: found '110', expected 0.0005 to 10 m"),
         (
             "youngs_modulus_Pa",
@@ -255,8 +255,6 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
         ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
         ("mass_kg = 4", "mass_kg = 3\nwidth_m = 1", "disc[1].mass_kg", "3", "or its geometry"),
         ("mass_kg = 4", "width_m = 1", "disc[1].width_m", "1", "the disc's width and outer diameter"),
-        ("mass_kg = 4", "mass_kg = 4\nmass_lb = 4", "disc[1].mass_lb", "4", "one key"),
-        ("mass_kg = 4", "mass_kg = 4\nmas = 1", "disc[1].mas", "1", "did you mean 'mass_kg'?"),
         (
             "mass_kg = 4",
             "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
@@ -274,14 +272,12 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
         ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
         ("node = 4", "node = 5", "bearing[1].node", "5", "a node from 1 to 4 or a station"),
         ("node = 4", "node = 0", "bearing[1].node", "0", "a node: its number from 1"),
-        ("node = 4", "node = 1.5", "bearing[1].node", "1.5", "a node: its number from 1"),
         ("node = 4", "", "bearing[1].node", None, "a node: its number from 1"),
         ("damping_N_s_per_m = 300", "damping = 3", "bearing[1].damping", "3", "'damping_N_s_per_m'?"),
         ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
         ('name = "thrust"', "", "station[1].name", None, "a name for the node"),
         ('name = "thrust"', 'name = "12"', "station[1].name", "12", "a name, not a number"),
         ('name = "thrust"', 'name = "a:b"', "station[1].name", "a:b", "without ':' and ','"),
-        ('name = "thrust"', 'name = "a, b"', "station[1].name", "a, b", "without ':' and ','"),
         (
             "node = 1\n",
             'node = 1\n[[station]]\nname = "thrust"\nnode = 2',
@@ -472,29 +468,6 @@ def test_every_kind_of_force_in_field_units(file):
 def test_bad_forces(file, kind, lines, key, words):
     [problem] = complaints(file, at_node_2(kind, *lines))
     assert (problem.column, words in problem.expected) == (f"{kind}[1].{key}", True)
-
-
-@each_of(
-    "command",
-    [
-        "critical rotor.toml",
-        "campbell rotor.toml --speeds 1000:9000:1000rpm --output o.csv",
-        "influence rotor.toml --planes 2 --sensors 3 --speeds 1000,2000rpm",
-        "balance job.toml",
-    ],
-)
-def test_linear_commands_refuse_and_say_what_helps(file, command, monkeypatch, cli):
-    file(at_node_2("journal_bearing", *BEARING))
-    header = ["run", "speed_rpm", "sensor", "amplitude_um", "phase_deg"]
-    write_csv(file.folder / "runs.csv", [header, ["a", 1000, "s", 10, 20]])
-    job = 'runs = "runs.csv"\nrotor = "rotor.toml"\nphase = "lead"\n'
-    (file.folder / "job.toml").write_text(job + "[planes.p]\nnode = 2\n[sensors.s]\nnode = 3\n")
-    before = sorted(file.folder.iterdir())
-    monkeypatch.chdir(file.folder)
-    ended = cli(*command.split())
-    assert (ended.code, ended.out) == (2, "")
-    assert "the journal bearing at node 2 is not linear" in ended.err
-    assert sorted(file.folder.iterdir()) == before
 
 
 # --- writing
