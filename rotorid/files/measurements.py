@@ -254,8 +254,8 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
         second = np.where(half, 0.0, table.numbers(other))
         wrong = np.where(blank, ~half, half & ~(is_polar & (first == 0)))
         table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
-        turn = np.abs(second) <= FULL_TURN
-        table.must_be(other, turn | ~np.array(is_polar), "a phase from -360 to 360 degrees")
+        largest = FULL_TURN if is_polar else np.inf
+        table.must_be(other, np.abs(second) <= largest, "a phase from -360 to 360 degrees")
     if blank.all():
         table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
     if not is_polar:

@@ -233,9 +233,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """
 
     def read(file: ModelFile) -> HarmonicFile:
-        equations, inputs, unseen = file.equations, file.inputs, list[str]()
-        if file.M:
-            equations, inputs, unseen = _of_amplitudes(file)
+        equations, inputs = _of_amplitudes(file) if file.M else (file.equations, file.inputs)
         if not equations:
             raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
         model = harmonic_model(
@@ -254,7 +252,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         if given := file.errors:
             phase = math.radians(given.phase_deg)
             errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
-        unmeasured = tuple({*unseen} & {*model.outputs})
+        unmeasured = tuple({*model.outputs} - {*file.outputs} if file.outputs else ())
         return HarmonicFile(model, file.bounds, start | file.start, errors, unmeasured, file.prior)
 
     return whole(_read(Path(path)), "model of amplitudes", read)
@@ -337,8 +335,8 @@ def _read(path: Path) -> ModelFile:
     return problems.need(read_settings(ModelFile, data, str(path), problems))
 
 
-def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
-    """Matrices as equations of amplitudes, what excites, and displacements that outputs do not show."""
+def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str]]:
+    """Matrices as equations of amplitudes, and what excites."""
     y, inputs, force = file.names, file.inputs or [], file.force
     if not inputs and not force:
         inputs = [f"{FORCE}{x}" for x in y]
@@ -364,6 +362,5 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )
-    unseen = [x for x in y if x not in put] if file.outputs else []
     put |= {f"v_{x}": f"(p*{put.get(x, x)})" for x in y}
-    return [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in equations], inputs, unseen
+    return [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in equations], inputs

@@ -119,7 +119,7 @@ def test_peaks_are_those_of_the_model(cli, tmp_path):
         (
             PLAIN[1:],
             "[material]\nyoungs_modulus_Pa=210\n",
-            "expected 1e+09 to 1e+12 Pa; is this in GPa?",
+            "key material.youngs_modulus_Pa: found '210', expected 1e+09",
         ),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=7.8\n", "is this in g_per_cm3?"),
         ([[250000, 40]] * 2, "[[bearing]]\nnode=1\nstiffness_N_per_m=1\n", "is this in um?"),
