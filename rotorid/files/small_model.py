@@ -156,13 +156,11 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
 
 def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Motion:
     """At a speed, rad/s; of one plane where nothing couples both and they are not asked for."""
-    motion = model.motion(speed)
-    y = np.array(["y" in name for name in motion.coordinates])
-    across = np.ix_(~y, y)
-    plane = "both" if both_planes or motion.C[across].any() or motion.K[across].any() else "x"
-    with suppress(ValueError):  # damped supports stay, as states of first order
-        return model.motion(speed, plane, condensed=True)
-    return model.motion(speed, plane)
+    for plane in ("x", "both")[both_planes:]:
+        for condensed in (True, False):  # damped supports stay, as states of first order
+            with suppress(ValueError):
+                return model.motion(speed, plane, condensed=condensed)
+    return model.motion(speed)
 
 
 def equations_of(
@@ -204,6 +202,7 @@ def equations_of(
     names, damping = names[on].tolist(), C.astype(float).astype(object)
     for i in [names.index(name) for name in dampers]:
         damping[i, i] = f"{damping[i, i]!r} + d_{names[i]}" if damping[i, i] else f"d_{names[i]}"
+    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
     data: dict[str, Any] = {
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],
@@ -213,9 +212,8 @@ def equations_of(
         "K": K.tolist(),
         "force": {name.removeprefix(FORCE): name for name in inputs},
         "outputs": {name: name for name in outputs or ()},
-        "bounds": {f"d_{name}": [0.0, math.inf] for name in dampers},
+        "bounds": {name: [0.0, math.inf] for name in estimate},
     }
-    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
     return {name: part for name, part in data.items() if part} | {"estimate": estimate}
 
 
