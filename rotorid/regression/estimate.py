@@ -112,15 +112,11 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
     for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, numbers)), strict=True):
         digits = value_digits(value, std)
         cells = [f"{value:.{digits}g}", error_figures(std), percent(std / abs(value)) if value else ""]
-        cells += [*(f"{end:.{digits}g}" for end in ends), "" if np.isnan(value) else why.get(name, "")]
-        lines.append([name, *("" if text in ("nan", "unknown") else text for text in cells)])
+        cells += [f"{end:.{digits}g}" for end in ends]
+        reason = why.get(name, "not determined" if np.isnan(value) else "")
+        lines.append([name, *("" if cell in ("nan", "unknown") else cell for cell in cells), reason])
     filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    shown = table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS).splitlines()
-    blank = np.flatnonzero(np.isnan(numbers.values)).tolist()
-    wide = max((len(names[k]) for k in blank), default=0)
-    for k in blank:  # the words stand beside the name, where a number would begin
-        shown[k + 1] = f"  {names[k]:<{wide}}  {why.get(names[k], 'not determined')}"
-    return "\n".join(shown)
+    return table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS)
 
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
@@ -150,7 +146,7 @@ class Estimate(Answered, Uncertain):
         Y − K θ, shape (m,).
     dof
         Degrees of freedom, m − rank (rows of zero weight not counted).
-    rank, condition_number, singular_values
+    rank, condition_number
         Of the row-weighted, column-scaled matrix.
     errors_stated
         Whether the covariance comes from errors that the user stated (normal intervals) and not from the
@@ -175,7 +171,6 @@ class Estimate(Answered, Uncertain):
     dof: int
     rank: int
     condition_number: float
-    singular_values: FloatArray
     errors_stated: bool
     chi_square: float | None
     row_space: FloatArray
@@ -241,8 +236,7 @@ class Estimate(Answered, Uncertain):
         if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > chance:
             return ""
         ratio = float(np.sqrt(self.chi_square / self.dof))
-        more = f"{ratio:.2g} times as large as" if ratio >= 2 else f"{100 * (ratio - 1):.2g} % larger than"
-        return f"residuals are {more} the stated errors explain"
+        return f"residuals are {ratio:.3g} times as large as the stated errors explain"
 
     @property
     def answer(self) -> Answer:
@@ -299,9 +293,9 @@ def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Seque
     seen = [name for name in parameters if name not in lost]
     seen += [w for w in words if w not in seen and any(name in w for name in lost)]
     verb = "is" if len(seen) == 1 else "are"
-    text = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
+    which = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
     itself = "itself is" if len(lost) == 1 else "themselves are"
-    return f"{text}; {listing(lost, 'and')} by {itself} not"
+    return f"{which}; {listing(lost, 'and')} by {itself} not"
 
 
 def unit_columns(A: AnyArray) -> tuple[AnyArray, FloatArray]:
@@ -316,20 +310,12 @@ def echelon(rows: FloatArray) -> list[FloatArray]:
     A, scale = unit_columns(rows)
     pivots: list[int] = []
     for column in range(A.shape[1]):
-        r = len(pivots)
-        if r == A.shape[0]:
-            break
-        best = r + int(np.argmax(np.abs(A[r:, column])))
-        if abs(A[best, column]) <= WORD_TOLERANCE:
-            continue
-        A[[r, best]] = A[[best, r]]
-        A[r] /= A[r, column]
-        others = np.arange(A.shape[0]) != r
-        A[others] -= np.outer(A[others, column], A[r])
-        pivots.append(column)
-    A[np.abs(A) <= WORD_TOLERANCE] = 0.0
-    back = A * scale
-    return [_snapped(back[i] / back[i, p]) for i, p in enumerate(pivots)]
+        more = [*pivots, column]
+        if np.linalg.matrix_rank(A[:, more], WORD_TOLERANCE) == len(more):
+            pivots = more
+    reduced = np.linalg.lstsq(A[:, pivots], A, rcond=None)[0]
+    reduced[np.abs(reduced) <= WORD_TOLERANCE] = 0.0
+    return [_snapped(row * scale / scale[p]) for row, p in zip(reduced, pivots, strict=True)]
 
 
 def _snapped(row: FloatArray) -> FloatArray:

@@ -129,7 +129,7 @@ def least_squares(
         `sigma` only.
     sigma
         Stated errors of Y, which weight the rows: one standard deviation of each entry, shape of Y or scalar,
-        > 0 (of real and imaginary part alike, for complex Y); or the covariance matrix of the (stretched) Y.
+        > 0 (of real and imaginary part alike, for complex Y).
     rcond
         Scaled singular values below `rcond` times the largest count as zero.
 
@@ -155,18 +155,18 @@ def least_squares(
     """
     A, y, labels = _real_problem(K, Y, names)
     m, n = A.shape
-    white = _whitened(np.column_stack((A, y)), weights, sigma, m // len(np.asarray(Y)))
-    white_A, white_y = white[:, :n], white[:, n]
-    unit, scale = unit_columns(white_A)
+    over = _row_factors(weights, sigma, len(np.asarray(Y)), m)
+    white, white_y = A * over[:, None], y * over
+    unit, scale = unit_columns(white)
     U, s, Vt = np.linalg.svd(unit, full_matrices=False)
     rank = int(np.count_nonzero(s > rcond * s[0]))
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
-    x = x + inverse @ (white_y - white_A @ x)
-    left = white_y - white_A @ x
+    x = x + inverse @ (white_y - white @ x)
+    left = white_y - white @ x
     chi_square, stated = float(left @ left), sigma is not None
-    dof = (m if weights is None else int(np.count_nonzero(white.any(axis=1)))) - rank
+    dof = int(np.count_nonzero(over)) - rank
     covariance: FloatArray | None = None
     if stated or dof > 0:
         covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof)
@@ -181,7 +181,6 @@ def least_squares(
         dof=dof,
         rank=rank,
         condition_number=float(s[0] / s[-1]) if rank == n else float("inf"),
-        singular_values=s,
         errors_stated=stated,
         chi_square=chi_square if stated else None,
         row_space=Vt[:rank] * scale,
@@ -268,25 +267,20 @@ def _real_problem(
     return A, y, labels
 
 
-def _whitened(rows: FloatArray, weights: ArrayLike | None, sigma: ArrayLike | None, parts: int) -> FloatArray:
-    """Rows (m, n + 1) of equal weight; each entry of Y stands in so many `parts`."""
-    if weights is None and sigma is None:
-        return rows
+def _row_factors(weights: ArrayLike | None, sigma: ArrayLike | None, rows: int, m: int) -> FloatArray:
+    """What makes the m real rows of so many rows of Y weigh alike, (m,)."""
     if weights is not None and sigma is not None:
         raise ValueError("give either weights or errors of Y, not both")
-    m, stated = len(rows), sigma is not None
-    each = np.asarray(sigma if stated else weights, dtype=np.float64)
-    right = each > 0 if stated and each.ndim < 2 else (each >= 0) | stated
-    if not (np.isfinite(each) & right).all() or not each.any():
+    stated = sigma is not None
+    each = np.asarray(sigma if stated else 1.0 if weights is None else weights, dtype=np.float64)
+    if each.shape not in ((), (rows,)):
+        raise ValueError(f"weights and errors need one entry per row of Y, {rows}; got {each.shape}")
+    if not np.isfinite(each).all() or (each < 0).any() or not (each.all() if stated else each.any()):
         raise ValueError(
             "errors must be finite and greater than zero, weights finite, not negative, not all 0"
         )
-    if stated and each.shape == (m, m):
-        return np.asarray(np.linalg.solve(np.linalg.cholesky(each), rows))
-    if each.shape not in ((), (m // parts,)):
-        raise ValueError(f"weights and errors need one entry per row of Y, {m // parts}; got {each.shape}")
-    each = np.repeat(np.broadcast_to(each, m // parts), parts)
-    return np.asarray(rows * (1.0 / each if stated else np.sqrt(each))[:, None])
+    over = 1.0 / each if stated else np.sqrt(each)
+    return np.repeat(np.broadcast_to(over, rows), m // rows)
 
 
 @dataclass(frozen=True, eq=False)

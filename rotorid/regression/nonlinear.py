@@ -96,13 +96,11 @@ class NonlinearEstimate:
     @property
     def bound_warning(self) -> str:
         """What stands at a bound, in words, or nothing."""
-        if not self.at_bounds:
-            return ""
         stand = "stands at its bound" if len(self.at_bounds) == 1 else "stand at their bounds"
-        return (
-            f"{', '.join(self.at_bounds)} {stand}: no standard deviation is given, and those of the others "
-            "hold it fixed"
+        words = (
+            f"{', '.join(self.at_bounds)} {stand}: no standard deviation is given, and those of the others"
         )
+        return f"{words} hold it fixed" if self.at_bounds else ""
 
     @property
     def end_warnings(self) -> tuple[str, ...]:
@@ -337,16 +335,16 @@ class _Search:
         )
         step = np.where(free, estimate.solution, 0.0)
         without = np.where(free[:, None] & free, 0.0, np.nan)
-        covariance, full = estimate.covariance, estimate.solution_covariance
-        seen = ~np.isnan(estimate.values)
+        seen, both = ~np.isnan(estimate.values), (estimate.covariance, estimate.solution_covariance)
+        covariance, full = (None if each is None else each + without for each in both)
         judged = replace(
             estimate,
             values=np.where(seen, x, np.nan),
             solution=x.copy(),
-            covariance=None if covariance is None else covariance + without,
+            covariance=covariance,
             residuals=r,
             chi_square=float(r @ r) if stated else None,
-            solution_covariance=None if full is None else full + without,
+            solution_covariance=full,
         )
         # one that moves the residuals by less than a millionth of what others do counts as so large: one that
         # is 0 has no size
