@@ -22,7 +22,7 @@ import numpy as np
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files.cells import decode
-from rotorid.files.disk import file_content, first_bytes, read_bytes, why_unreadable
+from rotorid.files.disk import file_content, first_bytes, why_unreadable
 from rotorid.files.problems import InputError, Problems, printable, refusal
 from rotorid.files.units import FORCE, TIME, VIBRATION, Unit, spelt
 
@@ -137,8 +137,7 @@ def _read_text(path: Path) -> Sampled:
     import pandas as pd
 
     problems = Problems()
-    data = problems.need(read_bytes(path, problems))
-    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), data, problems)))
+    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), file_content(path), problems)))
     lines = text.split("\n", HEAD)[:HEAD]
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in lines[len(lines) // 2 :]))
     rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator), ()))] for line in lines]
