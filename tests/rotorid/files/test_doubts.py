@@ -15,7 +15,6 @@ from rotorid.files import (
     read_rotor,
     read_trials,
     write_influence,
-    write_table,
 )
 
 SHAFT = [
@@ -115,7 +114,7 @@ def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
     influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
     frame = influence_frame(influence)
     frame = frame.rename(columns=lambda name: name.replace("per_g", "per_kg_m"))
-    write_table(tmp_path / "si.csv", frame)
+    frame.to_csv(tmp_path / "si.csv", index=False)
     read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
     assert (read.trials.labels.weight_unit, read.trials.labels.weight_scale) == ("g_mm", 1e6)
     c = correct(read.influence, read.trials).to_dict()["corrections"][0]
