@@ -12,7 +12,6 @@ from rotorid.base.lazy_names import lazy_names
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.conventions import Conventions
-    from rotorid.files.disk import write_table
     from rotorid.files.influence import influence_frame, read_influence, write_influence
     from rotorid.files.job import Job, job_from_files, read_job
     from rotorid.files.job_models import Errors
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "conventions": "Conventions",
-    "disk": "write_table",
     "influence": "influence_frame read_influence write_influence",
     "job": "Job job_from_files read_job",
     "job_models": "Errors",
@@ -73,7 +71,6 @@ __all__ = [
     "rotor_files",
     "write_influence",
     "write_rotor",
-    "write_table",
 ]
 
 __getattr__, __dir__ = lazy_names(

@@ -214,31 +214,17 @@ Attached = create_model("Attached", __base__=Settings, **_TABLES)
 """Settings of a file with tables of bearings, seals and forces."""
 
 
-def node_number(value: int | str, nodes: Collection[int], stations: Mapping[str, int]) -> int:
-    """The number of a node, given by it or its text, or by the name of a station.
-
-    Raises
-    ------
-    ValueError
-        That says what is expected.
-    """
-    number = stations.get(str(value), int(value) if str(value).strip().isdecimal() else 0)
-    if number in nodes:
-        return number
-    if isinstance(nodes, range):
-        hint = did_you_mean(str(value), stations)
-        raise ValueError(f"a node from 1 to {nodes.stop - 1} or a station{hint}")
-    raise ValueError(f"one of the nodes {listing(map(str, nodes))}")
-
-
 def places(nodes: Collection[int], stations: Mapping[str, int]) -> Callable[[Place], int]:
-    """What gives the node of a table of settings; InputError where it is none."""
+    """What gives the node of a table of settings, by its number or a station; InputError where it is none."""
 
     def at(item: Place) -> int:
-        try:
-            return node_number(item.node, nodes, stations)
-        except ValueError as error:
-            raise InputError([item.problem("node", str(error))]) from None
+        name = str(item.node).strip()
+        node = stations.get(name, int(name) if name.isdecimal() else 0)
+        if node not in nodes:
+            known = f"from 1 to {max(nodes)}" if isinstance(nodes, range) else listing(map(str, nodes))
+            hint = did_you_mean(name, stations)
+            raise InputError([item.problem("node", f"a node {known} or a station{hint}")])
+        return node
 
     return at
 

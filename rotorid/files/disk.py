@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import math
 import os
 import stat
 import sys
@@ -12,16 +11,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rotorid.base.choices import did_you_mean
-from rotorid.base.json import cell
 from rotorid.base.logs import files as log
-from rotorid.base.tables import Column, Table, csv, excel
 from rotorid.files.problems import STANDARD_INPUT, Problems, refusal
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_BYTES = 200_000_000
 reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
@@ -122,42 +115,6 @@ def why_unreadable(path: Path, error: OSError | ValueError) -> str:
     if isinstance(error, IsADirectoryError):
         return "a file, not a folder"
     return f"a file that can be read ({getattr(error, 'strerror', None) or error})"
-
-
-def write_table(path: str | Path, frame: pd.DataFrame) -> None:
-    """Write a table to `.csv` or `.xlsx`, whole or not at all.
-
-    Numbers keep all their digits; NaN and None become blanks. Text that a spreadsheet could take for a
-    formula gets a leading blank in CSV (readers drop it) and is marked as text in a workbook.
-
-    Parameters
-    ----------
-    path
-        Ends in `.csv` or `.xlsx`; an existing file is replaced.
-    frame
-        The table; its index is not written.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    write_files({Path(path): table_bytes(path, frame)})
-
-
-def table_bytes(path: str | Path, frame: pd.DataFrame, *, sheet: str = "table") -> bytes:
-    """What `write_table` writes to a file of this name."""
-    kind = Path(path).suffix.lower()
-    if kind not in (".csv", ".xlsx"):
-        raise refusal(path, "a name that ends in .csv or .xlsx")
-    if frame.isin([math.inf, -math.inf]).to_numpy().any():
-        raise ValueError("an infinite number cannot be written to a table")
-    columns = []
-    for name, values in frame.astype(object).where(frame.notna(), None).items():
-        cells = map(cell, values)
-        columns.append(Column(str(name), [x if isinstance(x, int | float | None) else str(x) for x in cells]))
-    table = Table(sheet, tuple(columns))
-    return csv(table) if kind == ".csv" else excel(table)
 
 
 def write_files(files: Mapping[Path, bytes], last_look: Callable[[], None] | None = None) -> None:

@@ -17,7 +17,7 @@ from rotorid.base.choices import suggest
 from rotorid.files import units
 from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
-from rotorid.files.units import UnitError, UnitReader, one_of
+from rotorid.files.units import UnitError, one_of
 
 READING, WEIGHT = ("amplitude", "phase"), ("mass", "angle")
 LONGEST = 100
@@ -93,8 +93,8 @@ _STARTS = re.compile(r"(?:^|(?<=[\s_.,;:]))(?=[^\s_])")
 """Of a word."""
 _DIGITS = frozenset("0123456789.,+-")
 BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
-_SURE = {"mil", "um", "mm_s", "in_s"}
-"""Units of vibration that say what they measure without a word for it."""
+_SURE = re.compile(r"(?:mil|um|mm_s|in_s)(?:_pp|_rms)?(?:@deg)?|deg")
+"""Units that say what they measure without a word for it."""
 _SPELLINGS = {
     other: unit
     for unit, others in {
@@ -147,6 +147,8 @@ class Heading:
 def read_unit(stem: str, text: str) -> tuple[str, str]:
     """The name in this project of a unit as people write it, `um_pp` of `µm pk-pk`; and `lag` or `lead`.
 
+    Of a `vector` it is that of its amplitude, `um_pp@`, or of both, `um_pp@deg`.
+
     Raises
     ------
     UnitError
@@ -155,6 +157,11 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     direction, plain = "", text.strip()
     if len(plain) > LONGEST:
         raise UnitError(f"a unit, not {len(plain)} characters")
+    if stem == "vector":
+        both = BOTH_UNITS.fullmatch(plain)
+        size, angle = both.groups() if both else (plain, "")
+        angle, direction = read_unit("phase", angle)
+        return f"{read_unit('amplitude', size)[0]}@{angle}", direction
     if stem == "phase":
         direction = " and ".join(sorted({word.casefold() for word in _DIRECTION.findall(plain)}))
         plain = _DIRECTION.sub("", plain).strip(" ,;/")
@@ -163,13 +170,12 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     swing = _SWING.search(plain) if stem == "amplitude" else None
     base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_").removesuffix("ec")
     folded = base.casefold()
-    if stem in ("mass", "unbalance"):
+    if stem == "mass":
         parts = re.split("[_-]", re.sub(r"^(g|oz)\.?(mm|in)$", r"\1_\2", folded))
         return units.weight("_".join(_SPELLINGS.get(part, part) for part in parts if part)).name, ""
     base = _SPELLINGS.get(folded, base if stem == "amplitude" and not base.isupper() else folded)
     if stem != "amplitude":
-        reader: UnitReader = one_of(units.SPEED if stem == "speed" else units.ANGLE)
-        return reader(base).name, direction
+        return one_of(units.SPEED if stem == "speed" else units.ANGLE)(base).name, direction
     if f"{base}_pp" not in units.VIBRATION:
         units.vibration(units.spelt(plain))
         raise UnitError(
@@ -180,12 +186,9 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
 
 @lru_cache
 def readable(stem: str, text: str) -> bool:
-    """Whether a text is a unit of the quantity, or nothing; of a vector, that of its amplitude or of both."""
-    both = BOTH_UNITS.fullmatch(text) if stem == "vector" else None
-    parts = zip(READING, both.groups() if both else (text,), strict=False)
+    """Whether a text is a unit of the quantity, or nothing."""
     try:
-        for quantity, part in parts if stem == "vector" else ((stem, text),):
-            read_unit(quantity, part)
+        read_unit(stem, text)
     except UnitError:
         return False
     return True
@@ -317,24 +320,13 @@ def _by_words(heading: Heading, words: set[str], outside: str, inside: str, *, w
 
 
 def _by_unit(outside: str, inside: str, *, weights: bool) -> tuple[str, str]:
-    """What a column holds as the unit at its heading's end says, and that unit; empty if not sure."""
+    """What a column holds as the unit at the end says, and that unit; empty where it may be another."""
     for stem in WEIGHT if weights else ("vector", *READING):
         unit = _without_unit(stem, outside, inside)[1]
-        if unit and readable(stem, unit) and _is_sure(stem, unit):
+        long = stem == "mass" and len(unit) > 1  # grams, not g
+        if readable(stem, unit) and (long or _SURE.fullmatch(read_unit(stem, unit)[0])):
             return stem, unit
     return "", ""
-
-
-def _is_sure(stem: str, unit: str) -> bool:
-    """Whether a unit says by itself what it measures: mils or degrees, not g or rad."""
-    if stem == "mass":
-        return len(unit) > 1
-    if stem in ("phase", "angle"):
-        return read_unit("phase", unit)[0] == "deg"
-    both = BOTH_UNITS.fullmatch(unit)
-    if stem == "vector":
-        return both is not None and _is_sure("amplitude", both[1]) and _is_sure("phase", both[2])
-    return re.sub("_(?:pp|rms)$", "", read_unit(stem, unit)[0]) in _SURE
 
 
 def _without_unit(stem: str, outside: str, inside: str) -> tuple[str, str]:

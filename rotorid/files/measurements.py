@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +19,12 @@ from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN
 from rotorid.files.instruments import DERIVATIVE, read_responses
+from rotorid.files.model import HarmonicFile
 from rotorid.files.node_tables import read_modes
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import Unit, UnitError, UnitReader, one_of, spelt
-from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, real_matrices
+from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiments, real_matrices
 from rotorid.identify.operator_model import HarmonicModel
-
-if TYPE_CHECKING:
-    from rotorid.files.model import HarmonicFile
 
 PARTS = ("amplitude", "phase", "re", "im")
 _FREE = "a free vibration has real amplitudes"
@@ -70,9 +68,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         Where an amplitude of the model is nowhere in the table.
     """
     errors, unmeasured = None, set[str]()
-    if not isinstance(model, HarmonicModel):
-        errors, unmeasured = model.errors, {*model.unmeasured}
-        model = model.model
+    if isinstance(model, HarmonicFile):
+        errors, unmeasured, model = model.errors, {*model.unmeasured}, model.model
     grid, problems = _grid(path)
     if {"mode", "node", "shape"} <= {*grid.header}:
         return _free_vibrations(path, model, errors)
@@ -95,14 +92,10 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     if lacking := {*model.outputs} - {*measured} - unmeasured:
         message = f"{table.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=2)
-    rows = replace(
-        rows,
-        signals={**_unread(model, len(table)), **rows.signals},
-        free=free,
-        errors=errors,
-        varying={name: table.numbers(name) for name in model.varying},
-    )
-    return replace(rows, rounding=_rounding(table, rows, model.outputs))
+    signals = _unread(model) | {**rows.signals} | {name: table.numbers(name) for name in model.varying}
+    data = experiments(model, rows.frequencies, signals, names=rows.names, free=free, errors=errors)
+    data = replace(data, axis=rows.axis, units=rows.units)
+    return replace(data, rounding=_rounding(table, data, model.outputs))
 
 
 def read_amplitudes(path: str | Path) -> Experiments:
@@ -157,17 +150,15 @@ def _grid(path: str | Path) -> tuple[Grid, Problems]:
     return problems.need(read_grid(path, "measurements", problems, first=True)), problems
 
 
-def _unread(model: HarmonicModel, count: int) -> dict[str, ComplexArray]:
+def _unread(model: HarmonicModel) -> dict[str, Any]:
     """Signals without readings: no input, unknown outputs."""
-    return {
-        name: np.full(count, 0 if name in model.inputs else np.nan, dtype=complex) for name in model.signals
-    }
+    return dict.fromkeys(model.outputs, np.nan) | dict.fromkeys(model.inputs, 0.0)
 
 
 def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeErrors | None) -> Experiments:
     """A table of modes, whose nodes are amplitudes of the model."""
     modes, problems = read_modes(path), Problems()
-    names, count = [*map(str, modes.nodes)], len(modes.frequencies)
+    names = [*map(str, modes.nodes)]
     for node in {*names} - {*model.outputs}:
         expected = f"an amplitude of the model: {listing(model.outputs)}{did_you_mean(node, model.outputs)}"
         problems.add(str(path), None, "node", node, expected)
@@ -177,17 +168,17 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
     std, covariances = modes.frequency_std, {}
     if errors is None and modes.shape_std is not None:
         variances = (modes.shape_std * modes.shapes) ** 2
-        along = variances[..., None, None] * np.diag([1.0, 0.0])
-        covariances = dict(zip(names, along, strict=True))
-    return Experiments(
-        tuple(f"mode {mode}" for mode in range(1, count + 1)),
+        covariances = dict(zip(names, variances[..., None, None] * np.diag([1.0, 0.0]), strict=True))
+    data = experiments(
+        model,
         modes.frequencies,
-        _unread(model, count) | dict(zip(names, modes.shapes.astype(complex), strict=True)),
-        np.ones(count, dtype=bool),
-        errors,
-        covariances,
-        frequency_std=std * modes.frequencies if std is not None and std.all() else None,
+        _unread(model) | dict(zip(names, modes.shapes, strict=True)),
+        names=[f"mode {i + 1}" for i in range(len(modes.frequencies))],
+        free=True,
+        errors=errors,
+        covariances=covariances,
     )
+    return data if std is None or not std.all() else replace(data, frequency_std=std * modes.frequencies)
 
 
 def _or_model(of: dict[str, Unit]) -> UnitReader:

@@ -12,7 +12,6 @@ from fem import Rotor
 from rotorid.base.arrays import FloatArray, polar
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.attached import node_number
 from rotorid.files.columns import Column, Table, read_table
 from rotorid.files.conventions import FULL_TURN
 from rotorid.files.problems import Problems
@@ -23,7 +22,7 @@ Node = int | str
 """The number of a node; without a rotor also any label."""
 RECIPROCAL = 1e-3
 """So far, relative, the two entries of a pair of nodes may differ: rounding, not a contradiction."""
-FREQUENCIES = ("frequency", "speed", "critical_speed")
+FREQUENCIES = ("frequency", "critical_speed")
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": Unit("percent", "ratio", 1.0, 100.0)})
 _PER_FORCE = {"m_per_N": 1.0, "mm_per_N": 1e3, "um_per_N": 1e6}
@@ -31,8 +30,7 @@ _COMPLIANCE = one_of({name: Unit(name, "compliance", 1.0, divide) for name, divi
 _ANGLE = Column("angle", one_of(units.ANGLE), ("angle_deg",))
 
 UNBALANCE_COLUMNS = (
-    Column("plane", required=False),
-    Column("node", required=False),
+    Column("plane"),
     Column("mass", one_of(units.MASS), ("mass_g", "mass_kg", "mass_oz"), required=False),
     Column("radius", one_of(units.LENGTH), ("radius_mm", "radius_m", "radius_in"), required=False),
     Column("unbalance", one_of(units.UNBALANCE), ("unbalance_g_mm", "unbalance_kg_m"), required=False),
@@ -41,10 +39,8 @@ UNBALANCE_COLUMNS = (
 BOW_COLUMNS = (Column("node"), Column("bow", one_of(units.LENGTH), ("bow_um", "bow_mm", "bow_mil")), _ANGLE)
 MODE_COLUMNS = (
     Column("mode", ratio),
-    *(
-        Column(stem, _SPEED, tuple(f"{stem}_{unit}" for unit in shown), required=False, blank=True)
-        for stem, shown in zip(FREQUENCIES, (("rad_s", "Hz", "rpm"), ("rpm",), ("rpm",)), strict=True)
-    ),
+    Column("frequency", _SPEED, ("frequency_rad_s", "frequency_Hz"), required=False, blank=True),
+    Column("critical_speed", _SPEED, ("critical_speed_rpm",), required=False, blank=True),
     Column("node"),
     Column("shape", ratio),
     *(
@@ -62,8 +58,8 @@ COMPLIANCE_COLUMNS = (
 def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
     """Read an unbalance table.
 
-    Its columns are `plane` or `node`; `unbalance_<unit>`, or both `mass_<unit>` and `radius_<unit>`; and
-    `angle_deg`, with the rotation.
+    Its columns are `plane` (a node or a station), `unbalance_<unit>`, or both `mass_<unit>` and
+    `radius_<unit>`; and `angle_deg`, with the rotation.
 
     Parameters
     ----------
@@ -84,14 +80,13 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
     """
     problems = Problems()
     table = problems.need(read_table(path, "unbalance", UNBALANCE_COLUMNS, problems))
-    where = table.only(("plane", "node"), "plane", "one column plane or node, not both: a node or a station")
     sizes = {"unbalance", "mass", "radius"}
     present = sizes & {*table.fields}
     if present not in ({"unbalance"}, {"mass", "radius"}) and table.misspelt.isdisjoint(sizes):
         expected = "either a column unbalance_<unit>, or both mass_<unit> and radius_<unit>"
         table.in_header("unbalance_g_mm", expected)
     total: dict[int, complex] = {}
-    for node, value in _vectors(table, problems.need(where), present, rotor):
+    for node, value in _vectors(table, "plane", present, rotor):
         total[node] = total.get(node, 0j) + value
     return total
 
@@ -147,10 +142,9 @@ def _nodes(table: Table, stem: str, rotor: Rotor | SmallModel | None) -> list[No
             if rotor is None or not name:
                 nodes.append(int(name) if name.isascii() and name.isdecimal() else name)
             else:
-                numbers = range(1, rotor.n_nodes + 1) if isinstance(rotor, Rotor) else rotor.nodes
-                nodes.append(node_number(name, numbers, rotor.stations))
+                nodes.append(rotor.node(name))
         except ValueError as error:
-            table.complain(row, stem, str(error))
+            table.complain(row, stem, f"a node of the rotor: {error}")
             nodes.append("")
     return nodes
 
@@ -185,8 +179,8 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     """Read a table of natural frequencies and mode shapes, a row per mode and node.
 
     Its columns are `mode` (1, 2, … from the lowest frequency, without a gap), `frequency_rad_s` (or `_Hz`,
-    `_rpm`, or `speed_rpm`; or `critical_speed_rpm` of modes that were read there, not at rest; it may be
-    blank after the first row of a mode), `node`, `shape` (relative amplitude with its sign) and, optionally,
+    `_rpm`; or `critical_speed_rpm` of modes that were read there, not at rest; it may be blank after the
+    first row of a mode), `node`, `shape` (relative amplitude with its sign) and, optionally,
     `frequency_std_percent` and `shape_std_percent`, one standard deviation; `damping_percent` and
     `damping_std_percent` may stand beside them and are not used. Every mode has the same nodes, each once.
 
@@ -204,7 +198,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     """
     problems = Problems()
     table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems))
-    expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm, speed_rpm or critical_speed_rpm"
+    expected = "one column frequency_rad_s (or _Hz, _rpm) or critical_speed_rpm"
     stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
     nodes, number, values = _nodes(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
     table.must_be("mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …")

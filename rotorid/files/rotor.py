@@ -44,9 +44,8 @@ from rotorid.files.disk import each_file_once, write_files
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, read_settings
 from rotorid.files.small_model import is_small, is_small_model, read_small_model
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
-from rotorid.files.units import one_of, ratio
+from rotorid.files.toml_file import read_toml, toml_bytes
+from rotorid.files.units import one_of
 
 USUAL = {
     "length": (5e-5, 50.0, "m"),
@@ -182,27 +181,27 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
     calibration: CalibrationKeys | None = key("what a fit to readings found, with its errors", default=None)
 
 
-def _column(stem: str, of: dict[str, units.Unit], *names: str) -> Column:
-    return Column(stem, one_of(of), names, required=len(names) > 1, blank=stem != "length")
-
-
-def _columns(keys: type[Settings], *stems: str) -> list[Column]:
-    """Optional columns that are called as settings are."""
-    of = {stem: keys.known_keys()[keys.model_fields[stem].alias or stem] for stem in stems}
-    readers = {stem: one_of(key.units) if isinstance(key.units, dict) else ratio for stem, key in of.items()}
-    return [Column(stem, readers[stem], key.names, required=False, blank=True) for stem, key in of.items()]
+def _column(stem: str, of: dict[str, units.Unit], *usual: str) -> Column:
+    names = tuple(f"{stem}_{unit}" for unit in usual)
+    return Column(stem, one_of(of), names, required=len(usual) > 1, blank=stem != "length")
 
 
 OF_ELEMENTS = {
-    "length": _column("length", units.LENGTH, "length_m", "length_mm"),
-    "outer_diameter": _column("diameter", units.LENGTH, "diameter_m", "diameter_mm"),
-    "inner_diameter": _column("inner_diameter", units.LENGTH, "inner_diameter_m"),
-} | {column.stem: column for column in _columns(Material, *Material.model_fields)}
+    "length": _column("length", units.LENGTH, "m", "mm"),
+    "outer_diameter": _column("diameter", units.LENGTH, "m", "mm"),
+    "inner_diameter": _column("inner_diameter", units.LENGTH, "m"),
+    "youngs_modulus": _column("youngs_modulus", units.MODULUS, "Pa"),
+    "density": _column("density", units.DENSITY, "kg_per_m3"),
+    "poisson_ratio": Column("poisson_ratio", units.ratio, required=False, blank=True),
+    "material_damping": _column("material_damping", units.TIME, "s"),
+}
 """Columns by attribute of a rotor, for reading and writing."""
 OF_NODES = (
-    *_columns(DiscKeys, "mass", "polar_inertia", "diametral_inertia"),
-    _column("support_stiffness", units.STIFFNESS, "support_stiffness_N_per_m"),
-    _column("support_damping", units.DAMPING, "support_damping_N_s_per_m"),
+    _column("mass", units.MASS, "kg"),
+    _column("polar_inertia", units.INERTIA, "kg_m2"),
+    _column("diametral_inertia", units.INERTIA, "kg_m2"),
+    _column("support_stiffness", units.STIFFNESS, "N_per_m"),
+    _column("support_damping", units.DAMPING, "N_s_per_m"),
 )
 COLUMNS = (*OF_ELEMENTS.values(), Column("element", required=False, blank=True), *OF_NODES)
 

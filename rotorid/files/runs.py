@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -173,22 +173,23 @@ def read_runs(
         return None, None
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
-    start = len(problems)
-    speeds, index, words = _merge_speeds(table, usable, conventions.speed_tolerance_percent)
+    start, band = len(problems), conventions.speed_tolerance_percent
+    speeds, index, words = _merge_speeds(table, usable, band)
     runs, sensors = (tuple(name for name in dict.fromkeys(names) if name) for names in (run, sensor))
-    run_at, sensor_at = ({name: k for k, name in enumerate(names)} for names in (runs, sensors))
     repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
-    order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
-    readings, places = Counter[tuple[int, int, int]](), list[tuple[int, ...]]()
-    rows = sorted(usable, key=lambda i: order[repeat[i]])
+    order, run_at, sensor_at = (
+        {name: k for k, name in enumerate(dict.fromkeys(of))} for of in (repeat, runs, sensors)
+    )
+    rows, readings = sorted(usable, key=lambda i: order[repeat[i]]), Counter[tuple[int, int, int]]()
+    places = list[tuple[int, int, int, int]]()
     for i in rows:
         place = run_at[run[i]], index[i], sensor_at[sensor[i]]
         places.append((readings[place], *place))
         readings[place] += 1
     if len(problems) == start:  # with unclear speeds all the rest would be noise
-        _complain_about_repeats(table)
+        _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.complete and len(usable) == len(table) and len(problems) == start:
-        _complain_about_gaps(table, (runs, speeds, sensors), readings, conventions.speed_tolerance_percent)
+        _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
     if not len(problems):
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
@@ -255,44 +256,35 @@ def _merge_speeds(
         rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
     values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
-    readings = [
-        *zip(*(table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table), strict=True)
-    ]
     distinct = np.unique(values[usable])
     apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
     groups = np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist()
-    index = dict(zip(usable, groups, strict=True))
-    remedy = (
-        f"within the tolerance of {band:g} %; write the nominal speed, or set speed_tolerance_percent smaller"
-    )
-    first: dict[tuple[object, ...], int] = {}
-    unclear: dict[tuple[int, str], tuple[int, int]] = {}
-    read: dict[int, dict[tuple[str, float], None]] = defaultdict(dict)
-    for row, g in index.items():
-        run, speed = readings[row][0], float(values[row])
-        read[g][run, speed] = None
-        one = first.setdefault((g, *readings[row]), row)
-        if values[one] != speed:
-            unclear.setdefault((g, run), (row, one))
-    for (_, run), (row, one) in unclear.items():
-        other = table.shown("speed", one)
-        table.complain(row, "speed", f"one speed: run {run!r} has {other} as well, {remedy}")
+    read: dict[int, set[tuple[str, float]]] = defaultdict(set)
+    for row, g in zip(usable, groups, strict=True):
+        read[g].add((table.texts("run")[row], float(values[row])))
     merged, alike = [], []
     for g in sorted(read):
         speeds = sorted({speed for _, speed in read[g]})
-        merged.append(float(np.mean([speed for _, speed in read[g]])) if len(speeds) > 1 else speeds[0])
+        one = speeds[0] if len(speeds) == 1 else float(np.mean(sorted(speed for _, speed in read[g])))
+        merged.append(one)
+        if same_speed(speeds[0], speeds[-1], UNSAID):
+            continue
         shown = [show_speed(speed, unit) for speed in speeds]
-        if not same_speed(speeds[0], speeds[-1], band) and g not in {k for k, _ in unclear}:
+        alike.append(f"{', '.join(words.split()[0] for words in shown)} as {show_speed(one, unit)}")
+        if not same_speed(speeds[0], speeds[-1], band):
             chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
-            expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
-            table.as_whole(table.fields["speed"].name, expected)
-        if not same_speed(speeds[0], speeds[-1], UNSAID):
-            alike.append(
-                f"{', '.join(words.split()[0] for words in shown)} as {show_speed(merged[-1], unit)}"
+            words = (
+                f"speeds that are clearly the same or not: {chain} form a chain, neighbours {_remedy(band)}"
             )
+            table.as_whole(table.fields["speed"].name, words)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
     words = f"speeds within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
-    return np.array(merged), index, [words] if alike else []
+    return np.array(merged), dict(zip(usable, groups, strict=True)), [words] if alike else []
+
+
+def _remedy(tolerance_percent: float) -> str:
+    within = f"within the tolerance of {tolerance_percent:g} %"
+    return f"{within}; write the nominal speed, or set speed_tolerance_percent smaller"
 
 
 def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
@@ -357,14 +349,23 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
         table.as_whole(table.fields["amplitude"].heading, expected)
 
 
-def _complain_about_repeats(table: Table) -> None:
+def _complain_about_twins(
+    table: Table, places: Mapping[int, tuple[int, ...]], repeat: Sequence[str], tolerance_percent: float
+) -> None:
     """Two readings of one run, speed and sensor must say that they are repeats."""
     stem, expected = "repeat", "another repeat than in row {}, the same reading"
     if stem not in table:
         stem, expected = "sensor", "one reading per run, speed and sensor (row {} has the same); "
         expected += "repeated readings need a column repeat"
-    keys = zip(table.numbers("speed").tolist(), *map(table.texts, {"run", "sensor", stem}), strict=True)
-    table.once(stem, (key if all(key) else None for key in keys), expected)
+    first: dict[tuple[object, ...], int] = {}
+    speed = table.numbers("speed")
+    for row, place in sorted(places.items()):
+        other = first.setdefault((place[1:], repeat[row]), row)
+        if speed[other] != speed[row]:
+            there = f"run {table.shown('run', row)!r} has {table.shown('speed', other)} as well"
+            table.complain(row, "speed", f"one speed: {there}, {_remedy(tolerance_percent)}")
+        elif other != row:
+            table.complain(row, stem, expected.format(table.rows[other]))
 
 
 def _complain_about_gaps(

@@ -29,8 +29,7 @@ from rotorid.files.attached import (
 )
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"
@@ -237,12 +236,10 @@ def small_equations(path: Path) -> dict[str, Any]:
             [name for name in inputs if name.removeprefix(FORCE) in names],
             [name for name in shown if name in names],
         )
+        merged = {name: equations.get(name, {}) | more.get(name, {}) for name in ("force", "bounds")}
     except (ValueError, TypeError) as error:
         raise InputError([Problem(str(path), None, "equations", None, str(error))]) from None
-    for name, value in more.items():
-        added = isinstance(value, dict) and name != "outputs"
-        equations[name] = {**equations.get(name, {}), **value} if added else value
-    return equations
+    return equations | more | merged
 
 
 def small_model_files(

@@ -55,7 +55,7 @@ def test_unbalance(read):
         read_unbalance, [header, ["wheel", 10, 200, 90], ["7", 3, 100, 0], ["12", 5, 200, 90]], ROTOR
     )
     assert found == {12: pytest.approx(3e-3j), 7: pytest.approx(3e-4)}
-    oz = [["node", "unbalance_oz_in", "angle_rad"], ["fan", 2, math.pi]]
+    oz = [["plane", "unbalance_oz_in", "angle_rad"], ["fan", 2, math.pi]]
     assert read(read_unbalance, oz, ROTOR) == {18: pytest.approx(-2 * 0.45359237 / 16 * 0.0254)}
 
 
@@ -70,11 +70,11 @@ def test_a_bow(read):
     [
         (read_bow, BOW[:3], None, "node", "three nodes or more"),
         (read_bow, [*BOW, ["12", 1, 0]], 5, "node", "no other row"),
-        (read_bow, replaced(BOW, 4, "node", "22"), 4, "node", "a node from 1 to 21"),
+        (read_bow, replaced(BOW, 4, "node", "22"), 4, "node", "the rotor has nodes 1 to 21"),
         (read_bow, replaced(BOW, 4, "bow_um", -1), 4, "bow_um", "0 or more"),
         (read_bow, replaced(BOW, 4, "angle_deg", 400), 4, "angle_deg", "-360 to 360"),
-        (read_unbalance, [["node", "mass_g", "angle_deg"], [1, 2, 3]], 1, "unbalance_g_mm", "or both mass_"),
-        (read_unbalance, [["unbalance_g_mm", "angle_deg"], [2, 3]], 1, "plane", "one column plane or node"),
+        (read_unbalance, [["plane", "mass_g", "angle_deg"], [1, 2, 3]], 1, "unbalance_g_mm", "or both mass_"),
+        (read_unbalance, [["unbalance_g_mm", "angle_deg"], [2, 3]], 1, "plane", "a column plane"),
     ],
 )
 def test_what_is_no_bow_or_unbalance(read, reader, table, row, column, words):
@@ -101,7 +101,6 @@ def test_modes(read):
         ("frequency_rad_s", 1.0),
         ("frequency_Hz", 2 * math.pi),
         ("frequency_rpm", math.pi / 30),
-        ("speed_rpm", math.pi / 30),
         ("critical_speed_rpm", math.pi / 30),
     ],
 )
@@ -139,7 +138,7 @@ def test_a_workbook_holds_both_tables(tmp_path):
         (5, "frequency_rad_s", 540.8, None),
         (4, "node", "", "a name"),
         (4, "node", "weel", "did you mean 'wheel'?"),
-        (4, "node", 0, "a node from 1 to 21"),
+        (4, "node", 0, "the rotor has nodes 1 to 21"),
         (4, "shape", "NaN", "a finite number"),
         (4, "shape", "1 mm", "unit in the header"),
         (2, "frequency_std_percent", -1, "of 0 or more"),
@@ -173,9 +172,9 @@ def test_a_cell_of_a_table_of_modes_that_does_not_fit(read, row, column, value, 
         ([*MODES, [2, "", 20, 0.1]], 2, "mode", "1", "the same nodes in every mode; it lacks 20"),
         ([*MODES[:4], *([*row[:3], 0] for row in MODES[4:])], 5, "shape", "0", "not 0 at every node"),
         (
-            [[*MODES[0], "speed_rpm"], *([*row, 1291] for row in MODES[1:])],
+            [[*MODES[0], "critical_speed_rpm"], *([*row, 1291] for row in MODES[1:])],
             1,
-            "speed_rpm",
+            "critical_speed_rpm",
             None,
             "one column",
         ),
