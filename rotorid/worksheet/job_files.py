@@ -18,7 +18,7 @@ from rotorid.files.job_excel import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.table_writing import write_files
-from rotorid.worksheet.job_settings import setting, settings_in, with_setting
+from rotorid.worksheet.job_settings import setting, settings_in, text_of, value_of, with_setting
 from rotorid.worksheet.text_table import Table, read_table, shown
 
 KEYS = ("runs", "weights", "check", "check_weights")
@@ -86,8 +86,8 @@ class JobFiles:
         self._held: Files = {}
         self._stamps: dict[Path, object] = {}
         self._noticed: list[str] = []
-        self._done: list[Files] = []
-        self._undone: list[Files] = []
+        self.done: list[Files] = []
+        self.undone: list[Files] = []
         self.now = self._job()
 
     def state(self) -> dict[str, Any]:
@@ -108,8 +108,8 @@ class JobFiles:
                 for key, table in now.tables.items()
             },
             "settings": now.settings,
-            "undo": bool(self._done),
-            "redo": bool(self._undone),
+            "undo": bool(self.done),
+            "redo": bool(self.undone),
         }
 
     def place(self, file: str, row: int | None) -> tuple[str, str] | None:
@@ -162,18 +162,18 @@ class JobFiles:
             changed = {table.path: table.data() for table in draft.tables.values() if table.changed}
             with suppress(_OutsideError):
                 if step := self._write({self.job: draft.text, **changed}):
-                    self._done, self._undone = [*self._done[1 - MOST_STEPS :], step], []
+                    self.done, self.undone = [*self.done[1 - MOST_STEPS :], step], []
                 return made
             self._reload()
         raise ValueError("another program goes on changing the files of the job: try again in a moment")
 
     def undo(self) -> None:
         """Go back to the files before the last step; ValueError where that is impossible."""
-        self._go(self._done, self._undone, "undo")
+        self._go(self.done, self.undone, "undo")
 
     def redo(self) -> None:
         """Go forth to the files that were undone; ValueError where that is impossible."""
-        self._go(self._undone, self._done, "redo")
+        self._go(self.undone, self.done, "redo")
 
     def _go(self, steps: list[Files], others: list[Files], word: str) -> None:
         if not steps:
@@ -202,7 +202,7 @@ class JobFiles:
     def _reload(self) -> None:
         """Take what is on disk; what another program has changed is noticed, and ends undo."""
         before, self._held = self._held, {}
-        self._done, self._undone = [], []
+        self.done, self.undone = [], []
         self.now = self._job()
         both = self._held.keys() & before.keys()
         self._noticed += [path.name for path in before if path in both and self._held[path] != before[path]]
@@ -302,9 +302,10 @@ class JobFiles:
         if draft.read_only:
             raise ValueError(draft.read_only)
         if "key" in edit:
-            key = [str(part) for part in edit["key"]]
-            if not _is_done(setting(draft.settings, key), edit["new"], edit, ".".join(key)):
-                draft.set(key, edit["new"])
+            key, now = [str(part) for part in edit["key"]], setting(draft.settings, edit["key"])
+            shown = text_of(now) if edit.get("typed") else now
+            if not _is_done(shown, edit["new"], edit, ".".join(key)):
+                draft.set(key, value_of(key[-1], edit["new"]) if edit.get("typed") else edit["new"])
             return None
         if "create" in edit:
             self._create(draft, edit["create"], edit["header"])
