@@ -60,7 +60,7 @@ class Asked(NamedTuple):
 
 def answered(folder: str, do: str, *given: object) -> dict[str, Any]:
     """Do what is asked for in a folder: its `value`, or why it is `refused`; which files were `read`."""
-    from rotorid.files.input_file import reading
+    from rotorid.files.disk import reading
 
     reading.set(_note)
     answer: dict[str, Any]
@@ -150,8 +150,7 @@ def _balance(asked: Asked) -> tuple[Balance, list[str]]:
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run; InputError where it has none."""
-    from rotorid.files.job import Overrides, job_of
-    from rotorid.files.job_excel import open_job
+    from rotorid.files.job import job_of, open_job
     from rotorid.files.problems import InputError, Problems
 
     problems = Problems()
@@ -161,7 +160,7 @@ def _without_check(path: Path) -> Job:
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
-    return job_of(written, Overrides(), problems)
+    return job_of(written, problems)
 
 
 def balanced(asked: Asked) -> dict[str, Any]:
@@ -289,7 +288,7 @@ def trial(job: str | None, options: dict[str, Any]) -> str:
 
     made = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
     answer, weights = made.answer, made.document["trial_weights"]
-    lines = [answer.judgement, answer.found, *answer.warnings, *answer.notes]
+    lines = [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]
     words = Markup("").join(Markup("<p>{}</p>").format(line) for line in lines if line)
     to_draw = all(one["angle_deg"] is not None for one in weights)
     return words + Markup(_svg(made.figure(), answer.judgement) if to_draw else "")

@@ -134,12 +134,11 @@ def runs_so_far(job: Path) -> RunsSoFar:
     """
     from balancing import reading_of
     from rotorid.files.columns import make_table, read_grid
-    from rotorid.files.job import conventions_of, tables_of
-    from rotorid.files.job_excel import open_job
-    from rotorid.files.layout import read_runs_grid
+    from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
+    from rotorid.files.job import conventions_of, open_job, tables_of
+    from rotorid.files.layout import joined, read_runs_grids
     from rotorid.files.problems import Problems
     from rotorid.files.runs import COLUMNS, make_trials
-    from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 
     problems = Problems()
     written = open_job(job, problems)
@@ -148,7 +147,8 @@ def runs_so_far(job: Path) -> RunsSoFar:
     sources, _ = tables_of(written, settings)
     slow = sources.get("slow_roll", settings.slow_roll)
     cells = read_grid(sources["runs"], "runs", problems) if "runs" in sources else None
-    grid = None if cells is None else read_runs_grid(_readable(cells), conventions, problems)
+    grids = None if cells is None else read_runs_grids(_readable(cells), conventions, problems)
+    grid = joined(grids, problems)
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
         problems.stop()
@@ -161,7 +161,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
             return trials
         its = {k: v for k, v in slow.items() if k in trials.sensors} if isinstance(slow, Mapping) else slow
         roll = make_slow_roll(its, trials, conventions, Problems())
-        return trials if roll is None else subtract_slow_roll(trials, roll)
+        return trials if roll is None else subtract_slow_roll(trials, roll[0])
 
     whole, channels = trials_of(range(len(table))), []
     for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):
@@ -190,12 +190,13 @@ def _readable(grid: Grid) -> Grid:
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> list[list[int]]:
     """Indices of the finished rows of each speed and sensor."""
-    from rotorid.files.runs import merge_speeds
+    from rotorid.files.runs import same_speed
 
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     finite = np.isfinite(table.numbers("amplitude") + table.numbers("phase"))
-    rows = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0 and finite[i]]
-    places: dict[tuple[int, str], list[int]] = defaultdict(list)
-    for i, k in merge_speeds(table, rows, tolerance_percent)[1].items():
-        places[k, sensor[i]].append(i)
+    places: dict[tuple[float, str], list[int]] = defaultdict(list)
+    for i, v in enumerate(speed.tolist()):
+        if run[i] and sensor[i] and v > 0 and finite[i]:
+            near = next((one for one, _ in places if same_speed(one, v, tolerance_percent)), v)
+            places[near, sensor[i]].append(i)
     return [places[key] for key in sorted(places, key=lambda key: key[0])]
