@@ -49,10 +49,10 @@ async def state(session: Session, given: Given) -> dict[str, Any]:
 
 
 async def edit(session: Session, given: Given) -> dict[str, Any]:
-    """Change cells and settings, all or none; the ids of new rows."""
-    rows = session.files.apply(given["edits"])
+    """Change cells and settings, all or none."""
+    session.files.apply(given["edits"])
     session.changed()
-    return {"rows": rows}
+    return {}
 
 
 async def do(session: Session, given: Given) -> dict[str, Any]:
@@ -118,9 +118,8 @@ def application(session: Session, token: str, address: str, ready: Callable[[], 
     async def answer(request: Request) -> Response:
         """A file of the page, or what is asked for; everything that is wrong as one sentence."""
         path, kind, status = request.url.path, "text/html", 400
-        error: dict[str, Any] = {"error": _refusal(request, token, address)}
-        if error["error"]:
-            return JSONResponse(error, 403, HEADERS)
+        if why := _refusal(request, token, address):
+            return JSONResponse({"error": why}, 403, HEADERS)
         if path in PAGE:
             name, kind = PAGE[path]
             content = (resources("rotorid.worksheet") / "page" / name).read_bytes()
@@ -131,13 +130,11 @@ def application(session: Session, token: str, address: str, ready: Callable[[], 
                 return JSONResponse(made, headers=HEADERS)
             kind = "image/svg+xml" if made.startswith("<svg") else kind
             return Response(made, media_type=kind, headers=HEADERS)
-        except Conflict as conflict:
-            error, status = {"error": str(conflict), "now": conflict.now}, 409
         except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
-            error = {"error": f"the page asked for what there is not: {wrong}"}
+            why = f"the page asked for what there is not: {wrong}"
         except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
-            error = {"error": str(wrong)}
-        return JSONResponse(error, status, HEADERS)
+            why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
+        return JSONResponse({"error": why}, status, HEADERS)
 
     changing = ("/edit", "/do", "/trial")
     routes = [

@@ -32,18 +32,11 @@ if TYPE_CHECKING:
     from rotorid.worksheet.runs_so_far import Effect
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
-ROWS = 5
-"""Of readings and limits, the worst that are shown."""
 _NOT_TO_DO = re.compile(
     r"^(do not|measure|make a trial|fail|not as)|Take off what|Add nothing yet", re.I | re.M
 )
-_FOUR, _THREE, _TWO = (partial(figures, digits=n) for n in (4, 3, 2))
-_SHOWN: Mapping[str, Callable[[Any], str]] = {
-    **dict.fromkeys(("mass", "size", "limit"), _FOUR),
-    **dict.fromkeys(("before", "after"), _THREE),
-    "angle_deg": "{:.1f}°".format,
-    "speed_rpm": "{:.6g}".format,
-}
+_TWO = partial(figures, digits=2)
+_SHOWN: Mapping[str, Callable[[Any], str]] = {"mass": figures, "angle_deg": "{:.1f}°".format}
 _read: dict[str, int] = {}
 """Names of the files that were read, and when each was changed before that (ns)."""
 
@@ -195,7 +188,7 @@ def _work(labels: Labels) -> dict[str, str]:
 
 
 def _tables(document: Mapping[str, Any], made: Balance, labels: Labels) -> Markup:
-    """What to mount, with 95 % of it, or what is left to do; below it the largest readings and limits."""
+    """What to mount, with 95 % of it, or what is left to do."""
     from markupsafe import Markup
 
     left, pieces, last = document.get("left_to_do"), document.get("mounting"), document["mounted_in_last_run"]
@@ -210,20 +203,16 @@ def _tables(document: Mapping[str, Any], made: Balance, labels: Labels) -> Marku
         tables += [table("mounting.holes", work)]
     else:
         sizes, angles = made.result.half_widths()
-        within = [Column("±", sizes * labels.weight_scale, _TWO), Column("± °", np.degrees(angles), _TWO)]
+        within = [
+            Column(f"± {labels.weight_in}", sizes * labels.weight_scale, _TWO),
+            Column("± °", np.degrees(angles), _TWO),
+        ]
         tables += [table("corrections", work, more=within)]
         words += "95 of 100 such weights lie within ±. "
         if last and any(row["mass"] for row in last["weights"]):
             tables += [table("add_to_mounted", work, f"Instead, if the weights of {last['run']} stay")]
         if document["other_readings"]:
             tables += [table("other_readings", {"if": "if", **work}, "Under another convention")]
-    if "verdict" in document:
-        limits = {"name": "limit of", "speed_rpm": "rpm", "size": "is", "limit": "limit", "verdict": ""}
-        tables += [table("verdict.rows", limits, "Limits", worst=lambda row: row["size"] / row["limit"])]
-    after = {"sensor": "sensor", "speed_rpm": "rpm", "before": "before", "after": "after"}
-    path, name = "mounting.residuals" if pieces and not left else "residuals", "Largest readings expected"
-    unit = labels.vibration_in and f", {labels.vibration_in}"
-    tables += [table(path, after, name + unit, worst=lambda row: row["after"])]
     words += f"Angles count {labels.angles}, phase {labels.phase}."
     first, *others = map(html, tables)
     return Markup("\n").join([first, Markup("<p>{}</p>").format(words), *others])
@@ -243,11 +232,9 @@ def _table(
     name: str = "",
     *,
     more: Sequence[Column] = (),
-    worst: Callable[[Mapping[str, Any]], float] | None = None,
 ) -> Table:
-    """Rows of the document, all or the worst; columns in which nothing stands are left out."""
+    """Rows of the document; columns in which nothing stands are left out."""
     rows = _at(document, path)
-    rows = rows if worst is None else sorted(rows, key=worst, reverse=True)[:ROWS]
     if all(row.get("action") == "add" for row in rows):  # which needs no words
         headings = {key: text for key, text in headings.items() if key != "action"}
     columns = []
@@ -257,8 +244,7 @@ def _table(
             key = "remove_at_deg"  # where it is drilled
         if key.endswith("_deg") and any("hole" in row for row in rows):
             shown = "{:.6g}°".format  # holes are where they are
-        place = f"{path}.*.{key}" if worst is None else ""
-        columns.append(Column(heading, [row.get(key) for row in rows], shown, place))
+        columns.append(Column(heading, [row.get(key) for row in rows], shown, f"{path}.*.{key}"))
     return Table(name, (*(one for one in columns if any(one.texts)), *more))
 
 

@@ -220,6 +220,7 @@ class View:
         column, closed = self.column(what, key), self.job.read_only or self.job.tables[key].read_only
         name = f"{key}|{row['id']}|{column}"
         why = next((one.text for one in self.problems if one.cell == name and not one.missing), "")
+        why = why.partition(": ")[2]
         edit = {"table": key, "row": row["id"], "column": column}
         return Cell(name, row[what], f"{what}, {row['run']}, {place}", edit, bool(closed), why)
 
