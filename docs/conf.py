@@ -29,7 +29,6 @@ extensions = [
     "mathml",
     "methods",
     "names",
-    "results",
     "tables",
 ]
 exclude_patterns = ["_build", "_ext"]
