@@ -42,10 +42,9 @@ from balancing.tables import (
     weight_rows,
 )
 from balancing.trials import Trials
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, rows, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, rows, text
 from rotorid.base.text import figures, listing, sentence
 from rotorid.regression import solution, unstretch
 

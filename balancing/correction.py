@@ -25,10 +25,9 @@ from balancing.tables import (
     weight_columns,
     weight_rows,
 )
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, cut, figures, listing, wrap
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from balancing.noise import Mounted as Mounted
 from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import RPM, rpm_text
 from rotorid.regression import gain
 
 SPEED_TOLERANCE = 0.005

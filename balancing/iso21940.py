@@ -43,11 +43,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import FloatArray
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm, rpm_text
-from rotorid.base.text import figures
+from rotorid.base.text import figures, rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd

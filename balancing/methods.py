@@ -48,7 +48,7 @@ from balancing.cones import (
 )
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
 from rotorid.regression import covariance_root, solution, solution_and_rank, stretch, unstretch
 

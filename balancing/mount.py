@@ -33,10 +33,9 @@ from balancing.tables import (
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:

@@ -25,9 +25,9 @@ from balancing.tables import (
     weight_columns,
 )
 from balancing.trials import Limits
+from rotorid.base.answer import Column, rows
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, rows
 from rotorid.base.text import figures
 
 HELD = 1e-5

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from balancing.conventions import Labels
 from balancing.errors import Reading, RunErrors
 from balancing.errors import rms as rms
+from rotorid.base.answer import Column, rows
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column, rows
-from rotorid.base.rpm import RPM, rpm
-from rotorid.base.text import figures
+from rotorid.base.text import RPM, figures, rpm
 
 ROUNDING = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""

@@ -40,12 +40,18 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.arrays import (
+    AnyArray,
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    IndexArray,
+    checked_speeds,
+    whole,
+)
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, listing
+from rotorid.base.text import RPM, counted, listing, range_text
 
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""

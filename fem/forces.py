@@ -47,11 +47,9 @@ from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.checks import attachment, number
+from rotorid.base.arrays import FloatArray, IndexArray, attachment, number
+from rotorid.base.choices import Method, one_of
 from rotorid.base.compiled import compiled_part
-from rotorid.base.registry import Method
-from rotorid.base.suggestions import one_of
 
 Film = Literal["pressure", "line of centres"]
 """Where a journal's film carries: where its pressure is positive, or on the half circle that the line of

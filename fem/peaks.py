@@ -30,9 +30,8 @@ from fem.rotor import SensorLike
 from fem.undamped import critical_speeds_below
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import listing
+from rotorid.base.text import RPM, listing, rpm_text
 
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
 LARGEST_MARGINS = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above

@@ -52,12 +52,10 @@ from fem.undamped import (
     lowest_modes,
     one_plane,
 )
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray, checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted
+from rotorid.base.text import RPM, counted, phase_deg, range_text, rpm_text
 
 Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
 """`{node or station: m r e^{iφ}}`, kg·m."""

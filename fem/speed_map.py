@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, Support
 from fem.undamped import lowest_critical_speeds
-from rotorid.base.arrays import FloatArray
-from rotorid.base.checks import whole
+from rotorid.base.arrays import FloatArray, whole
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM
 
 
 @holding_arrays

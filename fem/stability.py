@@ -35,11 +35,10 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text, speed_text
 from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM, rpm_text, speed_text
 
 AWAY = 1e-6
 """Part of the lowest frequency above which a real eigenvalue runs away."""

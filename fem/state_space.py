@@ -17,8 +17,7 @@ import numpy as np
 from fem.assembly import both_planes, project
 from fem.result import holding_arrays
 from fem.rotor import Rotor
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.checks import number
+from rotorid.base.arrays import ComplexArray, FloatArray, number
 
 
 @holding_arrays

@@ -37,12 +37,10 @@ from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, Support
 from fem.undamped import Spectrum, finite_modes, lowest_modes
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, checked_speeds, whole
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, speed_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted
+from rotorid.base.text import RPM, counted, speed_text
 
 GROWTH = 1e-14
 """Re λ / |λ| above which a mode grows: rounding of what damps and drives it."""

@@ -123,7 +123,7 @@ def test_every_package_says_what_it_is_for():
     "pattern",
     [
         r"^\s*\w+ = NDArray\[",  # array types: rotorid.base.arrays
-        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.rpm
+        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.text
         r"float\(\w+\) if (np|math)\.isfinite\(\w+\) else None",  # JSON: rotorid.base.json
     ],
 )

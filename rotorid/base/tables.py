@@ -28,10 +28,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.json import cell
+from rotorid.base.json import SCHEMA_VERSION, cell, now
 from rotorid.base.text import WIDTH
 from rotorid.base.text import table as aligned
-from rotorid.base.versions import SCHEMA_VERSION, now
 
 if TYPE_CHECKING:
     import pandas as pd

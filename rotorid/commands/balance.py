@@ -92,7 +92,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
     options = options or BalanceOptions()
     _check(options)
-    read, files = job_of(job, options)
+    read, files, again = job_of(job, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -102,7 +102,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         solved = solve(read, options) if options.refine else solved
     influence, runs = solved.known
     # what was proposed before a refinement was proposed by these conventions and no others
-    result = with_other_conventions(solved, read, files if stated or not options.refine else None, options)
+    result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
     mounted, check, left = None, None, None
     if options.split and read.check_pieces is not None and not options.refine:
         mounted = read.check_pieces
@@ -123,9 +123,9 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     def workbook(_: Path) -> Written:
         from rotorid.files.job_excel import job_workbook_bytes
 
-        if files is None:
+        if not files:
             raise ValueError("a workbook is made of the files of a job: give these, not what was read")
-        return job_workbook_bytes(files.files, outcome, made)
+        return job_workbook_bytes(files, outcome, made)
 
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
@@ -212,7 +212,7 @@ def _answer(
 
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
-    return replace(answer, found="", tables=(answer.found, *answer.tables))
+    return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
 
 
 def _figure(

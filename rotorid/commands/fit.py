@@ -16,7 +16,7 @@ from rotorid.report.options import check_choices, file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
-    from rotorid.base.registry import Method
+    from rotorid.base.choices import Method
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
     from rotorid.report.equations import Equations

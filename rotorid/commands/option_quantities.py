@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from typing import TYPE_CHECKING, get_args
 
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.words import Angles
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
@@ -118,8 +117,7 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.files.units import Quantity
-    from rotorid.files.weights_with_units import in_job_units
+    from rotorid.files.units import Quantity, in_job_units
 
     unit = labels.weight_unit
     amount = _weight(given, what, example) if isinstance(given, str) else (given, _si(unit))

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from rotorid.base.answer import Column as Told
+from rotorid.base.answer import rows
 from rotorid.base.json import plain
-from rotorid.base.result import Column as Told
-from rotorid.base.result import rows
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, listing
+from rotorid.base.text import RPM, counted, listing
 from rotorid.commands.quantities import Speeds, speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 

@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted
 from rotorid.files.input_file import file_content
 from rotorid.files.problems import Problems, TableWarning

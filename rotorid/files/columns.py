@@ -14,7 +14,7 @@ from typing import SupportsIndex
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.base.text import listing
 from rotorid.files.cells import (
     BadCell,

@@ -10,8 +10,7 @@ from pydantic import PlainValidator, create_model
 
 from fem import NodeForce, Rotor
 from fem.forces import FORCES, Film, kind_of
-from rotorid.base.registry import find
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean, find
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.problems import InputError, Problems

@@ -8,10 +8,10 @@ names over several columns.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.files import units
 from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
@@ -183,27 +183,19 @@ def readable(stem: str, text: str) -> bool:
     return True
 
 
-def read_headings(
-    header: Sequence[str], named: Mapping[str, str] | None = None, *, weights: bool = False
-) -> list[Heading]:
-    """What the headings of a runs table, or of a weights table, say.
-
-    `named` are names of a runs table by names that the file has.
-    """
+def read_headings(header: Sequence[str], *, weights: bool = False) -> list[Heading]:
+    """What the headings of a runs table, or of a weights table, say."""
     probes = any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is a probe, else an order
-    headings = [
-        _heading(Heading(i, name), (named or {}).get(name, name), probes=probes, weights=weights)
-        for i, name in enumerate(header)
-    ]
+    headings = [_heading(Heading(i, name), probes=probes, weights=weights) for i, name in enumerate(header)]
     plain = [h for h in headings if h.stem == "run" and re.search("run", h.name, re.IGNORECASE)]
     if len(plain) == 1:  # beside it a column such as Condition says something else
         headings = [replace(h, stem="note") if h.stem == "run" and h is not plain[0] else h for h in headings]
     return headings
 
 
-def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, weights: bool) -> bool:
+def looks_like_header(cells: Sequence[str], *, weights: bool) -> bool:
     """Whether cells are surely the header of a table: most of its columns; of runs, run and speed."""
-    stems = {heading.stem for heading in read_headings(cells, named, weights=weights)}
+    stems = {heading.stem for heading in read_headings(cells, weights=weights)}
     if weights:
         return {"plane", "mass"} <= stems
     stems |= set(READING) if "vector" in stems else set()
@@ -211,7 +203,7 @@ def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, 
 
 
 def find_header(
-    rows: Sequence[Sequence[str]], named: Mapping[str, str] | None = None, *, weights: bool = False
+    rows: Sequence[Sequence[str]], *, weights: bool = False
 ) -> tuple[int, int, Sequence[str]] | None:
     """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
@@ -221,9 +213,9 @@ def find_header(
     for at, cells in enumerate(rows[:MOST_ABOVE]):
         last, names, below = at, cells, rows[at + 1 :]
         both = None if weights or not below else _joined(cells, below[0])
-        if both is not None and looks_like_header(both, named, weights=False):
+        if both is not None and looks_like_header(both, weights=False):
             last, names = at + 1, both
-        elif not looks_like_header(cells, named, weights=weights):
+        elif not looks_like_header(cells, weights=weights):
             continue
         units_below = None if last + 1 >= len(rows) else _with_units(names, rows[last + 1], weights=weights)
         return (at, last, names) if units_below is None else (at, last + 1, units_below)
@@ -263,7 +255,8 @@ def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
     return names if several and len(set(filled)) == len(filled) else None
 
 
-def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Heading:
+def _heading(unknown: Heading, *, probes: bool, weights: bool) -> Heading:
+    name = unknown.name
     if len(name) > LONGEST or name.startswith("//"):  # a line that was taken out
         return unknown
     beside = not weights and (DEVIATION.match(name) or _BESIDE.match(name))

@@ -1,4 +1,4 @@
-"""Planes of a job in its tables and its model, their limits and holes, and its check runs.
+"""Planes of a job in its tables and its model, their limits and holes.
 
 Where material is removed, a hole drilled at the angle φ acts like a weight added at φ + 180°. Holes and
 forbidden arcs then have the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is
@@ -12,42 +12,30 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials, from_list
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Source, source_name
+from rotorid.files.columns import Source
 from rotorid.files.conventions import Conventions
 from rotorid.files.decimal_numbers import NotANumber, parse_number
-from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
+from rotorid.files.job_models import JobSettings, Plane, Sensor
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
+from rotorid.files.runs import nearest_speed, show_speeds
 from rotorid.files.settings import Settings
-from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
-from rotorid.files.units import Quantity
+from rotorid.files.units import Quantity, in_job_units
 from rotorid.files.weights import read_weights
-from rotorid.files.weights_with_units import in_job_units
 
 if TYPE_CHECKING:
     from fem import Rotor
 
 IN_HOLE = 1e-3
 """Relative distance of a weight from the hole that it is in."""
-
-
-class Readings(NamedTuple):
-    """What the tables of a job say, with its conventions settled and slow roll subtracted."""
-
-    trials: Trials
-    influence: Influence | None
-    conventions: Conventions
-    errors: Errors | None
-    slow_roll: SlowRoll | None
 
 
 def in_model(
@@ -248,52 +236,3 @@ def with_taken(
         if (off.min(axis=1) <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
             out[plane] = replace(free, taken=taken)
     return out
-
-
-def check_runs(
-    tables: Mapping[str, Source],
-    readings: Readings,
-    trials: Trials,
-    planes: tuple[str, ...],
-    problems: Problems,
-) -> Trials | None:
-    """Check runs, fitted to the speeds, units and names of the job, or None and problems."""
-    runs, weights, labels = tables["check"], tables.get("check_weights"), trials.labels
-    check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
-    if check is None:
-        return None
-    before, files = len(problems), [source_name(runs), source_name(runs if weights is None else weights)]
-    has, must = (
-        (units.vibration(x.vibration_unit), units.weight(x.weight_unit)) for x in (check.labels, labels)
-    )
-    for k, column in enumerate(("amplitude", "weight")[: 1 if weights is None else 2]):
-        if has[k].kind != must[k].kind:
-            expected = (
-                f"{column}s in {must[k].name or 'no unit'}, as the job has, or in one that converts to it"
-            )
-            problems.add(files[k], None, column, has[k].name or "no unit", expected)
-    names = ("sensor", check.sensors, trials.sensors), ("plane", check.planes, planes)
-    for file, (noun, there, known) in zip(files, names, strict=True):
-        for name in (name for name in there if name not in known):
-            expected = f"a {noun} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
-            problems.add(file, None, noun, name, expected)
-    unit, tolerance = units.SPEED[check.labels.speed_unit], readings.conventions.speed_tolerance_percent
-    near = [nearest_speed(trials.speeds, speed, tolerance) for speed in check.speeds.tolist()]
-    for k, at in enumerate(near):
-        if at is None or at in near[:k]:
-            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
-            problems.add(files[0], None, "speed", show_speed(float(check.speeds[k]), unit), expected)
-    if len(problems) > before:
-        return None
-    shown, mounted = check.planes, check.weights
-    if weights is not None:
-        # all planes of the job: a weights table without rows says that nothing was mounted
-        shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
-        mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(
-        check, speeds=trials.speeds[[at or 0 for at in near]], labels=labels, planes=shown, weights=mounted
-    )
-    if readings.slow_roll is None:
-        return check
-    check = subtract_slow_roll(check, readings.slow_roll)
-    return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))

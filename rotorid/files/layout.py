@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.cells import Cell, Grid, Row, below_title, show
 from rotorid.files.columns import REMARKS, Source, read_grid
@@ -34,9 +33,6 @@ from rotorid.files.headings import (
 )
 from rotorid.files.problems import Problems
 from rotorid.files.units import UnitError, spelt
-
-if TYPE_CHECKING:
-    from rotorid.files.job_models import Columns
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
@@ -71,9 +67,9 @@ class _Column(NamedTuple):
     cells: Sequence[Cell]
 
 
-def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: bool = False) -> list[Row]:
+def rows_from_header(rows: Sequence[Row], *, weights: bool = False) -> list[Row]:
     """Rows of a sheet with the header of the table in one row; those above it become comments."""
-    return below_title(rows, partial(find_header, named=named, weights=weights))
+    return below_title(rows, partial(find_header, weights=weights))
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
@@ -94,7 +90,7 @@ def read_runs_grid(
     source
         A file, a folder or a tuple with one file a run, or the cells of a sheet.
     conventions
-        What phases mean, how the job says that columns are named, and the speed where no column has it.
+        What phases mean, whether columns are exchanged, and the speed where no column has it.
     problems
         Collects the complaints.
     first
@@ -109,14 +105,13 @@ def read_runs_grids(
 ) -> list[Grid] | None:
     """The same of each file; a file of several without a column of runs is one run, named as the file."""
     files = source if isinstance(source, tuple) else files_of_runs(source)
-    named, grids = _names_of(conventions.columns), list[Grid]()
+    grids = list[Grid]()
     for file in files or (source,):
-        grid = read_grid(file, "runs", problems, first=first, find=partial(find_header, named=named))
-        stated = conventions.columns
-        if grid is None or (stated is not None and not _are_there(stated, grid, problems)):
+        grid = read_grid(file, "runs", problems, first=first, find=find_header)
+        if grid is None:
             continue
         with explained(grid, problems):
-            grid = _runs_form(grid, named, conventions)
+            grid = _runs_form(grid, conventions)
             if isinstance(file, Path) and files and "run" not in grid.header:
                 rows = tuple((number, (file.stem, *cells)) for number, cells in grid.rows)
                 names = tuple(("run", *row) for row in grid.named)
@@ -134,15 +129,14 @@ def explained(grid: Grid, problems: Problems) -> Iterator[None]:
         problems.add(grid.source, reason.row or grid.header_row, reason.column, reason.value, str(reason))
 
 
-def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None:
+def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
-    named, words = _names_of(columns), set[str]()
+    words = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file that is read once more
-            find = partial(find_header, named=named)
-            grid = read_grid(file, "runs", Problems(), first=True, find=find, top=True)
-        for heading in read_headings(grid.header, named) if grid else ():
+            grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
+        for heading in read_headings(grid.header) if grid else ():
             if heading.stem == "phase" and readable("phase", heading.unit):
                 words |= {*PHASES} & {read_unit("phase", heading.unit)[1]}
     return as_phase(words.pop()) if len(words) == 1 else None
@@ -164,25 +158,8 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     return replace(first, source=source, rows=tuple(rows), named=())
 
 
-def _names_of(columns: Columns | None) -> dict[str, str]:
-    """Names of a runs table by the names that the job says its file has."""
-    return (
-        {} if columns is None else {name: columns.written(field) for name, field in columns.in_file().items()}
-    )
-
-
-def _are_there(columns: Columns, grid: Grid, problems: Problems) -> bool:
-    """Whether the file has the columns that the job names; else a problem of the job."""
-    there, before = [*filter(None, grid.header)], len(problems)
-    for name, field in columns.in_file().items():
-        if name not in there and columns.written(field) not in there:
-            hint = f"{did_you_mean(name, there)}; its columns are {listing(there, 'and')}"
-            columns.complain(problems, field, f"a column of {grid.source}{hint}")
-    return len(problems) == before
-
-
-def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
-    headings = read_headings(grid.header, named)
+def _runs_form(grid: Grid, conventions: Conventions) -> Grid:
+    headings = read_headings(grid.header)
     for heading in headings:
         if heading.stem.endswith("X"):
             other = "delete the column, or begin its name with note (if it is a probe: with P)"
@@ -231,6 +208,11 @@ def long_rows(
         if _name(column) != name:
             raise Unclear(f"the unit of all {key}s, {name}", column.heading)
     header = [_name(column, k) for k, column in enumerate(common)]
+    if key == "sensor" and conventions.exchanged:
+        groups = [
+            [c._replace(heading=o.heading, cells=o.cells) for c, o in zip(own, own[::-1], strict=True)]
+            for own in groups
+        ]
     long: list[Row] = []
     taken = [tuple(c.heading.name for c in (*common, *own[:wide], *own)) for own in groups]
     for k, (number, _) in enumerate(rows):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.forces import whole
 from rotorid.files.problems import Problems, TableWarning

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.files.input_file import STANDARD_INPUT
 
 _T = TypeVar("_T")

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray, off_axis, turned
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
@@ -216,7 +215,7 @@ def read_runs(
         _placed(vectors[rows], at, shape),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=words + _which_mm_s(table),
+        warnings=words + _which_mm_s(table, "phase" if conventions.exchanged else "amplitude"),
         steps=_placed(steps[:, rows], at, shape),
         covariance=covariance,
     )
@@ -325,9 +324,9 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
     return table
 
 
-def _which_mm_s(table: Table) -> tuple[str, ...]:
+def _which_mm_s(table: Table, stem: str) -> tuple[str, ...]:
     """How mm/s alone are read, below a heading that does not say it."""
-    heading, unit = table.fields["amplitude"].heading, table.unit("amplitude").name
+    heading, unit = table.fields[stem].heading, table.unit("amplitude").name
     if unit not in ("mm_s", "mm_s_rms") or re.search("mm_s|rms|peak|pk", heading, re.IGNORECASE):
         return ()
     read, other = ("peak", "rms") if unit == "mm_s" else ("rms", "the peak")
@@ -337,27 +336,19 @@ def _which_mm_s(table: Table) -> tuple[str, ...]:
 
 
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
-    """Amplitudes that look like angles beside phases that look like amplitudes, unless the job names both."""
-    stated = conventions.columns
-    if (
-        (stated is not None and stated.has("amplitude"))
-        or table.unit("phase").name != "deg"
-        or len(table) < 4
-    ):
+    """Amplitudes that look like angles beside phases that look like amplitudes, unless the job says it."""
+    if conventions.exchanged is not None or table.unit("phase").name != "deg" or len(table) < 4:
         return
     unit = table.unit("amplitude")
     amplitude, phase = table.numbers("amplitude") * unit.scale, np.degrees(table.numbers("phase"))
     like_angles = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
     small = np.all(np.abs(phase) < 30) and np.any(table.steps("phase") < np.radians(0.5))
     if like_angles and np.ptp(amplitude) > 90 and small:
-        one, other = table.fields["amplitude"].heading, table.fields["phase"].name
-        key = f"amplitude_{unit.name}" if unit.name else "amplitude"
         expected = (
-            "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, and "
-            f'all amplitudes look like angles. If they are, state [columns] {key} = "{other}", phase_deg = '
-            f'"{one}" in the job; if not, {key} = "{one}", phase_deg = "{other}"'
+            "amplitudes and phases in their own columns: are they exchanged? All phases are below 30° and "
+            "all amplitudes look like angles: state exchanged = true in the job, or exchanged = false"
         )
-        table.as_whole(one, expected)
+        table.as_whole(table.fields["amplitude"].heading, expected)
 
 
 def _complain_about_repeats(table: Table) -> None:

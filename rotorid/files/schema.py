@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotorid.base.suggestions import one_of
+from rotorid.base.choices import one_of
 from rotorid.files.job_models import JobSettings
 from rotorid.files.rotor import RotorFile
 from rotorid.files.settings import Settings, settings_schema

@@ -33,9 +33,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
-from rotorid.base.versions import SCHEMA_VERSION
 from rotorid.files.decimal_numbers import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.problems import Problem, Problems
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader

@@ -14,8 +14,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from fem import GRAVITY, Motion
-from rotorid.base.arrays import FloatArray
-from rotorid.base.complex_numbers import polar
+from rotorid.base.arrays import FloatArray, polar
 from rotorid.files import units
 from rotorid.files.bearing import Attached, read_attached, support_tables
 from rotorid.files.forces import Place, Places, each, force_tables, whole

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.files.cells import read_bytes
 from rotorid.files.problems import Problems
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION
 
 
 def toml_bytes(data: Mapping[str, Any], comments: Iterable[str] = ()) -> bytes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 
 STANDARD_GRAVITY = 9.80665
@@ -206,3 +206,20 @@ def spelt(name: str) -> str:
     """A unit's name as this project spells it: `µm` is `um`, `mm/s` is `mm_s`, `lbs` is `lb`."""
     spelling = name.translate(_SPELLING)
     return "lb" if spelling == "lbs" else spelling
+
+
+def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:
+    """A mass or unbalance, or several, in kg or kg·m, as weights in a unit are.
+
+    Returns
+    -------
+    None where masses and unbalances convert only with a radius, m, and there is none.
+    """
+    values = weight.value if isinstance(weight.value, tuple) else (weight.value,)
+    sizes = tuple(map(weight.unit.to_si, values))
+    wanted = WEIGHT[unit].kind
+    if weight.unit.kind == wanted:
+        return sizes
+    if radius is None:
+        return None
+    return tuple(size * radius if wanted == "unbalance" else size / radius for size in sizes)

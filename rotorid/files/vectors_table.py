@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from balancing import Labels
-from rotorid.base.words import Phase
+from rotorid.base.text import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
 from rotorid.files.cells import Grid

@@ -15,12 +15,10 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
 from balancing import Labels
+from rotorid.base.answer import Column
 from rotorid.base.arrays import AnyArray, significant
-from rotorid.base.result import Column
-from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.words import Phase
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import RPM, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase

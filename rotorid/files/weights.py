@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid, show

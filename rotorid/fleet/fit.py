@@ -8,9 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, figures
+from rotorid.base.text import RPM, counted, figures
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:

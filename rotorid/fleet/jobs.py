@@ -127,9 +127,9 @@ def _rows(file: Path, path: str, machine_type: str | None) -> list[dict[str, Any
         quantity, weight_kind = kind_of(job.trials.labels)
         shared = {
             "job": path,
-            "machine": job.machine or machine_of(file),
-            "machine_type": job.machine_type or (parts[0] if len(parts) > 2 else machine_type or ""),
-            "date": "" if job.date is None else job.date.isoformat(),
+            "machine": job.settings.machine or machine_of(file),
+            "machine_type": job.settings.machine_type or (parts[0] if len(parts) > 2 else machine_type or ""),
+            "date": "" if job.settings.date is None else job.settings.date.isoformat(),
             "quantity": quantity,
             "weight_kind": weight_kind,
             "vibration_unit": job.trials.labels.vibration_unit,

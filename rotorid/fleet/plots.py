@@ -8,7 +8,7 @@ import numpy as np
 
 from balancing import region_edge
 from rotorid.base.plot_style import legend_below, look, new_figure, plain
-from rotorid.base.rpm import rpm_text
+from rotorid.base.text import rpm_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

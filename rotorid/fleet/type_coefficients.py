@@ -82,7 +82,11 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     file, _, name = address.rpartition(":")
     if not file or not name:
         raise ValueError(f"--type {address!r}: expected the table of a fleet and a type, FLEET.parquet:TYPE")
-    fleet, trials, machine = read_fleet(Path(file)), job.trials, job.machine or machine_of(job.files[0])
+    fleet, trials, machine = (
+        read_fleet(Path(file)),
+        job.trials,
+        job.settings.machine or machine_of(job.files[0]),
+    )
     planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
     radii = tuple(job.radii.get(plane, np.nan) for plane in planes)
     grid = Grid(trials.speeds, trials.sensors, planes, *kind_of(trials.labels), radii)

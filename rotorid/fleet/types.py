@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from balancing import Labels, UndeterminedError
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted, listing
 from rotorid.files.conventions import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight

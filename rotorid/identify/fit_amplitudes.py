@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.registry import find
+from rotorid.base.choices import find
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, why_several

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit
 from rotorid.identify.expressions import finite

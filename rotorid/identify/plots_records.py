@@ -7,11 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, legend_below, look, new_figure, plain
+from rotorid.base.plot_style import (
+    BLUE,
+    DARK,
+    MARKERS,
+    QUIET,
+    ROOM,
+    TEXT,
+    draw_intervals,
+    legend_below,
+    look,
+    new_figure,
+    plain,
+)
 from rotorid.base.text import counted
 from rotorid.identify.records import refined
 from rotorid.identify.simulation import STEPWISE, simulate
-from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

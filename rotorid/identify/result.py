@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, percent, sentence
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.linear_start import LinearFit

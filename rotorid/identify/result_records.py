@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base import tables
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, frame
 from rotorid.base.json import plain
-from rotorid.base.result import frame
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
@@ -139,14 +138,14 @@ class Fit(Answered, Iterations):
             judgement = f"NO intervals: {warnings.pop(0)}."
         else:
             judgement = f"NO intervals, see why. {judgement}"
-        found = f"{parts.found}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
-        found += f"\n  residual rms {self.residual_rms:.4g}"
+        numbers = f"{parts.numbers}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
+        numbers += f"\n  residual rms {self.residual_rms:.4g}"
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
         return replace(
             parts,
             judgement=judgement,
-            found=found,
+            numbers=numbers,
             warnings=tuple(warnings),
             notes=parts.notes if self.described or self.estimate.dof <= 0 else (),
             tables=tuple(texts),

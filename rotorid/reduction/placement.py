@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
-from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.checks import whole
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, numbered, text
+from rotorid.base.arrays import FloatArray, IndexArray, whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.text import counted
 from rotorid.reduction.masses import (
     Normalisation,

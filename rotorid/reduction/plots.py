@@ -25,8 +25,7 @@ from rotorid.base.plot_style import (
     plain_numbers,
     rad_s_above,
 )
-from rotorid.base.rpm import RPM
-from rotorid.base.text import counted
+from rotorid.base.text import RPM, counted
 from rotorid.reduction.masses import like
 from rotorid.reduction.placement import NAMED
 

@@ -42,8 +42,7 @@ from fem.assembly import (
 )
 from fem.forces import kind_of
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, read_only
-from rotorid.base.checks import checked_speeds, number
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, checked_speeds, number, read_only
 from rotorid.base.text import counted, listing
 from rotorid.reduction.condensation import held, static_shapes
 from rotorid.reduction.masses import bending_stiffness, mass_nodes, natural_frequencies, plane_at_rest

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import cell, plain
-from rotorid.base.result import Column
 from rotorid.base.text import error_figures, percent, sentence, table
 from rotorid.regression.undetermined_combinations import (
     Combination,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.registry import find
+from rotorid.base.choices import find
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.prior import Prior

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from rotorid.base.answer import Column, text
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
 from rotorid.regression.linear import least_squares
 from rotorid.regression.search import RCOND
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 
 Rho = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 

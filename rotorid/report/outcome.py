@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import COLUMNS, LINES, Answer, Answered
+from rotorid.base.json import SCHEMA_VERSION, now
 from rotorid.base.tables import Column, Table, csv, frame, terminal
 from rotorid.base.text import capital, listing
-from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.report.options import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -192,7 +192,7 @@ def outcome_of(
     draw = getattr(result, "figure", None)
     given: dict[str, Any] = {
         "sentences": tuple(told.judgement.splitlines()),
-        "tables": tuple(filter(None, [told.found])),
+        "tables": tuple(filter(None, [told.numbers])),
         "more": told.tables,
         "beyond": told.more,
         "warnings": told.warnings,

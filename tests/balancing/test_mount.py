@@ -93,4 +93,4 @@ def test_a_set_is_enough_where_every_limit_passes_by_the_verdict(share):
     assert verdict.overall == exact
     assert found.check_rms <= max(1.2 * c.check_rms, 0.2 * rms(c.before)) or exact == "pass"
     assert np.abs(found.after).max() <= most
-    assert ("No set of pieces is enough" in found.answer.found) == (not found.discrete.enough)
+    assert ("No set of pieces is enough" in found.answer.numbers) == (not found.discrete.enough)

@@ -44,7 +44,7 @@ def test_a_trim_makes_it_better(seed):
     document = left.to_dict()
     assert [row["mass"] for row in document["add"]] == pytest.approx(np.abs(left.trim) * 1e3)
     assert left.answer.judgement.startswith("Trim; rms ")
-    assert left.answer.found.count(" add ") == 2
+    assert left.answer.numbers.count(" add ") == 2
 
 
 def test_limits_decide_where_there_are_some():

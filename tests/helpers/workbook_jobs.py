@@ -98,7 +98,9 @@ def _parts(value):
     if dataclasses.is_dataclass(value):
         names = (field.name for field in dataclasses.fields(value) if field.name not in _NOT_SAID)
         return type(value), ".{}", {name: getattr(value, name) for name in names}
-    if isinstance(value, (Mapping, Settings)):
+    if isinstance(value, Settings):
+        return Mapping, ".{}", {key: part for key, part in value if key not in TABLES}
+    if isinstance(value, Mapping):
         return Mapping, ".{}", dict(value)
     if isinstance(value, (tuple, list)):
         return list, "[{}]", dict(enumerate(value, start=1))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.base.registry import Method, described, find, names
+from rotorid.base.choices import Method, described, find, names
 from rotorid.identify.fit_records import METHODS
 from rotorid.identify.simulation import INTEGRATORS
 from rotorid.regression.robust import LOSSES

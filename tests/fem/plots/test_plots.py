@@ -16,7 +16,7 @@ from fem.plots.campbell import campbell_figure, draw_speed_map
 from fem.plots.response import bode_figure, draw_orbits, draw_polar, influence_figure, polar_figure
 from fem.plots.rotor import radii, surface
 from rotorid.base.plot_style import new_axes
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 from rotorid.plots import plot
 
 mpl.use("Agg")

@@ -140,9 +140,13 @@ def test_stored_coefficients(folder, stored, job):
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
-        ("sensor", "C", "coefficients of sensor 'C', as the runs table has; there are A and B"),
-        ("speed_rpm", 1100, "coefficients at 1100 rpm, as the runs table has; there are 1000 rpm"),
-        ("amplitude_um_pp", None, "coefficients in mm_s or a unit that converts, as the runs"),
+        ("sensor", "C", "coefficients for sensor 'C', which the readings have; there are A and B"),
+        ("speed_rpm", 1100, "coefficients for speed '1100 rpm', which the readings have; there are 1000 rpm"),
+        (
+            "amplitude_um_pp",
+            None,
+            "coefficients for amplitude 'mm_s', which the readings have; there are um_pp",
+        ),
     ],
 )
 def test_coefficients_that_do_not_fit(folder, stored, column, value, words):

@@ -150,8 +150,8 @@ def test_a_check_with_nothing_mounted(job, folder):
 
 
 BAD_CHECKS = [
-    (3, "sensor", "C", "check.csv", "sensor", "C", "a sensor of the job; there are A and B"),
-    (1, "amplitude_um_pp", "amplitude_mm_s", "check.csv", "amplitude", "mm_s", "amplitudes in um_pp"),
+    (3, "sensor", "C", "check.csv", "sensor", "C", "what the job has: A and B"),
+    (1, "amplitude_um_pp", "amplitude_mm_s", "check.csv", "amplitude", "mm_s", "what the job has: um_pp"),
     (2, "phase_deg", "x", "check.csv", "phase_deg", "x", "a number"),
 ]
 
@@ -168,11 +168,11 @@ def test_check_runs_at_other_speeds_and_planes(job, folder):
     write_csv(folder / "mounted.csv", replaced(CHECK_WEIGHTS, 2, "plane", "3"))
     found = complaints(job, TABLES + 'check = "check.csv"\ncheck_weights = "mounted.csv"')
     assert [(p.column, p.value) for p in found] == [("plane", "3"), ("speed", "1200 rpm")]
-    assert "there are 1000 rpm" in found[1].expected
+    assert "what the job has: 1000 rpm" in found[1].expected
     write_csv(folder / "mounted.csv", [["run", "plane", "unbalance_g_mm", "angle_deg"], *CHECK_WEIGHTS[1:]])
     write_csv(folder / "check.csv", CHECK)
     found = complaints(job, TABLES + 'check = "check.csv"\ncheck_weights = "mounted.csv"')
-    the_only(found, "mounted.csv", None, "weight", "g_mm", "weights in g, as the job has")
+    the_only(found, "mounted.csv", None, "weight", "g_mm", "what the job has: g, or a unit that converts")
     found = complaints(job, TABLES + 'check_weights = "mounted.csv"')
     the_only(found, "job.toml", None, "check_weights", "mounted.csv", "the check runs too")
 

@@ -9,7 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 from balancing import ReadingErrors, Trials, correct, estimate_influence
 from balancing.errors import reading_covariance
 from rotorid.files import read_job
-from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
+from rotorid.files.further_runs import subtract_slow_roll
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 VECTORS = """[slow_roll.A]
@@ -114,7 +114,7 @@ def test_a_sensor_without_a_vector(job):
     read = job(TABLES + only_b)
     np.testing.assert_allclose(read.slow_roll, [0, S[1]], rtol=1e-12)
     (words,) = read.trials.warnings
-    assert words.startswith("there is no slow-roll vector for sensor 'A': its readings are used as they are")
+    assert words.startswith("there is no slow-roll vector for 'A': what is read there is used as it is")
     nothing = "[slow_roll.A]\namplitude = 0\nphase_deg = 0\n"
     assert job(TABLES + nothing + only_b).trials.warnings == ()
 
@@ -160,7 +160,7 @@ def test_the_floor_covers_the_measured_error_on_average():
         stated = Trials(
             measured.runs, [100.0], ("A",), (), measured.readings, measured.weights, errors=errors
         )
-        found = subtract_slow_roll(stated, SlowRoll(("A",), np.array([runout + 0j])))
+        found = subtract_slow_roll(stated, np.array([runout + 0j]))
         assert found.errors is not None
         ours = reading_covariance(vibration, found.errors).mean(axis=0)
         theirs = reading_covariance(vibration + runout, errors).mean(axis=0)
@@ -209,9 +209,9 @@ def test_bad_vectors(job, old, new, key, value, words):
 
 
 BAD_FILES = [
-    (1, "amplitude_um_pp", "amplitude_mm_s", "amplitude", "mm_s", "an amplitude in um_pp"),
-    (1, "amplitude_um_pp", "amplitude", "amplitude", "no unit", "an amplitude in um_pp"),
-    (3, "sensor", "C", "sensor", "C", "a sensor of the job; its sensors are A and B"),
+    (1, "amplitude_um_pp", "amplitude_mm_s", "amplitude", "mm_s", "what the job has: um_pp"),
+    (1, "amplitude_um_pp", "amplitude", "amplitude", "no unit", "what the job has: um_pp"),
+    (3, "sensor", "C", "sensor", "C", "what the job has: A and B"),
 ]
 
 

@@ -190,8 +190,8 @@ def test_opposite_columns_are_named_with_what_is_determined():
     assert document["identifiable"] is False
     assert document["parameters"]["b"]["value"] is None
     assert document["combinations"] == {"b − δb": {"value": pytest.approx(-2.0), "std": combination.std}}
-    assert estimate.answer.found.count("not determined") == 2
-    assert len(re.findall(r"^  \w+ {2,6}not determined$", estimate.answer.found, re.MULTILINE)) == 2
+    assert estimate.answer.numbers.count("not determined") == 2
+    assert len(re.findall(r"^  \w+ {2,6}not determined$", estimate.answer.numbers, re.MULTILINE)) == 2
 
 
 def test_columns_of_very_different_size_do_not_look_dependent():

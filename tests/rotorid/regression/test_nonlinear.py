@@ -140,7 +140,7 @@ def test_a_parameter_at_its_bound_is_named_and_held():
     document = fit.estimate.to_dict()["parameters"]["slope"]
     assert document["std"] is None
     assert document["ci95"] is None
-    assert "at its bound" in fit.estimate.told(fit.at_bounds).found
+    assert "at its bound" in fit.estimate.told(fit.at_bounds).numbers
     assert "nan" not in fit.estimate.told(fit.at_bounds).brief()
     assert "slope stands at its bound" in fit.end_warnings[0]
 
