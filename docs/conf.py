@@ -25,9 +25,8 @@ extensions = [
     "numpydoc",
     "myst_parser",
     "commands",
-    "drawn",
+    "pictures",
     "mathml",
-    "methods",
     "names",
     "tables",
 ]
@@ -38,7 +37,8 @@ myst_heading_anchors = 4
 default_role = "literal"
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # docs/_ext/names.py writes them as the source does
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
 suppress_warnings = ["ref.python"]  # two results are called TradeOff, one of each package
