@@ -9,7 +9,7 @@ from repetitions import FULL
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, sosfilt
 
-from examples.vectors_accuracy import NOISE, RATE, accuracy, machine, main, record
+from coverage_vectors import NOISE, RATE, accuracy, machine, main, record
 from rotorid.waveforms.record import Channel, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import find_vectors
 
@@ -38,7 +38,7 @@ def remembered(function):
 @pytest.fixture(scope="module", autouse=True)
 def _integrated():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("examples.vectors_accuracy.solve_ivp", integrated)
+        patch.setattr("coverage_vectors.solve_ivp", integrated)
         yield
 
 
@@ -69,10 +69,10 @@ def test_a_run_up_through_a_resonance(run, seed):
 @pytest.mark.full
 def test_a_speed_that_ripples_and_the_table_of_the_page(run, capsys, monkeypatch):
     """Whose numbers are the worst of ten records, this one among them."""
-    monkeypatch.setattr("examples.vectors_accuracy.machine", lambda r: machine(r) if r else run)
+    monkeypatch.setattr("coverage_vectors.machine", lambda r: machine(r) if r else run)
     main(1)
     printed = capsys.readouterr().out.splitlines()
-    page = (Path(__file__).parents[3] / "docs" / "vectors_accuracy.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "sure.md").read_text(encoding="utf-8")
     shown = page.split("```text\n")[1].split("```")[0].splitlines()
     assert printed[0].partition(" ")[2] == shown[0].partition(" ")[2]
     assert printed[1] == shown[1]
