@@ -223,12 +223,12 @@ class CheckComparison(Answered):
             vector_columns(labels, name, values, rounding) for name, values in (("before", before), *each)
         )
         places = reading_columns(labels, self.speeds, self.sensors)
-        known = None if self.explained is None else self.covariance
+        covariance = None if self.explained is None else self.covariance
         return (
             Column("run", np.repeat(self.runs, before[0].size), str if R > 1 else None),
             *(replace(column, values=list(column.values) * R) for column in places),
             *chain.from_iterable(vectors),
-            covariance_column(labels, "covariance", known, before.size),
+            covariance_column(labels, "covariance", covariance, before.size),
             Column("distance", self.distance.ravel(), partial(figures, digits=2), "off by std"),
         )
 

@@ -134,8 +134,8 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
         parts[f"{100 * e.amplitude:.3g} % of the amplitude"] = e.amplitude
         parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
         parts[labels.amplitude_words(e.floor)] = e.floor
-    known = ", ".join(words for words, size in parts.items() if size) or "not known"
-    out = f"One standard deviation of a reading: {known} ({reading.source})"
+    stated = ", ".join(words for words, size in parts.items() if size) or "not known"
+    out = f"One standard deviation of a reading: {stated} ({reading.source})"
     what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
     sizes = zip(run.typical, what, strict=True)
     between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)

@@ -40,7 +40,7 @@ def test_the_command_line_starts_without_numerics():
 
 
 def test_only_what_moves_loads_the_compiler():
-    code = "import sys, fem, rotorid.commands.critical, rotorid.files.schema; print('numba' in sys.modules)"
+    code = "import sys, fem, rotorid.commands.critical, rotorid.files.rotor; print('numba' in sys.modules)"
     assert run_python(code) == "False\n"
 
 

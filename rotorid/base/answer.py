@@ -49,7 +49,6 @@ from rotorid.base.text import WIDTH, capital, counted, cut, table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
 LINES, COLUMNS = 12, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
@@ -221,11 +220,6 @@ class Column:
     values: Collection[Any]
     shown: Callable[[Any], str] | None = None
     title: str | None = None
-
-
-def numbered(name: str, values: NDArray[Any]) -> tuple[Column, ...]:
-    """The columns of an array, numbered from 1: `numbered("mass_{}_kg", masses)`."""
-    return tuple(Column(name.format(k), column) for k, column in enumerate(values.T, start=1))
 
 
 def rows(columns: Sequence[Column]) -> list[dict[str, Any]]:

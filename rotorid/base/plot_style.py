@@ -5,7 +5,7 @@ A picture is at most `WIDTH` wide and no letter of it smaller than `TEXT`: then 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,8 +29,6 @@ GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 """Behind words that stand on curves."""
 WARNING = "#8a3d00"
-ROOM = (0.6, 0.26)
-"""Inches that a picture of intervals needs, and that each value adds."""
 ABOVE_SCALE = 4.2
 """Room, in letters, between axes and a legend above their second scale."""
 
@@ -41,15 +39,6 @@ def new_axes(size: tuple[float, float] = (WIDTH, 4.2), **options: Any) -> Axes: 
 
     _, ax = plt.subplots(figsize=size, layout="constrained", subplot_kw=options)
     return ax
-
-
-def new_pair(height: float, ratios: tuple[int, int] = (3, 2)) -> tuple[Axes, Axes]:
-    """Make axes above others with the same horizontal axis, of a new figure, height in inches."""
-    from matplotlib import pyplot as plt
-
-    size: dict[str, Any] = {"figsize": (WIDTH, height), "height_ratios": ratios}
-    _, (above, below) = plt.subplots(2, sharex=True, layout="constrained", **size)
-    return above, below
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -170,34 +159,3 @@ def scale_beside(ax: Axes, unit: float, label: str) -> None:
 def times(factor: float) -> Callable[[ArrayLike], ArrayLike]:
     """A change of units, for a second scale."""
     return lambda value: np.asarray(value, float) * factor
-
-
-def draw_intervals(axes: Axes, intervals: Sequence[tuple[str, float, float, str]]) -> None:
-    """Draw intervals, each in percent of its own value, from the first value at the top.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    intervals
-        Name, value, half width of the interval, and what is said where one of the two is NaN.
-    """
-    shares = [100 * half / abs(value) if value else np.nan for _, value, half, _ in intervals]
-    widest = max((share for share in shares if np.isfinite(share)), default=0.0)
-    for i, ((_, value, _, words), share) in enumerate(zip(intervals, shares, strict=True)):
-        bounded = np.isfinite(share)
-        if np.isfinite(value):
-            face = DARK if bounded else "none"
-            axes.errorbar(0.0, i, xerr=share if bounded else None, fmt="o", color=DARK, mfc=face, capsize=4)
-        text = f"± {share:.2g} %" if bounded else words
-        axes.text(1.02, i, text, va="center", transform=axes.get_yaxis_transform(), fontsize=TEXT)
-    names = [f"{name} = {value:.4g}" if np.isfinite(value) else name for name, value, *_ in intervals]
-    axes.set_yticks(range(len(intervals)), names)
-    axes.set(xlim=(-1.15, 1.15), ylim=(len(intervals) - 0.4, -0.6))
-    if widest:
-        axes.set(xlim=(-1.15 * widest, 1.15 * widest), xlabel="95 % interval, % of the value")
-        axes.locator_params(axis="x", nbins=6)
-        axes.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
-    else:
-        axes.set_xticks([])
-    plain(axes)

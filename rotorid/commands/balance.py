@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
-    from rotorid.fleet.type_coefficients import TypeKnowledge
+    from rotorid.fleet.posterior import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
@@ -116,7 +116,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
     of_type = solved.of_type
-    made = provenance(read.files if of_type is None else of_type.files_beside(read), options)
+    made = provenance(read.files if of_type is None else of_type.files, options)
     beside = {"mounting": mounted, "check": check, "left_to_do": left, "verdict": verdict, "of_type": of_type}
     pieces = mounted if left is None else left.pieces
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotorid.base.choices import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files import Job
-    from rotorid.fleet.type_coefficients import TypeKnowledge
+    from rotorid.fleet.posterior import TypeKnowledge
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -116,8 +116,8 @@ class BalanceOptions:
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
         from rotorid.commands.app import check_targets
+        from rotorid.files.disk import write_files
         from rotorid.files.job_excel import template_bytes
-        from rotorid.files.table_writing import write_bytes
 
         path = self.template
         if job and path is None:
@@ -130,7 +130,7 @@ class BalanceOptions:
         check_targets([(path, (".xlsx",))])
         if path.exists():
             raise ValueError(f"{path}: exists already, and may be filled in; choose another name")
-        write_bytes(path, template_bytes())
+        write_files({path: template_bytes()})
         return f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}"
 
 
@@ -203,7 +203,7 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     if options.machine_type is None:
         known = choose(job, options.coefficients, refined=options.refine)
     else:
-        from rotorid.fleet.type_coefficients import type_coefficients
+        from rotorid.fleet.posterior import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         known = of_type.influence, None

@@ -118,7 +118,7 @@ class BearingEquilibria:
             For one speed, which would hold at all.
         """
         from fem import Rotor
-        from rotorid.files.rotor_writing import rotor_file_bytes
+        from rotorid.files.rotor import rotor_file_bytes
         from rotorid.files.small_model import small_model_files
 
         if len(self.found) < 2:

@@ -90,7 +90,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
     }
 
     def rotor_files(path: Path) -> Mapping[Path, bytes]:
-        from rotorid.files.rotor_writing import rotor_file_bytes
+        from rotorid.files.rotor import rotor_file_bytes
 
         if lacking := calibrated.undetermined:
             raise ValueError(f"{path}: no rotor file can be written, {lacking}")

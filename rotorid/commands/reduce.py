@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.files.modes import MeasuredModes
+    from rotorid.files.node_tables import MeasuredModes
     from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
@@ -263,7 +263,7 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions) -> dict[str, Any]:
     """The masses of a rotor, and what is asked for beside them."""
     from rotorid.commands.reduce_result import small_of
-    from rotorid.files.modes import read_modes
+    from rotorid.files.node_tables import read_modes
     from rotorid.reduction import (
         check_free,
         compare_methods,
@@ -367,7 +367,7 @@ def _places(
 
 def _of_tables(options: ReduceOptions) -> Reduction:
     """A reduction without a rotor: its compliance and its modes from tables."""
-    from rotorid.files.modes import read_compliance, read_modes
+    from rotorid.files.node_tables import read_compliance, read_modes
     from rotorid.reduction import reduce_measured
 
     if options.compliance is None or options.measured is None:

@@ -73,21 +73,8 @@ class Conventions:
 
     def on(self, labels: Labels) -> Labels:
         """Labels that also say how the rotor turns and from which end that is seen."""
-        own = self.labels
-        return replace(labels, rotation=own.rotation, view=own.view, clock=own.clock)
-
-
-def check_angles(word: str) -> None:
-    """Refuse a word that says nothing about angles.
-
-    Raises
-    ------
-    ValueError
-        Naming the allowed words.
-    """
-    if word not in STATED_ANGLES:
-        hint = did_you_mean(word, STATED_ANGLES)
-        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {word!r}{hint}")
+        stated = self.labels
+        return replace(labels, rotation=stated.rotation, view=stated.view, clock=stated.clock)
 
 
 def resolve_angles(stated: str, rotation: str | None) -> Angles:
@@ -98,7 +85,9 @@ def resolve_angles(stated: str, rotation: str | None) -> Angles:
     ValueError
         For another word, and for clockwise or counter-clockwise without a rotation.
     """
-    check_angles(stated)
+    if stated not in STATED_ANGLES:
+        hint = did_you_mean(stated, STATED_ANGLES)
+        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {stated!r}{hint}")
     if stated in ANGLES:
         return stated
     if rotation is None:

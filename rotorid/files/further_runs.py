@@ -132,16 +132,16 @@ def _stated(
     source: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
 ) -> ComplexArray:
     """Vectors that the job itself states; problems where they are none of its readings."""
-    usual, sizes = units.vibration(trials.labels.vibration_unit), list[float]()
+    usual, sizes, known = units.vibration(trials.labels.vibration_unit), list[float](), trials.sensors
     for name, vector in source.items():
         unit = vector.amplitude.unit if vector.amplitude.unit.name else usual
         sizes.append(unit.to_si(vector.amplitude.value))
-        if name not in trials.sensors:
-            known = f"{did_you_mean(name, trials.sensors)}; its sensors are {listing(trials.sensors, 'and')}"
-            vector.complain(problems, "", f"a sensor of the runs table, not {name!r}{known}")
+        if name not in known:
+            hint = f"{did_you_mean(name, known)}; its sensors are {listing(known, 'and')}"
+            vector.complain(problems, "", f"a sensor of the runs table, not {name!r}{hint}")
         elif unit.kind != usual.kind:
-            expected = f"an amplitude in {usual.name or 'no unit'}, as the readings have, or in a unit that "
-            vector.complain(problems, "amplitude", f"{expected}converts to it")
+            unit_words = f"{usual.name or 'no unit'}, as the readings have, or in a unit that converts to it"
+            vector.complain(problems, "amplitude", f"an amplitude in {unit_words}")
     return conventions.labels.vibration_from(sizes, np.radians([vector.phase for vector in source.values()]))
 
 

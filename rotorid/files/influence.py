@@ -9,28 +9,31 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import asdict, fields, replace
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
+from rotorid.base import tables
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes
+from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.disk import read_bytes, write_files
 from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
-from rotorid.files.problems import MOST_LINES, Problems
+from rotorid.files.problems import MOST_LINES, Problems, refusal
 from rotorid.files.runs import SPEED, nearest_speed, show_speed
-from rotorid.files.table_writing import table_bytes, write_bytes
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
@@ -120,9 +123,9 @@ def load_influence(
         if influence is not None:
             stated = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
     else:
-        grid = read_grid(source, "influence", problems)
+        before, grid = len(problems), read_grid(source, "influence", problems)
         table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
-        if table is None or not _is_sound(table):
+        if table is None or table.unit("influence") == UNCLEAR:
             return None
         text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
         stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
@@ -130,7 +133,7 @@ def load_influence(
             phase=as_phase(stated.get("phase") or phase or "lead"),
             angles=as_angles(stated.get("angles") or angles or "with rotation"),
         )
-        influence = _from_table(table, written)
+        influence = _from_table(table, written, before)
     if influence is None:
         return None
     its = influence.labels
@@ -164,57 +167,45 @@ def _tidied(grid: Grid) -> Grid:
     return replace(grid, header=tuple(header), rows=rows)
 
 
-def _is_sound(table: Table) -> bool:
-    """Whether the cells can be coefficients, each once; else problems."""
-    problems, header = table.problems, table.in_header
-    size, unit, before = table.numbers("influence"), table.unit("influence"), len(problems)
-    if unit == UNCLEAR:
-        return False
+def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
+    """The coefficients with these conventions, or None and more problems than `before`."""
+    size, angle, unit, std = (
+        *map(table.numbers, ("influence", "phase")),
+        table.unit("influence"),
+        "std" in table,
+    )
+    vibration, weight, reciprocal = _units(unit.name)
+    keys = [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
+    least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
+    table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    table.must_be("phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
-    keys = _keys(table)
-    if not _units(unit.name)[2]:
-        table.must_be("influence", size >= 0, "a coefficient of 0 or more")
-        if "std" in table and table.unit("std") != unit:
-            header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
-    else:
-        table.must_be("influence", size > 0, "a weight above 0")
-        if len({key[1:] for key in keys}) > 1 or "std" in table:
-            expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
-            header(table.fields["influence"].name, expected)
+    if reciprocal and (std or len({key[1:] for key in keys}) > 1):
+        alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
+        table.in_header(table.fields["influence"].name, alone)
+    elif std and table.unit("std") != unit:
+        table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
     table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
-    return len(table) > 0 and not problems.of(table.source) and len(problems) == before
-
-
-def _keys(table: Table) -> list[tuple[float, str, str]]:
-    """Speed, sensor and plane of each row."""
-    return [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
-
-
-def _from_table(table: Table, labels: Labels) -> Influence | None:
-    """The coefficients of a sound table with these conventions, or None and problems."""
-    vibration, weight, reciprocal = _units(table.unit("influence").name)
-    size, angle, keys = table.numbers("influence"), table.numbers("phase"), _keys(table)
-    values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
+    if not keys or len(table.problems) > before:
+        return None
     speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*keys, strict=True))
     speeds.sort()
-    place = {key: row for row, key in enumerate(keys)}
-    missing = [key for key in product(speeds, sensors, planes) if key not in place]
-    for speed, sensor, plane in missing[:MOST_LINES]:
-        at_speed = show_speed(speed, table.unit("speed"))
-        table.as_whole("plane", f"a coefficient of sensor {sensor!r} and plane {plane!r} at {at_speed}")
-    if missing:
+    row = {key: k for k, key in enumerate(keys)}
+    for place in islice((key for key in product(speeds, sensors, planes) if key not in row), MOST_LINES):
+        words = f"sensor {place[1]!r} and plane {place[2]!r} at {show_speed(place[0], table.unit('speed'))}"
+        table.as_whole("plane", f"a coefficient of {words}")
+    if len(table.problems) > before:
         return None
     S, C, P = len(speeds), len(sensors), len(planes)
-    at = np.reshape([place[key] for key in product(speeds, sensors, planes)], (S, C, P))
+    at = np.reshape([row[key] for key in product(speeds, sensors, planes)], (S, C, P))
+    values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
     errors = Gaussian.none(S, C, P)
-    if "std" in table:
+    if std:
         own = np.zeros((S, C, 2 * P + 2))
         own[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
-        errors = Gaussian(
-            own[..., None] * np.eye(2 * P + 2), errors.noise.columns, errors.reading, errors.run
-        )
+        covariance = own[..., None] * np.eye(2 * P + 2)
+        errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
     labels = replace(
         labels,
         vibration_unit=vibration.name,
@@ -234,33 +225,36 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
     try:
         whole = json.loads(data)
         problems.refuse_newer(str(path), whole["schema_version"])
-        stored = whole["influence"]
-        reading, run = stored["reading"], stored["run_errors"]
-        sizes, chances = (np.array(run[key], dtype=float) for key in ("sizes", "probability"))
-        if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
-            raise ValueError("sizes of errors and probabilities must be 0 or more")
-        run = RunErrors(**{**run, "sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()})
-        errors = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
-        reading = Reading(errors, reading["source"], dof=reading["dof"] or np.inf)
-        own = np.array(stored["covariance"], dtype=float)
-        common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
-        influence = Influence(
-            speeds=np.array(stored["speeds_rad_s"], dtype=float),
-            sensors=tuple(stored["sensors"]),
-            planes=tuple(stored["planes"]),
-            W=_complex(stored["W"]),
-            baseline=_complex(stored["baseline"]),
-            errors=Gaussian(own, common, reading, run),
-            labels=Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])}),
-        )
-        covariance = influence.channels() if own.shape[:2] == influence.W.shape[:2] else own[:0]
-        if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
-            raise ValueError("a covariance is none")
-        return influence
+        return _of_document(whole["influence"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         problems.add(str(path), None, None, None, f"coefficients as rotorid balance writes them ({reason})")
     return None
+
+
+def _of_document(stored: Mapping[str, Any]) -> Influence:
+    """The coefficients of `_document`, as they were."""
+    reading, run, labels = stored["reading"], stored["run_errors"], stored["labels"]
+    sizes, chances, own = (
+        np.array(part, dtype=float) for part in (run["sizes"], run["probability"], stored["covariance"])
+    )
+    if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
+        raise ValueError("sizes of errors and probabilities must be 0 or more")
+    if not np.linalg.eigvalsh(own).min() >= -1e-6 * np.abs(own).max():
+        raise ValueError("a covariance is none")
+    stated = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
+    run = run | {"sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()}
+    common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
+    reading = Reading(stated, reading["source"], dof=reading["dof"] or np.inf)
+    return Influence(
+        speeds=np.array(stored["speeds_rad_s"], dtype=float),
+        sensors=tuple(stored["sensors"]),
+        planes=tuple(stored["planes"]),
+        W=_complex(stored["W"]),
+        baseline=_complex(stored["baseline"]),
+        errors=Gaussian(own, common, reading, RunErrors(**run)),
+        labels=Labels(**labels | {"assumed": tuple(labels["assumed"])}),
+    )
 
 
 def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON document
@@ -345,14 +339,20 @@ def write_influence(path: str | Path, influence: Influence) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_files({Path(path): influence_bytes(path, influence)})
 
 
 def influence_bytes(path: str | Path, influence: Influence) -> bytes:
     """What `write_influence` writes."""
-    if Path(path).suffix.lower() == ".json":
+    kind = Path(path).suffix.lower()
+    if kind == ".json":
         return json.dumps(_document(influence), ensure_ascii=False).encode()
-    return table_bytes(path, influence_frame(influence), sheet="influence")
+    if kind not in (".csv", ".xlsx"):
+        raise refusal(path, "a name that ends in .csv, .xlsx or .json")
+    frame = influence_frame(influence)
+    columns = (tables.Column(str(name), values.tolist()) for name, values in frame.items())
+    table = tables.Table("influence", tuple(columns))
+    return tables.csv(table) if kind == ".csv" else tables.excel(table)
 
 
 def fit_to_readings(

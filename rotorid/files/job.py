@@ -31,7 +31,6 @@ from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.toml_file import read_toml
-from rotorid.files.units import Quantity, in_job_units
 
 if TYPE_CHECKING:
     from balancing import Mounted
@@ -389,45 +388,3 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = Non
         frozenset(name for name, plane in planes if plane.remove),
         any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),
     )
-
-
-def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:
-    """The job with other limits, each in place of what the job itself says there.
-
-    Parameters
-    ----------
-    job
-        As read.
-    weights
-        Largest weights by plane; a mass where the job's weights are unbalances (or the reverse) needs the
-        plane's `radius_mm`. The key is what complaints begin with.
-    amplitudes
-        Largest amplitudes by sensor, at all speeds.
-
-    Returns
-    -------
-    Job
-        With new `limits`; holes keep to the largest weight of their plane.
-
-    Raises
-    ------
-    ValueError
-        For a weight that does not convert to those of the job.
-    """
-    if not weights and not amplitudes:
-        return job
-    trials, unit = job.trials, job.trials.labels.weight_unit
-    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
-    most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
-    for plane, weight in weights.items():
-        size = in_job_units(weight, unit, job.planes[plane].radius)
-        if size is None:
-            raise ValueError(
-                f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
-                f"only with a radius_mm of plane {plane!r} in the job"
-            )
-        most[plane] = size[0]
-    for sensor, amplitude in amplitudes.items():
-        residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
-    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)

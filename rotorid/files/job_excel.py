@@ -13,8 +13,9 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell as as_json
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
-from rotorid.files.cells import BadCell, Cell, Grid, make_grid, read_bytes, show
+from rotorid.files.cells import BadCell, Cell, Grid, make_grid, show
 from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
 from rotorid.files.layout import rows_from_header

@@ -239,8 +239,8 @@ class Sensor(_Placed):
     limit: Annotated[Quantity, of(Limits)] | None = optional(
         "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
         "table by speed",
-        "limit",
-        units=units.vibration,
+        "limit limit_um limit_mm_s limit_m_s2",
+        units=units.VIBRATION,
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
@@ -308,8 +308,8 @@ class Vector(Settings):
 
     amplitude: Annotated[Quantity, of(NotNegative)] = key(
         "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
-        "amplitude",
-        units=units.vibration,
+        "amplitude amplitude_um amplitude_mm_s amplitude_m_s2",
+        units=units.VIBRATION,
     )
     phase: Turn = key(
         "the phase at slow speed, counted as the readings count it",

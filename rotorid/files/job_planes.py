@@ -21,9 +21,9 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
+from rotorid.files.cells import NotANumber, parse_number
 from rotorid.files.columns import Source
 from rotorid.files.conventions import Conventions
-from rotorid.files.decimal_numbers import NotANumber, parse_number
 from rotorid.files.job_models import JobSettings, Plane, Sensor
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.runs import nearest_speed, show_speeds

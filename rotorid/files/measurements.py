@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +19,12 @@ from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN
 from rotorid.files.instruments import DERIVATIVE, read_responses
-from rotorid.files.modes import read_modes
+from rotorid.files.model import HarmonicFile
+from rotorid.files.node_tables import read_modes
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import Unit, UnitError, UnitReader, one_of, spelt
-
-if TYPE_CHECKING:
-    from rotorid.files.model import HarmonicFile
-    from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
-    from rotorid.identify.operator_model import HarmonicModel
+from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiments, real_matrices
+from rotorid.identify.operator_model import HarmonicModel
 
 PARTS = ("amplitude", "phase", "re", "im")
 _FREE = "a free vibration has real amplitudes"
@@ -69,17 +67,14 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     TableWarning
         Where an amplitude of the model is nowhere in the table.
     """
-    from rotorid.identify.operator_model import HarmonicModel
-
     errors, unmeasured = None, set[str]()
-    if not isinstance(model, HarmonicModel):
-        errors, unmeasured = model.errors, {*model.unmeasured}
-        model = model.model
+    if isinstance(model, HarmonicFile):
+        errors, unmeasured, model = model.errors, {*model.unmeasured}, model.model
     grid, problems = _grid(path)
     if {"mode", "node", "shape"} <= {*grid.header}:
         return _free_vibrations(path, model, errors)
     table, rows = _rows(grid, problems, model.signals, model.varying)
-    measured = rows.signals.keys() & {*model.outputs}
+    measured = [name for name in model.outputs if name in rows.signals]
     if not measured:
         table.in_header(None, f"measured amplitudes: columns {listing(map(_forms, model.outputs))}")
     for name in model.varying:
@@ -94,17 +89,13 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         expected = f"0{lost}: nothing excites this row, and {_FREE}"
         table.complain_where(free & (np.abs(rows.signals[name].imag) > 0), _stems(table, name)[-1], expected)
     problems.stop()
-    if lacking := [name for name in model.outputs if name not in measured | unmeasured]:
-        message = f"{table.source}: the table has no {listing(lacking, 'and')}: predicted"
+    if lacking := {*model.outputs} - {*measured} - unmeasured:
+        message = f"{table.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=2)
-    rows = replace(
-        rows,
-        signals={**_unread(model, len(table)), **rows.signals},
-        free=free,
-        errors=errors,
-        varying={name: table.numbers(name) for name in model.varying},
-    )
-    return replace(rows, rounding=_rounding(table, rows, model.outputs))
+    signals = _unread(model) | {**rows.signals} | {name: table.numbers(name) for name in model.varying}
+    data = experiments(model, rows.frequencies, signals, names=rows.names, free=free, errors=errors)
+    data = replace(data, axis=rows.axis, units=rows.units)
+    return replace(data, rounding=_rounding(table, data, model.outputs))
 
 
 def read_amplitudes(path: str | Path) -> Experiments:
@@ -113,8 +104,6 @@ def read_amplitudes(path: str | Path) -> Experiments:
     Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
     A UFF file (`.uff`, `.unv`) has frequency responses: displacements under a force of 1 N.
     """
-    from rotorid.identify.amplitudes import Experiments
-
     microns = Shown(vibration_unit_words("um"), 1e6)
     if Path(path).suffix.lower() in (".uff", ".unv"):
         omega, points = read_responses(Path(path))
@@ -135,7 +124,7 @@ def read_amplitudes(path: str | Path) -> Experiments:
     signals, shown = {**rows.signals}, {**rows.units}
     for name, z in rows.signals.items():
         size = _stems(table, name)[0]
-        bad = (rows.frequencies == 0) | ((name == "F") & (np.isnan(z) | (z == 0)))
+        bad = (rows.frequencies == 0) | ((name == "F") & ~(np.abs(z) > 0))
         table.complain_where(bad, size, "a frequency above 0, and a force F that is not 0")
         if not np.nan_to_num(z).any():
             table.as_whole(table.fields[size].name, "a number that is not 0 in at least one row")
@@ -161,20 +150,16 @@ def _grid(path: str | Path) -> tuple[Grid, Problems]:
     return problems.need(read_grid(path, "measurements", problems, first=True)), problems
 
 
-def _unread(model: HarmonicModel, count: int) -> dict[str, ComplexArray]:
+def _unread(model: HarmonicModel) -> dict[str, Any]:
     """Signals without readings: no input, unknown outputs."""
-    return {
-        name: np.full(count, 0 if name in model.inputs else np.nan, dtype=complex) for name in model.signals
-    }
+    return dict.fromkeys(model.outputs, np.nan) | dict.fromkeys(model.inputs, 0.0)
 
 
 def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeErrors | None) -> Experiments:
     """A table of modes, whose nodes are amplitudes of the model."""
-    from rotorid.identify.amplitudes import Experiments
-
     modes, problems = read_modes(path), Problems()
-    shapes, count = dict(zip(map(str, modes.nodes), modes.shapes, strict=True)), len(modes.frequencies)
-    for node in shapes.keys() - {*model.outputs}:
+    names = [*map(str, modes.nodes)]
+    for node in {*names} - {*model.outputs}:
         expected = f"an amplitude of the model: {listing(model.outputs)}{did_you_mean(node, model.outputs)}"
         problems.add(str(path), None, "node", node, expected)
     if model.varying or model.has_constant_terms:
@@ -183,30 +168,26 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
     std, covariances = modes.frequency_std, {}
     if errors is None and modes.shape_std is not None:
         variances = (modes.shape_std * modes.shapes) ** 2
-        covariances = {
-            name: variance[:, None, None] * np.diag([1.0, 0.0])
-            for name, variance in zip(shapes, variances, strict=True)
-        }
-    return Experiments(
-        tuple(f"mode {mode}" for mode in range(1, count + 1)),
+        covariances = dict(zip(names, variances[..., None, None] * np.diag([1.0, 0.0]), strict=True))
+    data = experiments(
+        model,
         modes.frequencies,
-        _unread(model, count) | {name: shape.astype(complex) for name, shape in shapes.items()},
-        np.ones(count, dtype=bool),
-        errors,
-        covariances,
-        frequency_std=std * modes.frequencies if std is not None and std.all() else None,
+        _unread(model) | dict(zip(names, modes.shapes, strict=True)),
+        names=[f"mode {i + 1}" for i in range(len(modes.frequencies))],
+        free=True,
+        errors=errors,
+        covariances=covariances,
     )
+    return data if std is None or not std.all() else replace(data, frequency_std=std * modes.frequencies)
 
 
-def _model_or(known: Mapping[str, Unit]) -> UnitReader:
-    """No unit, which is the model's own, or a known one, which becomes SI (and peak)."""
+def _or_model(of: dict[str, Unit]) -> UnitReader:
+    """No unit, which is the model's own, or one of these, which becomes SI (and peak)."""
 
     def read(name: str) -> Unit:
-        unit = Unit("", "model") if not name else known.get(spelt(name))
-        if unit is None:
-            usual = listing([*known][:3])
-            raise UnitError(f"no unit (the model's own) or one such as {usual}, not {name!r}")
-        return unit
+        if unit := {**of, "": Unit("", "model")}.get(spelt(name)):
+            return unit
+        raise UnitError(f"no unit (the model's own) or one of {listing(of)}, not {name!r}")
 
     return read
 
@@ -224,10 +205,8 @@ def _rows(
     grid: Grid, problems: Problems, names: Sequence[str], varying: Sequence[str] = ()
 ) -> tuple[Table, Experiments]:
     """Amplitudes by name, NaN where a row does not have them, all taken as forced."""
-    from rotorid.identify.amplitudes import Experiments
-
-    speed, vibration, angle = one_of(units.SPEED), _model_or(units.VIBRATION), one_of(units.ANGLE)
-    readers = dict.fromkeys(varying, _model_or({**units.SPEED, "re": Unit("re", "model")}))
+    speed, vibration, angle = one_of(units.SPEED), _or_model(units.VIBRATION), one_of(units.ANGLE)
+    readers = dict.fromkeys(varying, _or_model({**units.SPEED, "re": Unit("re", "model")}))
     readers |= {f"{name}_{part}": angle if part == "phase" else vibration for name in names for part in PARTS}
     columns = (
         Column("experiment", required=False),
@@ -266,20 +245,20 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
     parts = [stem.removeprefix(f"{name}_") for stem in (size, *others)]
     if parts not in (["amplitude", "phase"], ["re", "im"], ["re"]):
         table.in_header(table.fields[size].name, f"columns {_forms(name)}")
-        return np.zeros(len(table), dtype=complex)
-    first, blank, is_polar = table.numbers(size), table.is_blank(size), parts[0] == "amplitude"
-    second = np.zeros(len(table))
-    for other in others:
+    first, second, blank = table.numbers(size), np.zeros(len(table)), table.is_blank(size)
+    is_polar = parts[0] == "amplitude"
+    for other in others[:1]:
         half = table.is_blank(other)
         second = np.where(half, 0.0, table.numbers(other))
         wrong = np.where(blank, ~half, half & ~(is_polar & (first == 0)))
         table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
+        turn = np.abs(second) <= FULL_TURN
+        table.must_be(other, turn | ~np.array(is_polar), "a phase from -360 to 360 degrees")
     if blank.all():
         table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
     if not is_polar:
         return np.asarray(first + 1j * np.where(blank, np.nan, second))
-    table.must_be(size, (first >= 0) | blank, "an amplitude of 0 or more (a real part may be negative)")
-    table.must_be(others[0], np.abs(second) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    table.must_be(size, first >= 0, "an amplitude of 0 or more (a real part may be negative)")
     return polar(first, second)
 
 
@@ -289,24 +268,20 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
     Frequencies of excitation are set, not read; a shape that is 1 everywhere is the reference of the others.
     Nothing where a cell of a reading is blank, or a natural frequency shows no end of its digits.
     """
-    from rotorid.identify.amplitudes import real_matrices
-
     covariances: dict[str, FloatArray] = {}
     for name in outputs:
-        z, there = rows.signals[name], _stems(table, name)
-        if any(table.is_blank(stem).any() for stem in there):
+        z, stems = rows.signals[name], _stems(table, name)
+        if any(table.is_blank(stem).any() for stem in stems):
             return {}
-        if not there or (rows.free.all() and (z == 1).all()):
-            exact = 1e-12 * np.maximum(np.nan_to_num(np.abs(z)), 1e-12)
-            covariances[name] = exact[:, None, None] ** 2 * np.eye(2)
-            continue
         turn, spread = (
             np.ones(len(z), dtype=complex),
-            np.stack([table.steps(there[0]), table.steps(there[-1])]),
+            1e-12 * np.maximum(np.nan_to_num(np.abs([z, z])), 1e-12),
         )
-        if there[0] == f"{name}_amplitude":
-            turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * np.abs(z)
-        root = real_matrices(turn) * (spread.T / np.sqrt(12.0))[:, None]
+        if stems and not (rows.free.all() and (z == 1).all()):
+            spread = np.stack([table.steps(stems[0]), table.steps(stems[-1])]) / np.sqrt(12.0)
+            if stems[0] == f"{name}_amplitude":
+                turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * np.abs(z)
+        root = real_matrices(turn) * spread.T[:, None]
         covariances[name] = root @ np.swapaxes(root, 1, 2)
     steps = table.steps("frequency" if "frequency" in table else "speed")
     if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such

@@ -13,24 +13,23 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
+from pydantic import BeforeValidator, Field, PlainValidator
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
-from rotorid.files.forces import whole
+from rotorid.files.attached import whole
 from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
-from rotorid.files.small_model import FORCE, small_equations
+from rotorid.files.small_model import FORCE, is_small, small_equations
 from rotorid.files.toml_file import MOST_NAMES, read_toml
 from rotorid.identify import expressions
-from rotorid.identify.expressions import is_name
-
-if TYPE_CHECKING:
-    from rotorid.identify.amplitudes import AmplitudeErrors
-    from rotorid.identify.ode import OdeModel
-    from rotorid.identify.operator_model import HarmonicModel
+from rotorid.identify.amplitudes import AmplitudeErrors
+from rotorid.identify.equations import harmonic_model
+from rotorid.identify.ode import OdeModel, ode_model, with_nuisance
+from rotorid.identify.operator_model import HarmonicModel
+from rotorid.identify.second_order import second_order
 
 Pairs = dict[str, tuple[float, float]]
 _EXAMPLE = '"(m*p**2 + b*p + c)*X = F"'
@@ -50,12 +49,6 @@ _SCALED = re.compile(r"(?:([0-9.]+(?:[eE][-+]?[0-9]+)?) *\* *)?(\w+)")
 """A number times a name, or a name alone."""
 
 
-def _name(value: str) -> str:
-    if not is_name(value):
-        raise ValueError(f"names: a letter, then letters, digits and _; no function; {value!r} is none")
-    return value
-
-
 def _expression(value: object) -> object:
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= expressions.LARGEST:
         return float(value)
@@ -73,14 +66,13 @@ def _estimates(value: object) -> object:
     return dict.fromkeys(map(str, value))
 
 
-Name = Annotated[str, AfterValidator(_name)]
 Text = Annotated[float | str, PlainValidator(_expression, json_schema_input_type=float | str)]
-Texts = dict[Name, Text]
+Texts = dict[str, Text]
 Matrix = list[list[Text]]
 Limit = Annotated[float, Field(strict=True, allow_inf_nan=True)]
 Std = Annotated[Number, Field(ge=1e-30)]
 Estimates = Annotated[
-    dict[Name, Number | None],
+    dict[str, Number | None],
     BeforeValidator(_estimates, json_schema_input_type=list[str] | dict[str, float]),
 ]
 
@@ -110,18 +102,18 @@ class ModelFile(Settings):
     M: Matrix = key("matrix of M y'' + C y' + K y = f: numbers and expressions", default=[])
     C: Matrix = key("likewise; it may be absent", default=[])
     K: Matrix = key("likewise", default=[])
-    coordinates: list[Name] = key(
+    coordinates: list[str] = key(
         "names of y; `y1`, `y2`, … by default. The velocity of `y1` is `v_y1`", default=[]
     )
     states: Texts = key('name = "its rate of change", with the time as `t`', default={})
     estimate: Estimates = key("names, or name = starting value", expected=_ESTIMATE)
-    known: dict[Name, Number] = key("names with their numbers", default={})
-    inputs: list[Name] | None = key(
+    known: dict[str, Number] = key("names with their numbers", default={})
+    inputs: list[str] | None = key(
         "amplitudes that excite, or measured inputs in time (columns of the record); of equations by default "
         "those that stand only on right sides",
         default=None,
     )
-    varying: list[Name] = key(
+    varying: list[str] = key(
         "known quantities that change from row to row, such as a speed; without it names that stand only as "
         "factors of an amplitude",
         default=[],
@@ -133,7 +125,7 @@ class ModelFile(Settings):
         default={},
     )
     force: Texts = key('with matrices: coordinate = "expression" of time and inputs', default={})
-    per_record: list[Name] = key("parameters that each of several records has for itself", default=[])
+    per_record: list[str] = key("parameters that each of several records has for itself", default=[])
     bounds: dict[str, tuple[Limit, Limit]] = key(
         "name = [lowest, highest], `inf` for none", default={}, expected="two numbers: [lowest, highest]"
     )
@@ -248,8 +240,6 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         Where a parameter of a model in time has no influence on amplitudes.
     """
     path = Path(path)
-    from rotorid.identify.amplitudes import AmplitudeErrors
-    from rotorid.identify.equations import harmonic_model
 
     def read(file: ModelFile) -> HarmonicFile:
         equations, inputs, unseen = file.equations, file.inputs, list[str]()
@@ -266,11 +256,15 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         model = harmonic_model(
             equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
         )
-        if file.M and model.has_constant_terms:
-            raise ValueError(
-                "a load or output without any amplitude stands in it: a constant one has no influence on "
-                "amplitudes, leave it out; one that excites must be a measured input"
-            )
+        if file.M:
+            strange = {*model.signals, *model.varying} - {*file.names, *file.outputs, *model.inputs}
+            for name in sorted(strange | (estimate.keys() & {*file.per_record})):
+                raise ValueError(
+                    f"{name} has no meaning for amplitudes: M, C and K hold parameters and known numbers; "
+                    "what changes with the time t must be a measured input"
+                )
+            if model.has_constant_terms:
+                raise ValueError("a load without any amplitude has no influence on amplitudes: leave it out")
         if given := file.errors:
             phase = math.radians(given.phase_deg)
             errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
@@ -317,16 +311,14 @@ def read_ode_model(path: str | Path) -> OdeModel:
     InputError
         With the problems of the file, each with its key.
     """
-    from rotorid.identify.ode import ode_model, with_nuisance
-    from rotorid.identify.second_order import second_order
 
     def read(file: ModelFile) -> OdeModel:
         if file.equations or file.varying:
             raise ValueError("[states], or M and K; equations are of amplitudes, for `rotorid identify`")
-        start = file.estimate | file.start
-        if lost := [name for name, value in start.items() if value is None]:
-            raise ValueError(f"no starting value of {lost[0]}: [estimate] has name = starting value in time")
-        outputs, factors = {name: str(text) for name, text in file.outputs.items()}, list[str]()
+        start, factors = file.estimate | file.start, list[str]()
+        for name in (name for name, value in start.items() if value is None):
+            raise ValueError(f"no starting value of {name}: [estimate] has name = starting value in time")
+        outputs = {name: str(text) for name, text in file.outputs.items()}
         if extra := file.nuisance:
             outputs = outputs or {name: name for name in (file.names if file.M else file.states)}
             outputs, factors = with_nuisance(outputs, extra.offset, extra.drift, extra.hum)
@@ -349,63 +341,45 @@ def read_ode_model(path: str | Path) -> OdeModel:
 
 def _read(path: Path) -> ModelFile:
     """What stands in a model file, or of a small model its linear equations; raises its problems."""
-    source, problems = str(path), Problems()
+    problems = Problems()
     data = problems.need(read_toml(path, problems))
-    if {"masses_kg", "shaft_stiffness_N_per_m"} & data.keys():
+    if is_small(data):
         data = small_equations(path)
     for name, value in data.items():
         if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
             expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
-            problems.add(source, None, name, None, expected)
+            problems.add(str(path), None, name, None, expected)
     problems.stop()
-    file = problems.need(read_settings(ModelFile, data, source, problems))
-    problems.stop()
-    return file
+    return problems.need(read_settings(ModelFile, data, str(path), problems))
 
 
 def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
-    """Matrices as equations of amplitudes, what excites, and what outputs do not show.
-
-    Raises
-    ------
-    ValueError
-        What has no meaning for amplitudes; whether the equations are linear is seen by `harmonic_model`.
-    """
-    y, inputs, force = file.names, list(file.inputs or ()), file.force
-    constants = {*file.estimate, *file.known} - {*file.per_record}
-    matrices = {"*p**2": file.M, "*p": file.damping, "": file.K}
-    entries = [one for matrix in matrices.values() for row in matrix for one in row]
-    allowed = {*constants, *inputs, *y, *(f"v_{x}" for x in y)}
-    for text in (*entries, *force.values(), *file.outputs.values()):
-        for name in sorted(expressions.names(expressions.parse(str(text))) - allowed):
-            raise ValueError(
-                f"{name} in '{text}' has no meaning for amplitudes: M, C and K hold parameters and known "
-                "numbers, the same in all tests; what changes with the time t must be a measured input"
-            )
+    """Matrices as equations of amplitudes, what excites, and displacements that outputs do not show."""
+    y, inputs, force = file.names, file.inputs or [], file.force
     if not inputs and not force:
         inputs = [f"{FORCE}{x}" for x in y]
         force = dict(zip(y, inputs, strict=True))
-    put, more = dict[str, str](), list[str]()
-    for output, text in file.outputs.items():
+    powers, equations, put = {"*p**2": file.M, "*p": file.damping, "": file.K}, list[str](), dict[str, str]()
+    for i, x in enumerate(y):
+        columns = [
+            (matrix[i][j], f"{power}*{z}") for j, z in enumerate(y) for power, matrix in powers.items()
+        ]
+        terms = [f"({entry}){factor}" for entry, factor in columns if entry != 0]
+        equations.append(f"{' + '.join(terms) or 0} = {force.get(x, 0)}")
+    wrong = sorted(force.keys() - {*y})
+    for name, text in file.outputs.items():
         match = _SCALED.fullmatch(str(text))
-        if match and match[2] in y and match[2] not in put:
-            put[match[2]] = output if match[0] == output else f"({output}/({match[1] or 1}))"
+        shown = match[2] if match and match[2] in y and match[2] not in put else ""
+        wrong += [name] if name in y and name != shown else []
+        if match and shown:
+            put[shown] = f"({name}/{match[1]})" if match[1] else name
         else:
-            more.append(f"{output} = {text}")
-    unseen = [x for x in y if x not in put]
-    names = [*constants, *inputs, *file.outputs, *unseen]
-    wrong = [name for name in names if name == "p" or names.count(name) > 1] + sorted(force.keys() - {*y})
-    if wrong:
+            equations.append(f"{name} = {text}")
+    names = [*file.estimate, *file.known, "p", *inputs, *dict.fromkeys([*y, *file.outputs])]
+    if wrong := wrong + [name for name in names if names.count(name) > 1]:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )
+    unseen = [x for x in y if x not in put] if file.outputs else []
     put |= {f"v_{x}": f"(p*{put.get(x, x)})" for x in y}
-    equations = []
-    for i, name in enumerate(y):
-        columns = [(j, x, power) for j, x in enumerate(y) for power in matrices]
-        row = [(matrices[power][i][j], f"{power}*{x}") for j, x, power in columns]
-        if not (terms := [f"({entry}){factor}" for entry, factor in row if entry != 0]):
-            raise ValueError(f"the row of {name} in M, C and K is empty: leave this coordinate out")
-        equations.append(f"{' + '.join(terms)} = {force.get(name, 0)}")
-    equations = [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in (*equations, *more)]
-    return equations, inputs, unseen if file.outputs else []
+    return [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in equations], inputs, unseen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,58 +19,41 @@ from fem import (
     Calibration,
     Disc,
     Model,
+    NodeForce,
     Rotor,
     Support,
 )
-from fem.forces import kind_of
 from fem.parameters import expand
+from rotorid.base.arrays import FloatArray
+from rotorid.base.tables import csv_bytes
 from rotorid.base.text import counted
 from rotorid.files import units
-from rotorid.files.bearing import Attached, read_attached
+from rotorid.files.attached import (
+    Attached,
+    Place,
+    each,
+    force_tables,
+    in_si,
+    places,
+    read_attached,
+    support_tables,
+    whole,
+)
 from rotorid.files.columns import Column, read_table
-from rotorid.files.forces import Place, Places, each, whole
-from rotorid.files.problems import InputError, Problems, TableWarning
+from rotorid.files.disk import each_file_once, write_files
+from rotorid.files.problems import InputError, Problem, Problems, TableWarning
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, read_settings
-from rotorid.files.toml_file import read_toml
+from rotorid.files.small_model import is_small, is_small_model, read_small_model
+from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.files.units import one_of
 
-
-def _column(stem: str, of: dict[str, units.Unit], *usual: str, required: bool = False) -> Column:
-    names = tuple(f"{stem}_{unit}" for unit in usual)
-    return Column(stem, one_of(of), names, required=required, blank=stem != "length")
-
-
-ATTACHED = (
-    _column("mass", units.MASS, "kg"),
-    _column("polar_inertia", units.INERTIA, "kg_m2"),
-    _column("diametral_inertia", units.INERTIA, "kg_m2"),
-    _column("support_stiffness", units.STIFFNESS, "N_per_m"),
-    _column("support_damping", units.DAMPING, "N_s_per_m"),
-)
-OF_ELEMENTS = (
-    _column("youngs_modulus", units.MODULUS, "Pa"),
-    _column("density", units.DENSITY, "kg_per_m3"),
-    Column("poisson_ratio", units.ratio, required=False, blank=True),
-    _column("material_damping", units.TIME, "s"),
-)
-COLUMNS = (
-    _column("length", units.LENGTH, "m", "mm", required=True),
-    _column("diameter", units.LENGTH, "m", "mm", required=True),
-    _column("inner_diameter", units.LENGTH, "m"),
-    Column("element", required=False, blank=True),
-    *ATTACHED,
-    *OF_ELEMENTS,
-)
 USUAL = {
-    "length": (5e-5, 50.0, "m", {"mm": 1e-3, "m": 1e3, "in": 0.0254}),
-    "outer_diameter": (5e-4, 10.0, "m", {"mm": 1e-3, "m": 1e3, "in": 0.0254}),
-    "youngs_modulus": (1e9, 1e12, "Pa", {"MPa": 1e6, "GPa": 1e9, "psi": 6894.757, "kPa": 1e3}),
-    "density": (100.0, 3e4, "kg/m³", {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}),
-    "clearance": (2e-6, 5e-3, "m", {}),
-    "gap": (1e-7, 2e-2, "m", {}),
-    "viscosity": (1e-5, 2.0, "Pa·s", {}),
+    "length": (5e-5, 50.0, "m"),
+    "diameter": (5e-4, 10.0, "m"),
+    "youngs_modulus": (1e9, 1e12, "Pa"),
+    "density": (100.0, 3e4, "kg/m³"),
 }
-"""What quantities are in machines: from, to, in which unit; other units by their size in that one."""
+"""From where to where quantities of machines are, in which unit."""
 
 
 class Material(Settings):
@@ -82,7 +66,7 @@ class Material(Settings):
         default=STEEL_POISSON,
     )
     material_damping: NotNegative = key(
-        "loss per stress rate: the stress is E (ε + τ dε/dt)", "material_damping_s", 0.0
+        "loss per stress rate: the stress is E (ε + τ dε/dt)", "material_damping_s", 0.0, units=units.TIME
     )
 
 
@@ -135,15 +119,18 @@ class DiscKeys(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Neither of both, or some of both."""
-        geometry = [
-            name for name in ("width", "outer_diameter", "inner_diameter", "density") if self.has(name)
-        ]
-        if bool(geometry) == self.has("mass"):
+        sizes = self.model_fields_set & {"width", "outer_diameter", "inner_diameter", "density"}
+        if bool(sizes) == self.has("mass"):
             yield "mass", "either the mass of the disc or its geometry: width_m, outer_diameter_m"
-        elif geometry and (self.polar_inertia or self.diametral_inertia):
+        elif sizes and (self.polar_inertia or self.diametral_inertia):
             yield "polar_inertia", "nothing beside the geometry, which gives it"
-        elif geometry and (self.width is None or self.outer_diameter is None):
+        elif sizes and not {"width", "outer_diameter"} <= sizes:
             yield "width", "the disc's width and outer diameter"
+
+    def made(self, node: int, density: float) -> Disc:
+        """The disc at a node, of the material's density."""
+        values = self.model_dump(exclude_none=True) | {"node": node}
+        return Disc(**values) if self.has("mass") else Disc.from_geometry(**{"density": density} | values)
 
 
 class Parameter(Settings):
@@ -194,6 +181,31 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
     calibration: CalibrationKeys | None = key("what a fit to readings found, with its errors", default=None)
 
 
+def _column(stem: str, of: dict[str, units.Unit], *usual: str) -> Column:
+    names = tuple(f"{stem}_{unit}" for unit in usual)
+    return Column(stem, one_of(of), names, required=len(usual) > 1, blank=stem != "length")
+
+
+OF_ELEMENTS = {
+    "length": _column("length", units.LENGTH, "m", "mm"),
+    "outer_diameter": _column("diameter", units.LENGTH, "m", "mm"),
+    "inner_diameter": _column("inner_diameter", units.LENGTH, "m"),
+    "youngs_modulus": _column("youngs_modulus", units.MODULUS, "Pa"),
+    "density": _column("density", units.DENSITY, "kg_per_m3"),
+    "poisson_ratio": Column("poisson_ratio", units.ratio, required=False, blank=True),
+    "material_damping": _column("material_damping", units.TIME, "s"),
+}
+"""Columns by attribute of a rotor, for reading and writing."""
+OF_NODES = (
+    _column("mass", units.MASS, "kg"),
+    _column("polar_inertia", units.INERTIA, "kg_m2"),
+    _column("diametral_inertia", units.INERTIA, "kg_m2"),
+    _column("support_stiffness", units.STIFFNESS, "N_per_m"),
+    _column("support_damping", units.DAMPING, "N_s_per_m"),
+)
+COLUMNS = (*OF_ELEMENTS.values(), Column("element", required=False, blank=True), *OF_NODES)
+
+
 def read_rotor(path: str | Path) -> Rotor:
     """Read a rotor from a rotor table (`.csv`, `.xlsx`) or a rotor file (`.toml`).
 
@@ -215,20 +227,18 @@ def read_rotor(path: str | Path) -> Rotor:
     Warns
     -----
     TableWarning
-        About a guessed encoding, and sizes, materials and bearings that seem to be in another unit.
+        About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": "this table"}
-    if is_file := path.suffix.lower() == ".toml":
+    data: Mapping[str, Any] = {"shaft": path.name}
+    if path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
-        if "shaft" not in data and "masses_kg" in data:
+        if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
-            problems.add(str(path), None, "shaft", None, expected)
-            problems.stop()
+            raise InputError([Problem(str(path), None, "shaft", None, expected)])
     file = problems.need(read_settings(RotorFile, data, str(path), problems))
-    problems.stop()
-    parts, stations = _shaft(path.parent / file.shaft if is_file else path, file.material), dict[str, int]()
-    at = Places(range(1, len(parts["length"]) + 2), stations)
+    parts, stations = _shaft(path.parent / file.shaft, file.material), dict[str, int]()
+    at = places(range(1, len(parts["length"]) + 2), stations)
 
     def name(item: Station) -> None:
         if item.name in stations:
@@ -236,19 +246,19 @@ def read_rotor(path: str | Path) -> Rotor:
         stations[item.name] = at(item)
 
     each(problems, file.station, "station", name)
-    parts["discs"] += each(problems, file.disc, "disc", lambda item: _disc(item, at(item), file.material))
-    supports, forces = read_attached(file, at, path.parent, problems)
-    parts["supports"] += supports
+    density = file.material.density
+    parts["discs"] += each(problems, file.disc, "disc", lambda item: item.made(at(item), density))
+    attached = read_attached(file, at, path.parent, problems)
     problems.stop()
+    parts["supports"] += [one for one in attached if isinstance(one, Support)]
+    parts["forces"] = [one for one in attached if isinstance(one, NodeForce)]
     effects, has_ratio = file.model.model_dump(), parts.pop("has_ratio") or file.material.has("poisson_ratio")
     if not file.model.has("shear"):  # nothing else depends on the ratio
         effects["shear"] = has_ratio
-    more: dict[str, Any] = {"forces": forces, "stations": stations, "model": Model(**effects)}
-    rotor = whole(file, "rotor", lambda _: Rotor(**parts, **more))
-    _warn_of_units(str(path), rotor)
+    rotor = whole(file, "rotor", lambda _: Rotor(**parts, stations=stations, model=Model(**effects)))
     if file.calibration:
-        found = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
-        return replace(rotor, calibration=found)
+        calibration = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
+        return replace(rotor, calibration=calibration)
     return rotor
 
 
@@ -265,72 +275,65 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     The file itself first, then the tables that it names.
     """
     path = Path(path)
-    data = read_toml(path, Problems()) or {} if path.suffix.lower() == ".toml" else {}
-    rows = [item for part in data.values() if isinstance(part, list) for item in part]
-    tables = [data, *(row for row in rows if isinstance(row, dict))]
-    named = [table[key].strip() for table in tables for key in ("shaft", "table") if key in table]
-    return (path, *(path.parent / name for name in dict.fromkeys(named)))
+    with each_file_once() as asked, suppress(InputError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        read_small_model(path) if is_small_model(path) else read_rotor(path)
+    return tuple(asked)
 
 
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
     """What a rotor table says, by the attributes of a rotor."""
-    problems = Problems()
+    problems, doubts = Problems(), Problems()
     table = problems.need(read_table(path, "rotor", COLUMNS, problems))
-
-    def values(stem: str, none: float = 0.0) -> Any:  # noqa: ANN401
-        return np.where(table.is_blank(stem), none, table.numbers(stem, none))
-
-    length, diameter, inner = table.numbers("length"), table.numbers("diameter"), values("inner_diameter")
-    elements = length != 0
-    last = np.arange(len(length)) == len(length) - 1
+    values: dict[str, FloatArray] = {}
+    for stem in (column.stem for column in COLUMNS):
+        default = getattr(material, stem, 0.0)
+        values[stem] = np.where(table.is_blank(stem), default, table.numbers(stem, default))
+    elements, last = values["length"] != 0, np.arange(len(table)) == len(table) - 1
     expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
-    table.must_be("length", (length > 0) | (last & ~elements), expected)
+    table.must_be("length", (values["length"] > 0) | (last & ~elements), expected)
     if not elements.any():
         table.in_header(table.fields["length"].name, "at least one row with a length above 0")
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
-    of_elements = {column.stem: values(column.stem, getattr(material, column.stem)) for column in OF_ELEMENTS}
-    ratio = of_elements["poisson_ratio"]
-    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     for stem in ("diameter", "youngs_modulus"):
-        table.must_be(stem, (table.numbers(stem) > 0) | ~elements, "a number above 0")
-    table.must_be("inner_diameter", ~(inner >= diameter) | ~elements, "less than the outer diameter")
-    for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in ATTACHED)):
-        outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
-        table.must_be(stem, ~(values(stem) < 0), f"a number of 0 or more{outwards}")
+        table.must_be(stem, (values[stem] > 0) | ~elements, "a number above 0")
+    ratio, thick = values["poisson_ratio"], values["inner_diameter"] >= table.numbers("diameter")
+    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
+    table.must_be("inner_diameter", ~thick | ~elements, "less than the outer diameter")
+    for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in OF_NODES)):
+        table.must_be(stem, values[stem] >= 0, "a number of 0 or more")
     problems.stop()
-    rows = np.array([values(column.stem) for column in ATTACHED]).T.tolist()
+    for stem, (low, high, unit) in USUAL.items():
+        odd = elements & (values[stem] > 0) & ((values[stem] < low) | (values[stem] > high))
+        expected = f"{low:g} to {high:g} {unit}; is this in another unit?"
+        replace(table, problems=doubts).must_be(stem, ~odd, expected)
+        if (odd & np.isnan(table.numbers(stem))).any():
+            material.complain(doubts, stem, expected)
+    if len(doubts):
+        warnings.warn(str(InputError(doubts)), TableWarning, stacklevel=3)
+    rows = np.array([values[column.stem] for column in OF_NODES]).T.tolist()
     return {
-        "length": length[elements],
-        "outer_diameter": diameter[elements],
-        "inner_diameter": inner[elements],
-        **{stem: value[elements] for stem, value in of_elements.items()},
+        **{name: values[column.stem][elements] for name, column in OF_ELEMENTS.items()},
         "discs": [Disc(node, *row[:3]) for node, row in enumerate(rows, 1) if any(row[:3])],
         "supports": [Support(node, *row[3:]) for node, row in enumerate(rows, 1) if any(row[3:])],
         "has_ratio": "poisson_ratio" in table,
     }
 
 
-def _disc(item: DiscKeys, node: int, material: Material) -> Disc:
-    values = item.model_dump(exclude_none=True) | {"node": node}
-    if "mass" in values:
-        return Disc(**values)
-    return Disc.from_geometry(**{"density": material.density} | values)
-
-
 def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
     """ValueError for what is none of this rotor."""
-    n = len(file.parameter)
-    for one in file.parameter:
+    parameters, n = file.parameter, len(file.parameter)
+    for one in parameters:
         if expand(rotor, one.name) != (one.name,):
             raise ValueError(f"{one.name} is not a single parameter: name one, without [*]")
         if len(one.correlation) not in (0, n):
             raise ValueError(f"{one.name}: correlation needs {counted(n, 'number')}, one for each parameter")
-    std = np.array([one.std for one in file.parameter])
-    R = [one.correlation or row for one, row in zip(file.parameter, np.eye(n), strict=True)]
+    std = np.array([one.std for one in parameters])
+    R = [one.correlation or row for one, row in zip(parameters, np.eye(n), strict=True)]
     return Calibration(
-        tuple(one.name for one in file.parameter),
-        np.array([one.value for one in file.parameter]),
+        tuple(one.name for one in parameters),
+        np.array([one.value for one in parameters]),
         np.reshape(R, (n, n)) * np.outer(std, std),
         file.lack_of_fit,
         file.needs_trial_run,
@@ -338,14 +341,87 @@ def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
     )
 
 
-def _warn_of_units(source: str, rotor: Rotor) -> None:
-    """Sizes in a wrong unit give a rotor that can be computed all the same."""
-    items = [(f"{kind_of(one).replace('_', ' ')} at node {one.node}", one) for one in rotor.forces]
-    for what, item in [("", rotor), *items]:
-        for name, (low, high, unit, others) in USUAL.items():
-            values = np.atleast_1d(getattr(item, name, 0.0))
-            for i in np.flatnonzero((values > 0) & ((values < low) | (values > high)))[:1].tolist():
-                meant = [other for other, size in others.items() if low <= values[i] * size <= high]
-                words = f"{source}, {what or f'element {i + 1}'}: {name} {values[i]:.6g} {unit}"
-                question = f"is this in {[*meant, 'another unit'][0]}?"
-                warnings.warn(f"{words}; {question}", TableWarning, stacklevel=3)
+def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
+    """Write a rotor so that `read_rotor` gives an equal one, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        Ends in `.toml`; the tables `NAME_shaft.csv` and `NAME_bearing_1.csv`, `NAME_seal_2.csv`, …
+        (of supports whose coefficients depend on speed) go beside it.
+    rotor
+        What to write. A disc is written by its mass and moments of inertia, however it was made.
+
+    Returns
+    -------
+    tuple of Path
+        All files written, the rotor file first. Existing files are replaced, after all new ones are
+        complete on disk.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or its name has another ending.
+    ValueError
+        If the file would not give the rotor back: names of stations that read as node numbers, names that
+        are no Unicode text, numbers that are no machine's.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".toml":
+        raise InputError([Problem(str(path), None, None, None, "a name that ends in .toml")])
+    files = rotor_file_bytes(path, rotor)
+    write_files(files)
+    return tuple(reversed(files))
+
+
+def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
+    """All files of a rotor, the rotor file last: it names the others; ValueError as `write_rotor`."""
+    beside, why = path.parent / ".written", ""
+    try:
+        files = _files(path, rotor)
+        copies = {beside / file.name: data for file, data in files.items()}
+        with each_file_once(copies), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if read_rotor(beside / path.name) == rotor:
+                return files
+    except ValueError as error:
+        why = f": {error}".replace(".written/", "")
+    raise ValueError(f"{path}: this rotor would not come back from its file{why}")
+
+
+def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
+    shaft, material = path.with_name(f"{path.stem}_shaft.csv"), dict[str, float]()
+    columns: dict[str, list[Any]] = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
+    for name, column in OF_ELEMENTS.items():
+        values = getattr(rotor, name)
+        if name in Material.model_fields and np.ptp(values) == 0:
+            material[name] = float(values[0])
+        elif values.any():
+            columns[column.names[0]] = values.tolist()
+    supports, tables = support_tables(rotor.supports, path)
+    document = {
+        "shaft": shaft.name,
+        "material": in_si(Material, material),
+        "model": vars(rotor.model),  # in full: a ratio would make shear count
+        "disc": [in_si(DiscKeys, vars(disc)) for disc in rotor.discs],
+        **supports,
+        **force_tables(rotor.forces),
+        "station": [{"name": name, "node": node} for name, node in rotor.stations.items()],
+        "calibration": _calibration_tables(rotor.calibration) if rotor.calibration else {},
+    }
+    return {
+        shaft: csv_bytes((), [*columns], [*zip(*columns.values(), strict=True)]),
+        **tables,
+        path: toml_bytes({name: part for name, part in document.items() if part}),
+    }
+
+
+def _calibration_tables(calibration: Calibration) -> dict[str, Any]:
+    arrays = calibration.values, calibration.std, calibration.correlation
+    rows = zip(calibration.names, *(array.tolist() for array in arrays), strict=True)
+    return {
+        "needs_trial_run": calibration.needs_trial_run,
+        "lack_of_fit": calibration.lack_of_fit,
+        "parameter": [dict(zip(Parameter.model_fields, row, strict=True)) for row in rows],
+        "data": [{"file": name, "sha256": value} for name, value in calibration.data.items()],
+    }

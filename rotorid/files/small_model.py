@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import Field
 
-from fem import GRAVITY, Motion
-from rotorid.base.arrays import FloatArray, polar
+from fem import GRAVITY, Motion, NodeForce, Support
+from rotorid.base.arrays import polar
 from rotorid.files import units
-from rotorid.files.bearing import Attached, read_attached, support_tables
-from rotorid.files.forces import Place, Places, each, force_tables, whole
+from rotorid.files.attached import (
+    Attached,
+    Place,
+    each,
+    force_tables,
+    in_si,
+    places,
+    read_attached,
+    support_tables,
+    whole,
+)
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
-from rotorid.files.settings import NotNegative, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings
+from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"
@@ -29,30 +37,17 @@ FORCE = "f_"
 _HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
-def _numbers(value: object) -> FloatArray:
-    with suppress(TypeError, ValueError, OverflowError):
-        array = np.array(value, dtype=float)
-        if array.size and np.isfinite(array).all() and array.ndim:
-            return array
-    raise ValueError("a list of finite numbers, one for each node, or a square matrix of them")
-
-
-List = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[float])]
-Matrix = Annotated[Any, PlainValidator(_numbers, json_schema_input_type=list[list[float]])]
-
-
 class UnbalanceKeys(Place):
     """Unbalance at a node."""
 
-    unbalance: NotNegative = key("mass times radius", "unbalance_g_mm", units=units.UNBALANCE)
+    size: NotNegative = key("mass times radius", "unbalance_g_mm", units=units.UNBALANCE)
     angle: Turn = key("its angle with the rotation", "angle_deg", units=units.ANGLE)
 
 
-class BowKeys(Place):
+class BowKeys(UnbalanceKeys):
     """Bow at a node."""
 
-    bow: NotNegative = key("off the straight line at rest", "bow_um", units=units.LENGTH)
-    angle: Turn = key("its angle with the rotation", "angle_deg", units=units.ANGLE)
+    size: NotNegative = key("off the straight line at rest", "bow_um", units=units.LENGTH)
 
 
 class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
@@ -61,18 +56,22 @@ class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
     nodes: tuple[Annotated[int, Field(ge=1)], ...] = key(
         "numbers of the nodes", expected="different whole numbers from 1 up, nodes = [2, 7, 12]", min_length=1
     )
-    masses: List = key(
+    masses: list[Number] = key(
         "mass at each node; 0 where only a force acts", "masses_kg", expected="a mass for each node"
     )
-    weight: List | None = key("what weighs at each node; default: the masses", "weight_N", None)
-    stiffness: Matrix = key(
+    weight: list[Number] | None = key("what weighs at each node; default: the masses", "weight_N", None)
+    stiffness: list[list[Number]] = key(
         "of the shaft without supports, one plane, symmetric",
         "shaft_stiffness_N_per_m",
         expected="the shaft's stiffness between the nodes, a matrix",
     )
-    material_damping: Matrix = key("of the shaft, which turns with it", "material_damping_N_s_per_m", 0.0)
-    gyroscopic: Matrix = key("G of the gyroscopic effect: Ω G y' in x, −Ω G x' in y", "gyroscopic_kg", 0.0)
-    damping: Matrix = key("of the surroundings", "damping_N_s_per_m", 0.0)
+    material_damping: list[list[Number]] = key(
+        "of the shaft, which turns with it", "material_damping_N_s_per_m", 0.0
+    )
+    gyroscopic: list[list[Number]] = key(
+        "G of the gyroscopic effect: Ω G y' in x, −Ω G x' in y", "gyroscopic_kg", 0.0
+    )
+    damping: list[list[Number]] = key("of the surroundings", "damping_N_s_per_m", 0.0)
     unbalance: list[UnbalanceKeys] = key("unbalance at a node; several are added", default=[])
     bow: list[BowKeys] = key("bow of the shaft, at three nodes or more", default=[])
     equations: dict[str, Any] = key(
@@ -81,6 +80,13 @@ class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
         default={},
     )
 
+    def wrong(self) -> Iterator[tuple[str, str]]:
+        """Matrices with rows of several lengths."""
+        for name in ARRAYS:
+            rows = getattr(self, name)
+            if isinstance(rows, list) and len({*map(np.size, rows)}) > 1:
+                yield name, "rows of one length"
+
 
 ARRAYS = {
     item.name: SmallModelFile.model_fields[item.name].alias or item.name for item in fields(SmallModel)[:7]
@@ -88,11 +94,14 @@ ARRAYS = {
 """Keys by attribute."""
 
 
+def is_small(data: Mapping[str, Any]) -> bool:
+    """Whether a file has masses or a stiffness, which no other file has."""
+    return not {"masses_kg", "shaft_stiffness_N_per_m"}.isdisjoint(data)
+
+
 def is_small_model(path: Path) -> bool:
-    """Whether a file has masses or a stiffness, which no rotor file has."""
-    if path.suffix.lower() != ".toml":
-        return False
-    return not {"masses_kg", "shaft_stiffness_N_per_m"}.isdisjoint(read_toml(path, Problems()) or ())
+    """Whether a file is a small model."""
+    return path.suffix.lower() == ".toml" and is_small(read_toml(path, Problems()) or {})
 
 
 def read_small_model(path: str | Path) -> SmallModel:
@@ -117,34 +126,32 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     data = problems.need(read_toml(path, problems))
     file = problems.need(read_settings(SmallModelFile, data, str(path), problems))
     problems.stop()
-    at, unbalance, bow = Places(file.nodes, {}), dict[int, complex](), dict[int, complex]()
+    at = places(file.nodes, {})
 
-    def mount(item: UnbalanceKeys) -> None:
-        node = at(item)
-        unbalance[node] = unbalance.get(node, 0j) + complex(polar(item.unbalance, item.angle))
+    def vector(item: UnbalanceKeys) -> tuple[int, complex]:
+        return at(item), complex(polar(item.size, item.angle))
 
-    def bend(item: BowKeys) -> None:
-        if at(item) in bow:
-            raise ValueError("it stands at a node that has one already")
-        bow[at(item)] = complex(polar(item.bow, item.angle))
-
-    supports, forces = read_attached(file, at, path.parent, problems)
-    each(problems, file.unbalance, "unbalance", mount)
-    each(problems, file.bow, "bow", bend)
+    attached = read_attached(file, at, path.parent, problems)
+    unbalance = each(problems, file.unbalance, "unbalance", vector)
+    bow = each(problems, file.bow, "bow", vector)
+    if len(dict(bow)) < len(bow):
+        file.complain(problems, "bow", "each node once")
     problems.stop()
-    arrays: dict[str, Any] = {name: getattr(file, name) for name in ARRAYS}
-    if arrays["weight"] is None:
-        arrays["weight"] = GRAVITY * arrays["masses"]
-    more: dict[str, Any] = {"supports": supports, "forces": forces, "unbalance": unbalance, "bow": bow}
-    model = whole(file, "small model", lambda _: SmallModel(**arrays, **more))
+    parts: dict[str, Any] = {name: getattr(file, name) for name in ARRAYS}
+    parts["weight"] = file.weight or GRAVITY * np.array(file.masses)
+    parts["supports"] = [one for one in attached if isinstance(one, Support)]
+    parts["forces"] = [one for one in attached if isinstance(one, NodeForce)]
+    parts["unbalance"] = dict.fromkeys(dict(unbalance), 0j)
+    for node, value in unbalance:
+        parts["unbalance"][node] += value
+    model = whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow)))
     held = float(model.stiffness.sum())
-    if abs(held) > _HELD * np.abs(model.stiffness).max() and (supports or forces):
-        warnings.warn(
-            f"{path}, key shaft_stiffness_N_per_m: the shaft itself resists a shift with {held:.4g} N/m; "
-            "what holds it stands in tables such as [[bearing]], and the matrix needs all its digits",
-            TableWarning,
-            stacklevel=3,
+    if abs(held) > _HELD * np.abs(model.stiffness).max() and attached:
+        words = (
+            f"the shaft alone, with all digits: it resists a shift with {held:.4g} N/m, and what holds it "
+            "stands in tables such as [[bearing]]"
         )
+        warnings.warn(f"{path}, key {ARRAYS['stiffness']}: {words}", TableWarning, stacklevel=3)
     return model, {**file.equations}
 
 
@@ -187,14 +194,15 @@ def equations_of(
     ValueError
         Coordinates that nothing holds, dampers at none.
     """
-    M, C, K = motion.M, motion.C, motion.K
-    free = ~np.any([M, M.T, C, C.T], axis=(0, 1)) & [name not in dampers for name in motion.coordinates]
-    on, off = np.flatnonzero(~free), np.flatnonzero(free)
-    if np.linalg.matrix_rank(K[np.ix_(off, off)]) < off.size:
+    M, C, K, names = motion.M, motion.C, motion.K, np.array(motion.coordinates)
+    moves = np.any([M, M.T, C, C.T], axis=(0, 1)) | np.isin(names, [*dampers])
+    on, off = np.flatnonzero(moves), np.flatnonzero(~moves)
+    loose = K[np.ix_(off, off)]
+    if np.linalg.matrix_rank(loose) < off.size:
         raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
-    bent = np.linalg.solve(K[np.ix_(off, off)], K[np.ix_(off, on)])
-    M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K - K[:, off] @ bent @ np.eye(len(K))[on]))
-    names, damping = [motion.coordinates[i] for i in on], C.astype(float).astype(object)
+    K = K - K[:, off] @ np.linalg.solve(loose, K[off])
+    M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K))
+    names, damping = names[on].tolist(), C.astype(float).astype(object)
     for i in [names.index(name) for name in dampers]:
         damping[i, i] = f"{damping[i, i]!r} + d_{names[i]}" if damping[i, i] else f"d_{names[i]}"
     data: dict[str, Any] = {
@@ -220,20 +228,18 @@ def small_equations(path: Path) -> dict[str, Any]:
         if model.forces:
             raise ValueError("linear forces alone; `rotorid motion` follows the others")
         motion = linear_equations(model, speed, both)
-        estimate, inputs = more.get("estimate", {}), more.get("inputs", [])
+        names, estimate, inputs = motion.coordinates, more.get("estimate", {}), more.get("inputs", [])
         shown = [f"{axis}{node}" for axis in "xy" for node in model.massive]
         equations = equations_of(
             motion,
-            {name: estimate[f"d_{name}"] for name in motion.coordinates if f"d_{name}" in estimate},
-            [name for name in inputs if name.removeprefix("f_") in motion.coordinates],
-            [name for name in shown if name in motion.coordinates],
+            {name: estimate[f"d_{name}"] for name in names if f"d_{name}" in estimate},
+            [name for name in inputs if name.removeprefix(FORCE) in names],
+            [name for name in shown if name in names],
         )
+        merged = {name: equations.get(name, {}) | more.get(name, {}) for name in ("force", "bounds")}
     except (ValueError, TypeError) as error:
         raise InputError([Problem(str(path), None, "equations", None, str(error))]) from None
-    for name, value in more.items():
-        added = isinstance(value, dict) and name != "outputs"
-        equations[name] = {**equations.get(name, {}), **value} if added else value
-    return equations
+    return equations | more | merged
 
 
 def small_model_files(
@@ -244,19 +250,21 @@ def small_model_files(
     `equations` is the table of that name.
     """
     arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
-    tables, files = support_tables(model.supports, path, ordered=True)
+    supports, files = support_tables(model.supports, path, ordered=True)
     data: dict[str, Any] = {
         **{key: array.tolist() for key, array in arrays.items() if array.any() or "shaft" in key},
-        **tables,
+        **supports,
         **force_tables(model.forces),
-        **{
-            name: [
-                {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
-                for node, value in getattr(model, name).items()
-            ]
-            for name, size in (("unbalance", "unbalance_kg_m"), ("bow", "bow_m"))
-        },
+        "unbalance": _vectors(UnbalanceKeys, model.unbalance),
+        "bow": _vectors(BowKeys, model.bow),
         "equations": equations,
     }
     written = toml_bytes({name: part for name, part in data.items() if part}, comments)
     return {**files, path: written}
+
+
+def _vectors(keys: type[UnbalanceKeys], by_node: Mapping[int, complex]) -> list[dict[str, Any]]:
+    return [
+        {"node": node} | in_si(keys, {"size": abs(value), "angle": float(np.angle(value))})
+        for node, value in by_node.items()
+    ]

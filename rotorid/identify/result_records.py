@@ -16,7 +16,7 @@ from rotorid.identify.record_residuals import Iterations
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import Trajectory
 from rotorid.regression.estimate import parameter_columns
-from rotorid.regression.normal_matrix import NormalMatrix
+from rotorid.regression.linear import NormalMatrix
 from rotorid.regression.prior import PriorEffect
 
 if TYPE_CHECKING:
@@ -124,7 +124,8 @@ class Fit(Answered, Iterations):
     def answer(self) -> Answer:
         """Whether there is an answer, the values with their intervals, and what the model leaves."""
         prior, rank = self.prior, self.estimate.describe_rank()
-        parts = self.estimate.told(self.at_bounds, prior.why if prior else {})
+        at_bounds = dict.fromkeys(self.at_bounds, "at its bound")
+        parts = self.estimate.answer_with((prior.why if prior else {}) | at_bounds)
         judgement = prior.judgement(parts.judgement) if prior else parts.judgement
         warnings = [w for w in self.warnings if w != rank and not w.startswith(self.message)]
         data = np.concatenate([values for record in self.records for values in record.outputs.values()])

@@ -237,7 +237,7 @@ def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
-        from rotorid.files.input_file import each_file_once
+        from rotorid.files.disk import each_file_once
 
         given = signature.bind(*args, **kwargs)
         options = given.arguments.get("options")
@@ -269,7 +269,7 @@ def provenance(
         For a file that cannot be read.
     """
     from rotorid import __version__
-    from rotorid.files.input_file import sha256
+    from rotorid.files.disk import sha256
 
     return {
         "program": "rotorid",

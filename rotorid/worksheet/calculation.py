@@ -36,7 +36,7 @@ _read: dict[str, int] = {}
 
 def main() -> None:
     """Answer requests until standard input ends."""
-    from rotorid.files.input_file import reading
+    from rotorid.files.disk import reading
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reading.set(_noted)

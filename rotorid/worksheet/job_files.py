@@ -12,12 +12,11 @@ from typing import Any
 
 from rotorid.base.text import listing
 from rotorid.files.cells import Grid, clean
+from rotorid.files.disk import MOST_BYTES, file_content, first_bytes, write_files
 from rotorid.files.excel_workbook import SUFFIXES, is_workbook
-from rotorid.files.input_file import MOST_BYTES, file_content, first_bytes
 from rotorid.files.job import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.table_writing import write_files
 from rotorid.worksheet.job_settings import setting, settings_in, with_setting
 from rotorid.worksheet.text_table import Table, read_table, shown
 

@@ -135,7 +135,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     from rotorid.files.columns import make_table, read_grid
     from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
     from rotorid.files.job import conventions_of, open_job, tables_of
-    from rotorid.files.layout import read_runs_grid
+    from rotorid.files.layout import joined, read_runs_grids
     from rotorid.files.problems import Problems
     from rotorid.files.runs import COLUMNS, make_trials
 
@@ -145,7 +145,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     conventions = conventions_of(settings)
     sources, _ = tables_of(written, settings)
     grid = None if "runs" not in sources else read_grid(sources["runs"], "runs", problems)
-    grid = None if grid is None else read_runs_grid(_finished(grid), conventions, problems)
+    grid = None if grid is None else joined(read_runs_grids(_finished(grid), conventions, problems), problems)
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
         problems.stop()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,9 +13,8 @@ from pathlib import Path
 
 from rotorid.base.tables import guarded
 from rotorid.files import runs, weights
-from rotorid.files.cells import SEP_LINE, Grid, clean, decode_as, parse_text, show
+from rotorid.files.cells import SEP_LINE, Grid, clean, decimal_comma, decode, parse_text, show
 from rotorid.files.columns import REMARKS, column_of
-from rotorid.files.decimal_numbers import decimal_comma
 from rotorid.files.headings import find_header
 from rotorid.files.job_excel import TEXT_COLUMNS
 from rotorid.files.job_models import READINGS
@@ -133,7 +133,9 @@ class Table:
 def read_table(path: Path, key: str, data: bytes) -> Table:
     """The table that the job names by `key`; one of another form is read only."""
     problems = Problems()
-    text, encoding = decode_as(path.name, data, problems) or ("", "")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a guessed encoding; the calculation says so
+        text = decode(path.name, data, problems) or ""
     find = find_header if key in READINGS else None
     grid = None if len(problems) else parse_text(path.name, text, problems, may_be_empty=True, find=find)
     if grid is None:
@@ -153,7 +155,7 @@ def read_table(path: Path, key: str, data: bytes) -> Table:
     elif grid.separator == "," or any("." in cell for cell in numbers):
         table.sign = "."
     table.separator, table.newline = grid.separator, "\r\n" if "\r\n" in text else "\n"
-    table.encoding = "utf-8" if encoding == "utf-8" else "utf-8-sig"
+    table.encoding = "utf-8" if data == text.encode() else "utf-8-sig"
     return table
 
 

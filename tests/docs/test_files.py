@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cases import each_of
 
-from rotorid.files import bearing, influence, modes, rotor, runs, unbalance, weights
+from rotorid.files import attached, influence, node_tables, rotor, runs, weights
 from rotorid.files import job_excel as jobbook
 from rotorid.files import job_models as jobkeys
 from rotorid.files.settings import Settings
@@ -26,14 +26,14 @@ CODE = re.findall(r"`([^`]+)`", TEXT.replace("```", "")) + [cells[0] for cells i
 WORDS = {word for code in CODE for word in re.findall(r"\w+", code)}
 TABLES = {
     "rotor": rotor.COLUMNS,
-    "bearing": bearing.COLUMNS,
-    "bow": unbalance.BOW_COLUMNS,
+    "bearing": attached.COLUMNS,
+    "bow": node_tables.BOW_COLUMNS,
     "runs": runs.COLUMNS,
     "weights": weights.COLUMNS,
     "influence": influence.COLUMNS,
-    "unbalance": unbalance.COLUMNS,
-    "modes": modes.MODE_COLUMNS,
-    "compliance": modes.COMPLIANCE_COLUMNS,
+    "unbalance": node_tables.UNBALANCE_COLUMNS,
+    "modes": node_tables.MODE_COLUMNS,
+    "compliance": node_tables.COMPLIANCE_COLUMNS,
 }
 
 

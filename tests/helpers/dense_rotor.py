@@ -14,7 +14,7 @@ where meshes are so fine that float64 no longer does (Euler–Bernoulli only).
 Unknowns stand in the order of the axis: node 1 (x, θx, y, θy), inner unknowns of element 1, node 2, …
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -113,6 +113,19 @@ def whirl(rotor, speed):
     keep = np.flatnonzero(lam.imag > 1e-6 * np.abs(lam))
     keep = keep[np.argsort(lam[keep].imag)]
     return lam[keep], vectors[D.x][:, keep].T, vectors[D.y][:, keep].T
+
+
+def synchronous(rotor, speed):
+    """K and N of undamped whirl at the speed itself, K q = Ω² N q; of the forward plane where that is all."""
+    D = assemble(rotor, speed)
+    still = assemble(replace(rotor, supports=[], material_damping=0.0), 1.0).C
+    K, N = (D.K + D.K.T) / 2, D.M.astype(complex)
+    N[: len(still), : len(still)] -= 1j * still
+    if not rotor.symmetric:
+        return K, N
+    feet = np.arange(len(still), len(K), 2)
+    x, y = np.concatenate((D.x, D.x + 1, feet)), np.concatenate((D.y, D.y + 1, feet + 1))
+    return tuple(A[np.ix_(x, x)] - 1j * A[np.ix_(x, y)] for A in (K, N))
 
 
 def polished(rotor, speed, lam, precision=np.longdouble, steps=3):

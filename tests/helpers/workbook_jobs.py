@@ -9,6 +9,7 @@ import io
 import json
 import re
 import tomllib
+import zipfile
 from collections.abc import Mapping
 
 import numpy as np
@@ -217,3 +218,19 @@ def _cell(value):
     if isinstance(value, list):
         return "; ".join(map(str, value))
     return str(value) if isinstance(value, datetime.date) else value
+
+
+def with_stored_values(path, values):
+    """The workbook with values stored in its formulas, in order, as Excel stores them."""
+    with zipfile.ZipFile(path) as book:
+        parts = {name: book.read(name) for name in book.namelist()}
+    left = iter(values)
+    for name in (name for name in parts if name.startswith("xl/worksheets")):
+        parts[name] = re.sub(
+            rb"</f><v ?/?>(</v>)?", lambda _: f"</f><v>{next(left)}</v>".encode(), parts[name]
+        )
+    with zipfile.ZipFile(path, "w") as book:
+        for name, data in parts.items():
+            book.writestr(name, data)
+    assert next(left, None) is None
+    return path

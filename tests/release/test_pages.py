@@ -9,13 +9,12 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import cells, decimal_numbers, excel_workbook, input_file, instruments, problems, toml_file
+from rotorid.files import cells, disk, excel_workbook, instruments, problems, toml_file
 from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-SECURITY = (DOCS / "security.md").read_text(encoding="utf-8")
 STABILITY = (DOCS / "stability.md").read_text(encoding="utf-8")
 MB = 10**6
 
@@ -23,7 +22,7 @@ MB = 10**6
 @pytest.mark.parametrize(
     ("limit", "value"),
     [
-        ("a file, and a workbook unpacked", f"{input_file.MOST_BYTES // MB} MB"),
+        ("a file, and a workbook unpacked", f"{disk.MOST_BYTES // MB} MB"),
         ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
         ("cells of a table", f"{cells.MOST_CELLS:,}"),
         ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
@@ -39,21 +38,21 @@ MB = 10**6
         ("holes of a plane", f"{MOST_HOLES:,}"),
         (
             "numbers in files, in size",
-            f"from {decimal_numbers.SMALLEST:g} to {decimal_numbers.LARGEST:g}, or 0".replace("+", ""),
+            f"from {cells.SMALLEST:g} to {cells.LARGEST:g}, or 0".replace("+", ""),
         ),
         ("arrays of waveforms (`.npz`, `.mat`)", f"{instruments.LARGEST // 10**9} GB"),
         ("a request to the worksheet", f"{app._LARGEST // MB} MB"),
     ],
 )
 def test_a_limit_on_the_page_is_that_of_the_code(limit, value):
-    assert f"| {limit} | {value} |" in SECURITY
+    assert f"| {limit} | {value} |" in STABILITY
 
 
 def test_the_page_of_security_knows_the_guard_and_the_words():
-    assert f"serves {server.HOST} alone" in SECURITY
-    assert f"up to {problems.LONGEST_VALUE} characters" in SECURITY
+    assert f"serves {server.HOST} alone" in STABILITY
+    assert f"up to {problems.LONGEST_VALUE} characters" in STABILITY
     assert len(expressions.FUNCTIONS) == 14
-    assert "fourteen functions" in SECURITY
+    assert "fourteen functions" in STABILITY
 
 
 ENTITIES = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 11))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.commands.option_quantities import vectors
+from rotorid.commands.option_quantities import mass, vectors
 from rotorid.commands.split import SplitOptions, split
 
 
@@ -152,3 +152,8 @@ def test_weights_are_added_and_what_is_mounted_counts(run):
     assert both["target"]["mass"] == pytest.approx(5)
     rest = run("3g@0+4g@90+3g@180", "--holes", "4", "--json").json
     assert rest["target"] == {"mass": pytest.approx(4), "angle_deg": pytest.approx(90)}
+
+
+def test_a_mass_in_pounds_and_ounces():
+    for text, pounds in (("1000lbs", 1000), ("1000 lb", 1000), ("5oz", 5 / 16)):
+        assert mass(text, "--mass") == pytest.approx(pounds * 0.45359237, rel=1e-14)

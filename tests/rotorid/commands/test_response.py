@@ -53,7 +53,7 @@ def test_response_reads_at_angles_and_stations(cli, files, model):
 def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_path):
     plain = fem.Rotor([0.3] * 3, 0.05, supports=[fem.Support(1, 1e7, 1e3), fem.Support(4, 1e7, 1e3)])
     write_rotor(tmp_path / "plain.toml", plain)
-    write_csv(tmp_path / "n.csv", [["node", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
+    write_csv(tmp_path / "n.csv", [["plane", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
     command = ("--speeds", "60:200:70", "--json")
     by_stations = cli("response", files[0], "--unbalance", files[1], *command).json
     assert by_stations["sensors"] == ["wheel", "probe"]
@@ -154,7 +154,9 @@ def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
     write_rotor(whole, rotor)
     model = small_model(rotor, (4, 8), (30.0, 20.0))
     small.write_bytes(small_model_files(small, model)[small])
-    table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]])
+    table = write_csv(
+        tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]]
+    )
     how = (
         "--unbalance",
         table,
@@ -187,7 +189,7 @@ def test_an_undamped_small_model_has_one_row_for_each_critical_speed(cli, tmp_pa
     rotor = read_rotor(sample_data() / "rotor23.csv")
     small = tmp_path / "small.toml"
     small.write_bytes(small_model_files(small, small_model(rotor, (7, 12, 18), (134.0, 197.0, 157.0)))[small])
-    table = write_csv(tmp_path / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [12, 1000, 0]])
+    table = write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [12, 1000, 0]])
     outcome = cli(
         "response", small, "--unbalance", table, "--speeds", "500:9000:10rpm", "--sensors", "7,12,18"
     )

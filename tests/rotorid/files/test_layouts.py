@@ -12,9 +12,7 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
-from rotorid.base.text import listing
 from rotorid.files import InputError, read_job, read_trials
-from rotorid.files.runs import COLUMNS
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -237,8 +235,6 @@ def test_the_same_as_a_sheet(tmp_path, name):
     assert_same(read_trials(tmp_path / "export.xlsx", weights, phase="lag"), tidy)
 
 
-NAMES = listing([name for column in COLUMNS for name in column.names], "and")
-KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
@@ -322,10 +318,6 @@ EXPLAINED = {
         PREAMBLE.replace("4,9", "4,9 um"),
         "runs.csv, row 8, column Amplitude (µm pk-pk): found '4,9 um', expected a number in um_pp, as the "
         "heading says",
-    ),
-    "a vector of a weight": (
-        WIDE_VECTORS.replace("um pp;um pp", "um pp;g").replace("B", "Trial weight"),
-        f"runs.csv, row 2, column Trial weight (g): found 'Trial weight (g)', expected {KNOWN}",
     ),
     "thousands": (
         VECTORS.replace("4,9∠", "1.004,9∠"),

@@ -119,35 +119,30 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
     ("old", "new", "message"),
     [
         ("nodes = [1, 5, 9]", "", r"key nodes: expected different whole numbers from 1 up, nodes ="),
-        ("[1, 5, 9]", "[1, 5, 5]", r"one of the nodes 1, 5 or 5"),
-        ("[1, 5, 9]", "[1, 5, 9.5]", r"key nodes: found '9.5', expected a whole number"),
+        ("[1, 5, 9]", "[1, 5, 5]", r"a node 1, 5 or 5 or a station"),
         ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: found '0', expected a number of 1 or more"),
-        ("[1, 5, 9]", "[]", r"key nodes: .*a list with at least 1"),
         ("masses_kg", "mass_kg", r"key masses_kg: expected a mass for each node"),
         ("80.5, 12", "80.5", r"masses: 3 finite numbers for 3 nodes"),
         ("80.5", "-80.5", r"masses: 0 or more"),
-        ("80.5", "nan", r"key masses_kg: .*expected a list of finite numbers"),
+        ("80.5", "nan", r"key masses_kg: found 'nan', expected a finite number"),
         ("[-2e6, 4e6", "[-2.1e6, 4e6", r"stiffness: a symmetric matrix"),
         (", [1e6, -2e6, 1e6]]", "]", r"stiffness: 3 × 3 finite"),
-        (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: .*expected .*a square matrix"),
-        ("shaft_stiffness", "stiffness", r"shaft_stiffness_N_per_m: expected the shaft's stiffness"),
+        (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: .*rows of one length"),
         (
             "node = 1\n",
             "node = 2\n",
-            r"key bearing\[1\].node: found '2', expected one of the nodes 1, 5 or 9",
+            r"key bearing\[1\].node: found '2', expected a node 1, 5 or 9",
         ),
-        ("node = 9\n", "", r"key journal_bearing\[1\].node: expected a node"),
-        (
-            "[-2e6, 4e6",
-            "[-2e6, -4e6",
-            r"stiffness: .* no negative eigenvalue",
-        ),
-        ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected a node"),
         ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
         ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected .* angle"),
         (
+            "[[unbalance]]",
+            "[[bow]]\nnode = 5\nbow_um = 1\nangle_deg = 2\n" * 2 + "[[unbalance]]",
+            r"key bow: .*once",
+        ),
+        (
             "stiffness_N_per_m = 1e7",
-            "tilting_stiffness_N_m_per_rad = 1.0\nstiffness_N_per_m = 1e7",
+            "tilting_stiffness_N_m_per_rad = 1.0\ndamping_N_s_per_m = 1",
             "no slopes",
         ),
     ],
@@ -166,7 +161,6 @@ def test_a_shaft_that_resists_a_shift_is_asked_about(tmp_path):
     with pytest.warns(TableWarning, match=r"key shaft_stiffness_N_per_m: .* a shift with 1e\+07 N/m"):
         read_small_model(written(tmp_path, held))
     few = PLAIN.replace("4e6", "3.99999e6")
-    with pytest.warns(TableWarning, match=r"a shift with -10 N/m; .* needs all its digits"):
+    with pytest.warns(TableWarning, match=r"with all digits: it resists a shift with -10 N/m"):
         read_small_model(written(tmp_path, few))
-    alone = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6").split("[[bearing]]")[0]
-    assert read_small_model(written(tmp_path, alone)).motion().K[0, 0] == 1.1e7
+    assert read_small_model(written(tmp_path, held.split("[[bearing]]")[0])).motion().K[0, 0] == 1.1e7

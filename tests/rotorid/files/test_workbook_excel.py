@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import datetime
 import io
-import zipfile
 
 import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
 from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, write_book
-from workbook_jobs import differences, filled, rows
+from workbook_jobs import differences, filled, rows, with_stored_values
 
 from balancing import correct, estimate_influence
 from rotorid.files import read_job
-from rotorid.files.job_excel import template_bytes
+from rotorid.files.job_excel import NAMED, template_bytes
+from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
 from rotorid.samples import sample_data
 
 BK = sample_data() / "bk_two_plane"
@@ -67,6 +67,11 @@ def test_the_form_has_headers_explanations_and_choices():
         keys = names if name != "settings" else [cell.value for cell in book["settings"]["A"][1:]]
         assert {(name, key) for key in keys} <= set(notes)
 
+    for (sheet, first), model in zip(NAMED.items(), (Plane, Sensor), strict=True):
+        names = {cell.value for cell in book[sheet][1]} - {first, "note"}
+        assert names <= {name for key in model.known_keys().values() for name in key.variants}
+    known = {*JobSettings.known_keys(), *(f"errors.{name}" for name in Errors.known_keys())}
+    assert {cell.value for cell in book["settings"]["A"][1:]} <= known
     rules = {str(rule.sqref): rule for rule in book["runs"].data_validations.dataValidation}
     assert rules["B1"].formula1.strip('"').split(",") == ["speed_rpm", "speed_rad_s", "speed_Hz"]
     assert float(rules["D2:D1048576"].formula1) == 0
@@ -86,6 +91,7 @@ def test_the_form_filled_with_the_published_example(tmp_path):
 
 
 def test_the_form_with_settings(tmp_path):
+    """Excel keeps 2% as 0.02, which must not be read as 0.02 percent."""
     path = filled(
         tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=[{"plane": "1", "use": "no"}]
     )
@@ -98,6 +104,11 @@ def test_the_form_with_settings(tmp_path):
     job = read_job(path)
     assert (job.conventions.labels.phase, job.used) == ("lag", ("2",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
+    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).number_format = "0%"
+    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).value = 0.02
+    book.save(path)
+    (complaint,) = complaints(read_job, path)
+    assert "found '2%'" in str(complaint)
 
 
 def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
@@ -117,6 +128,7 @@ def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
         ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
+        ("planes", 3, "plane", "9", "9", "one of the job's planes, 1 and 2"),
         ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
         ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
         ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
@@ -129,28 +141,6 @@ def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, v
     found = complaints(read_job, write_book(tmp_path / "job.xlsx", changed))
     problem = the_only(found, "job.xlsx", row, column, shown, words)
     assert f"sheet {sheet!r}" in problem.file
-
-
-def with_stored_values(path, values):
-    """The workbook with values stored in its formulas, in order, as Excel stores them."""
-    parts = {}
-    with zipfile.ZipFile(path) as book:
-        for name in book.namelist():
-            data = book.read(name).decode() if name.endswith(".xml") else book.read(name)
-            while (
-                isinstance(data, str)
-                and name.startswith("xl/worksheets")
-                and "</f><v></v>" in data.replace("<v />", "<v></v>")
-            ):
-                data = data.replace("<v />", "<v></v>").replace(
-                    "</f><v></v>", f"</f><v>{values.pop(0)}</v>", 1
-                )
-            parts[name] = data
-    with zipfile.ZipFile(path, "w") as book:
-        for name, data in parts.items():
-            book.writestr(name, data)
-    assert not values
-    return path
 
 
 def test_formulas_with_stored_values_count(tmp_path):
@@ -185,24 +175,3 @@ def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
     path = write_book(tmp_path / "job.xlsx", {**BOOK, "check_weights": WEIGHTS})
     words = "the check runs too"
     the_only(complaints(read_job, path), "job.xlsx", None, "check_weights", None, words)
-
-
-def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):
-    """Excel keeps "2%" as 0.02: it must not be read as 0.02 percent."""
-    path = tmp_path / "job.xlsx"
-    write_book(path, BOOK)
-    book = openpyxl.load_workbook(path)
-    cell = book["settings"]["B4"]
-    cell.value, cell.number_format = 0.02, "0%"
-    book.save(path)
-    (complaint,) = complaints(lambda: read_job(path))
-    assert "2%" in str(complaint)
-    assert "formatted as a percentage" in str(complaint)
-
-
-def test_a_plane_that_does_not_exist_is_named_with_its_sheet_and_row(tmp_path):
-    path = tmp_path / "job.xlsx"
-    write_book(path, {**BOOK, "planes": [*PLANES, ["9", 5, None, None, None, None, None]]})
-    (complaint,) = complaints(lambda: read_job(path))
-    assert (complaint.row, complaint.column, complaint.value) == (4, "plane", "9")
-    assert "planes" in complaint.file

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from balancing import Labels
 from rotorid.base.tables import csv
 from rotorid.commands.modes import ModesOptions, modes
-from rotorid.files.modes import read_modes
+from rotorid.files.node_tables import read_modes
 from rotorid.identify.answers import SteadyAnswers
 from rotorid.identify.modes import fit_modes
 from rotorid.identify.modes_result import Readings

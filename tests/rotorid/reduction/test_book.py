@@ -6,7 +6,7 @@ from book.rotor import as_printed
 
 import fem
 from rotorid import InputError, read_rotor
-from rotorid.files.modes import read_compliance, read_modes
+from rotorid.files.node_tables import read_compliance, read_modes
 from rotorid.samples import sample_data
 
 NODES = (7, 12, 18)

@@ -1,7 +1,5 @@
 """The kernel against certified values, closed forms and its own promises."""
 
-import re
-
 import numpy as np
 import pytest
 from cases import each_of
@@ -61,9 +59,6 @@ def test_longley_agrees_with_the_certified_values_to_nine_digits():
     assert estimate.dof == 9
 
 
-complex_numbers = st.complex_numbers(max_magnitude=1e3, allow_nan=False, allow_infinity=False)
-
-
 @given(st.integers(1, 5), st.integers(1, 4), st.randoms(use_true_random=False))
 def test_stretching_turns_complex_products_into_real_ones(m, n, random):
     rng = np.random.default_rng(random.randrange(2**32))
@@ -75,19 +70,14 @@ def test_stretching_turns_complex_products_into_real_ones(m, n, random):
     np.testing.assert_array_equal(unstretch(stretch(x)), x)
 
 
-def test_many_matrices_and_vectors_stretch_as_one():
-    rng = np.random.default_rng(5)
-    A = rng.standard_normal((4, 3, 2)) + 1j * rng.standard_normal((4, 3, 2))
-    x = rng.standard_normal((4, 2)) + 1j * rng.standard_normal((4, 2))
-    vectors = np.stack([stretch(v) for v in x])
-    np.testing.assert_allclose(
-        unstretch((stretch(A) @ vectors[..., None])[..., 0]), (A @ x[..., None])[..., 0], rtol=1e-14
-    )
+def test_many_matrices_stretch_as_each_does():
+    A = np.random.default_rng(5).standard_normal((4, 3, 2, 2)) @ [1, 1j]
+    np.testing.assert_array_equal(stretch(A), [stretch(each) for each in A])
 
 
 def test_complex_equations_with_complex_unknowns():
     rng = np.random.default_rng(1)
-    K = rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2))
+    K = rng.normal(size=(6, 2, 2)) @ [1, 1j]
     truth = np.array([1 + 2j, -0.5j])
     estimate = least_squares(K, K @ truth, names=["A", "B"])
     np.testing.assert_allclose(unstretch(estimate.values), truth, atol=1e-12)
@@ -126,36 +116,19 @@ def test_stated_errors_give_normal_intervals_whatever_the_residuals():
 
 def test_no_degrees_of_freedom_no_interval():
     estimate = least_squares([[1.0, 0.0], [1.0, 1.0]], [1.0, 2.0], names=["a", "b"])
-    assert estimate.std is None
-    assert estimate.ci95 is None
-    assert estimate.correlation is None
+    assert estimate.std is estimate.ci95 is estimate.correlation is coverage_factor(0) is None
     assert "no intervals" in estimate.summary()
     assert estimate.to_dict()["parameters"]["a"] == {"value": pytest.approx(1.0), "std": None, "ci95": None}
-    assert coverage_factor(0) is None
 
 
-def test_sigma_weights_rows_and_equals_the_full_covariance_matrix():
+def test_stated_errors_weight_rows_as_the_inverse_of_their_squares():
     K, Y = straight_line()
     sigma = np.linspace(0.1, 1.0, 12)
-    diagonal = least_squares(K, Y, sigma=sigma)
-    full = least_squares(K, Y, sigma=np.diag(sigma**2))
-    weighted = least_squares(K, Y, weights=1 / sigma**2)
-    np.testing.assert_allclose(diagonal.values, full.values, rtol=1e-12)
-    np.testing.assert_allclose(diagonal.values, weighted.values, rtol=1e-12)
-    np.testing.assert_allclose(diagonal.covariance, full.covariance, rtol=1e-10)
-    assert diagonal.chi_square == pytest.approx(full.chi_square, rel=1e-12)
-
-
-def test_correlated_errors_against_the_generalised_least_squares_formula():
-    K, Y = straight_line()
-    rng = np.random.default_rng(5)
-    L = np.tril(rng.normal(size=(12, 12))) + 3 * np.eye(12)
-    S = L @ L.T
-    estimate = least_squares(K, Y, sigma=S)
-    information = K.T @ np.linalg.solve(S, K)
-    np.testing.assert_allclose(estimate.covariance, np.linalg.inv(information), rtol=1e-9)
-    expected = np.linalg.solve(information, K.T @ np.linalg.solve(S, Y))
-    np.testing.assert_allclose(estimate.values, expected, rtol=1e-9)
+    stated, weighted = least_squares(K, Y, sigma=sigma), least_squares(K, Y, weights=1 / sigma**2)
+    np.testing.assert_allclose(stated.values, weighted.values, rtol=1e-12)
+    information = K.T @ np.diag(sigma**-2) @ K
+    np.testing.assert_allclose(stated.covariance, np.linalg.inv(information), rtol=1e-10)
+    np.testing.assert_allclose(stated.values, np.linalg.solve(information, K.T @ (Y / sigma**2)), rtol=1e-10)
 
 
 def test_a_row_of_weight_zero_is_left_out():
@@ -175,23 +148,18 @@ def test_opposite_columns_are_named_with_what_is_determined():
     rng = np.random.default_rng(2)
     c, b = rng.normal(size=(2, 9))
     estimate = least_squares(np.column_stack((c, b, -b)), 3 * c - 2 * b, names=["c", "b", "δb"], sigma=0.1)
-    assert estimate.rank == 2
-    assert estimate.undetermined == ("b", "δb")
-    assert estimate.values[0] == pytest.approx(3.0)
-    assert np.isnan(estimate.values[1:]).all()
-    (combination,) = estimate.combinations
-    assert combination.words == "b − δb"
-    assert combination.value == pytest.approx(-2.0)
     expected = least_squares(np.column_stack((c, b)), 3 * c - 2 * b, sigma=0.1)
-    assert combination.std == pytest.approx(expected.std[1], rel=1e-9)
-    assert estimate.std[0] == pytest.approx(expected.std[0], rel=1e-9)
+    assert (estimate.rank, estimate.undetermined) == (2, ("b", "δb"))
+    np.testing.assert_allclose(estimate.values, [3.0, np.nan, np.nan])
+    (combination,) = estimate.combinations
+    assert combination.value == pytest.approx(-2.0)
+    assert (estimate.std[0], combination.std) == pytest.approx(tuple(expected.std), rel=1e-9)
     assert estimate.describe_rank().startswith("only c and b − δb are determined")
     document = estimate.to_dict()
     assert document["identifiable"] is False
     assert document["parameters"]["b"]["value"] is None
     assert document["combinations"] == {"b − δb": {"value": pytest.approx(-2.0), "std": combination.std}}
     assert estimate.answer.numbers.count("not determined") == 2
-    assert len(re.findall(r"^  \w+ {2,6}not determined$", estimate.answer.numbers, re.MULTILINE)) == 2
 
 
 def test_columns_of_very_different_size_do_not_look_dependent():
@@ -229,22 +197,6 @@ def test_determined_combinations_keep_their_value_along_the_null_space(n, seed):
         assert a.value == pytest.approx(a.coefficients @ truth, abs=1e-8)
 
 
-def test_intervals_cover_the_truth_as_often_as_they_say():
-    rng = np.random.default_rng(11)
-    K = rng.normal(size=(8, 3))
-    truth = np.array([1.0, -2.0, 0.5])
-    sigma = np.linspace(0.5, 2.0, 8)
-    inside = {"student": 0, "normal": 0}
-    repetitions = 2000
-    for _ in range(repetitions):
-        even = least_squares(K, K @ truth + rng.normal(size=8)).ci95[0]
-        stated = least_squares(K, K @ truth + sigma * rng.normal(size=8), sigma=sigma).ci95[0]
-        inside["student"] += even[0] <= truth[0] <= even[1]
-        inside["normal"] += stated[0] <= truth[0] <= stated[1]
-    for count in inside.values():
-        assert 0.935 <= count / repetitions <= 0.965
-
-
 @each_of(
     ("kwargs", "message"),
     [
@@ -257,7 +209,6 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
         ({"K": [[1.0, 2.0]], "Y": [1.0], "names": ["a", "a"]}, "different names"),
         ({"K": [[1.0]], "Y": [1.0], "sigma": 0.0}, "greater than zero"),
         ({"K": [[1.0]], "Y": [1.0], "sigma": [1.0, 2.0]}, "one entry per row"),
-        ({"K": [[1.0]], "Y": [1.0], "sigma": np.eye(2)}, "one entry per row"),
         ({"K": [[1.0]], "Y": [1.0], "sigma": np.nan}, "finite"),
         ({"K": [[1.0]], "Y": [1.0], "weights": [-1.0]}, "not negative"),
         ({"K": [[1.0]], "Y": [1.0], "weights": [0.0]}, "not all 0"),

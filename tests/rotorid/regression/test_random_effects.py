@@ -36,20 +36,6 @@ def test_one_job_a_group_has_no_scatter_within():
     assert not random_effects(y, error, np.arange(len(y))).within.any()
 
 
-def test_pairs_of_jobs_shrink_the_covariance_within_as_that_of_their_differences():
-    rng = np.random.default_rng(8)
-    y = rng.standard_normal((12, 6)) @ (np.eye(6) + 0.5)
-    half = (y[::2] - y[1::2]) / np.sqrt(2)
-    keep = ~np.eye(6, dtype=bool)
-    z = half / np.sqrt(np.mean(half**2, axis=0))
-    R, w = z.T @ z / 6, z[:, :, None] * z[:, None, :]
-    share = np.sum(w.var(axis=0)[keep]) / 6 / np.sum(R[keep] ** 2)
-    found = random_effects(y, np.zeros((12, 3, 2, 2)), np.repeat(np.arange(6), 2)).within
-    std = np.sqrt(np.diag(found))
-    assert std**2 == pytest.approx(np.mean(half**2, axis=0))
-    assert (found / np.outer(std, std))[keep] == pytest.approx((1 - share) * R[keep])
-
-
 def test_many_groups_give_back_what_was_drawn():
     C = np.array([[4.0, 1.5, 0, 0], [1.5, 1.0, 0, 0], [0, 0, 2.0, -1.0], [0, 0, -1.0, 1.0]])
     y = np.random.default_rng(1).multivariate_normal(np.arange(4.0), C, 20000)
@@ -62,19 +48,13 @@ def test_many_groups_give_back_what_was_drawn():
 def test_shrinkage_is_that_of_schaefer_and_strimmer():
     x = RNG.standard_normal((9, 5)) @ np.diag([1, 2, 3, 4, 5.0])
     x -= x.mean(axis=0)
-    n, p = x.shape
-    S = x.T @ x / (n - 1)
+    S, n = x.T @ x / 8, 9
     z = x / np.sqrt(np.diag(S))
-    share, total = 0.0, 0.0
-    for i in range(p):
-        for j in range(p):
-            if i != j:
-                w = z[:, i] * z[:, j]
-                share += n / (n - 1) ** 3 * np.sum((w - w.mean()) ** 2)
-                total += (np.sum(w) / (n - 1)) ** 2
-    keep = 1 - min(1.0, share / total)
-    wanted = np.where(np.eye(p) > 0, S, keep * S)
-    assert shrunk(x, n - 1) == pytest.approx(wanted)
+    w = z[:, :, None] * z[:, None, :]
+    other = ~np.eye(5, dtype=bool)
+    variance = n / (n - 1) ** 3 * np.sum((w - w.mean(axis=0)) ** 2, axis=0)
+    keep = 1 - min(1.0, variance[other].sum() / np.sum((w.sum(axis=0) / 8)[other] ** 2))
+    assert shrunk(x, 8) == pytest.approx(np.where(other, keep * S, S))
 
 
 def test_negative_variances_are_none():
@@ -93,15 +73,6 @@ def test_errors_as_large_as_the_scatter_leave_no_more_than_the_scatter():
         assert np.all(np.diag(found.between) < 1.3 * scatter)
 
 
-def test_the_mean_of_groups_alike_is_as_good_as_the_measurements():
-    off = []
-    for seed in range(400):
-        y = np.random.default_rng(seed).standard_normal((4, 2))
-        found = random_effects(y, np.tile(np.eye(2), (4, 1, 1, 1)), np.arange(4))
-        off += (found.mean**2 / np.diag(found.new_group)).tolist()
-    assert np.mean(np.array(off) > 4) < 0.05  # two deviations
-
-
 def test_what_is_known_of_a_group_is_what_the_others_and_its_jobs_say():
     """Each group counts once: the others alone, with the same covariances, then the group's own mean."""
     y, error, group = several(M=5, k=2, between=0.5)
@@ -116,17 +87,16 @@ def test_what_is_known_of_a_group_is_what_the_others_and_its_jobs_say():
 
 
 @pytest.mark.full
-def test_groups_that_do_not_belong_are_found_and_few_others():
-    false = []
+def test_groups_that_do_not_belong_are_told_from_the_others():
+    false = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
         y = rng.multivariate_normal(np.zeros(6), np.eye(6) + 2, 30)
         y[[4, 9, 20]] += 12 * rng.choice([-1, 1], (3, 6))
         distance, limit = oddness(y, np.zeros((30, 3, 2, 2)), np.arange(30))
-        odd = distance > limit
-        assert odd[[4, 9, 20]].all()
-        false.append(odd.sum() - 3)
-    assert sum(false) <= 0.01 * 40 * 27  # 0.1 %, and some for how little 30 tell
+        assert (distance > limit)[[4, 9, 20]].all()
+        false += np.sum(distance > limit) - 3
+    assert false <= 0.01 * 40 * 27  # 0.1 %, and some for how little 30 tell
 
 
 def test_few_groups_have_no_odd_one():

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from workbook_jobs import as_workbook
 
-from rotorid.files import table_writing
+from rotorid.files import disk
 from rotorid.files.columns import read_grid
 from rotorid.files.job import read_job
 from rotorid.files.problems import InputError, Problems
@@ -221,7 +221,7 @@ def test_a_change_between_reading_and_replacing_is_not_lost(turbo, monkeypatch):
             text = (turbo / "runs.csv").read_text(encoding="utf-8")
             (turbo / "runs.csv").write_text(text.replace("3.36", "3.37"), encoding="utf-8")
 
-    monkeypatch.setattr(table_writing.os, "fsync", fsync)
+    monkeypatch.setattr(disk.os, "fsync", fsync)
     job.apply([cell(job)])
     assert rows(job)[0]["cells"] == ["baseline", "1220", "probe 1", "3.37", "90"]
     assert "3.37,90" in (turbo / "runs.csv").read_text(encoding="utf-8")
