@@ -18,7 +18,6 @@ import rotorid  # noqa: E402 - the environment must be set before NumPy loads
 project = "rotorid"
 author = "the rotorid developers"
 version = release = rotorid.__version__
-language = "en"
 
 extensions = [
     "sphinx.ext.autodoc",
@@ -41,8 +40,6 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
-suppress_warnings = ["ref.python"]  # two results are called TradeOff, one of each package
-autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 

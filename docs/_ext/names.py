@@ -76,10 +76,8 @@ def _escaped(line: str) -> str:
     return out
 
 
-def _take_literally(
-    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
-) -> None:
-    lines[:] = plain(lines)
+def _take_literally(*event: Any) -> None:
+    event[-1][:] = plain(event[-1])
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`{picture} COMMAND`: what `rotorid COMMAND --plot` draws while the pages are built, inside the page itself."""
+"""`{picture} COMMAND`: what `rotorid COMMAND --plot` draws while the pages are built, in the page itself."""
 
 from __future__ import annotations
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coverage_vectors import NOISE, RATE, accuracy, machine, main, record
 from repetitions import FULL
 from scipy.signal import butter, sosfilt
 
-from coverage_vectors import NOISE, RATE, accuracy, machine, main, record
 from rotorid.waveforms.record import Channel, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import find_vectors
 
