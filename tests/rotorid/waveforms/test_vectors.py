@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coverage_vectors import NOISE, RATE, accuracy, machine, main, record
 from repetitions import FULL
 from scipy.signal import butter, sosfilt
 
-from examples.vectors_accuracy import NOISE, RATE, accuracy, machine, main, record
 from rotorid.waveforms.record import Channel, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import find_vectors
 
@@ -72,11 +72,12 @@ def test_a_run_up_through_a_resonance(run, seed):
 @pytest.mark.full
 def test_a_speed_that_ripples_and_the_table_of_the_page(run, capsys, monkeypatch):
     """Whose numbers are the worst of ten records, this one among them."""
-    monkeypatch.setattr("examples.vectors_accuracy.machine", lambda r: machine(r) if r else run)
+    monkeypatch.setattr("coverage_vectors.machine", lambda r: machine(r) if r else run)
     main(1)
     printed = capsys.readouterr().out.splitlines()
-    page = (Path(__file__).parents[3] / "docs" / "vectors_accuracy.md").read_text(encoding="utf-8")
-    shown = page.split("```text\n")[1].split("```")[0].splitlines()
+    page = (Path(__file__).parents[3] / "docs" / "sure.md").read_text(encoding="utf-8")
+    blocks = page.split("```text\n")
+    shown = next(b for b in blocks if b.startswith("10 seeds")).split("```")[0].splitlines()
     assert printed[1] == shown[1]
     assert [line.split()[:2] for line in printed[2:]] == [line.split()[:2] for line in shown[2:]]
     one, ten = (np.array([line.split()[2:6] for line in lines[2:]], float) for lines in (printed, shown))
