@@ -54,7 +54,7 @@ class Choice:
 
     @property
     def most(self) -> float:
-        """What they leave at most with 95 %."""
+        """Largest rms that a check run with these weights shows, with 95 %."""
         return float(self.rms + NORMAL_RADIUS / np.sqrt(2) * self.error)
 
 
@@ -161,7 +161,7 @@ class Correction(Prediction, Answered):
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """That the runs contradict their conventions; nothing may be mounted then."""
+        """Sentences on how the runs contradict their conventions; nothing may be mounted then."""
         return () if self.convention_test is None else self.convention_test.contradiction(self.labels)
 
     @property
@@ -171,7 +171,7 @@ class Correction(Prediction, Answered):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user may want to know."""
+        """Further remarks for the user, none of them a warning."""
         return (*self.influence.remarks.notes, *self.decision.notes)
 
     @property

@@ -94,7 +94,7 @@ class Reading(NamedTuple):
     dof: float = np.inf
 
     def scales(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """How many times larger the errors may be, (count,)."""
+        """Drawn factors by which the errors may be larger than estimated, (count,)."""
         draws = rng.chisquare(min(self.dof, 1e9), count)
         return np.sqrt(self.dof / draws) if np.isfinite(self.dof) else np.ones(count)
 
@@ -252,7 +252,7 @@ def rms(values: ArrayLike) -> float:
 
 
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
-    """What unbalances do, one in each plane, of equal effect and together of mean square size², (S, C, P)."""
+    """Readings by one unbalance in each plane, of equal effect, together of mean square size², (S, C, P)."""
     mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
     return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
 
