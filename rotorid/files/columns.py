@@ -23,10 +23,10 @@ from rotorid.files.cells import (
     Grid,
     NotANumber,
     Shown,
-    below_title,
     check_size,
     decimal_comma,
     decode,
+    header_place,
     is_spreadsheet_error,
     make_grid,
     parse_number,
@@ -271,8 +271,10 @@ def read_grid(
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
             return None
-        rows = chosen[1] if find is None else below_title(chosen[1], find)
-        return make_grid(sheet_source(path, chosen[0]), rows, "", problems, may_be_empty=may_be_empty)
+        title, rows = chosen
+        place = header_place(rows, find)
+        source = sheet_source(path, title)
+        return make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data[:TOP] if top else data, problems)
     if text is None:

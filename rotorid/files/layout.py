@@ -13,13 +13,12 @@ import warnings
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
 from rotorid.base.text import listing
-from rotorid.files.cells import Cell, Grid, Row, below_title, show
+from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.conventions import PHASES, Conventions, Phase
 from rotorid.files.headings import (
@@ -77,11 +76,6 @@ def _unclear(grid: Grid, column: _Column, expected: str, cell: Cell | None = Non
     if cell is not None:
         row, value = grid.rows[column.cells.index(cell)][0], show(cell)
     return InputError([Problem(grid.source, row, column.heading.name, value, expected)])
-
-
-def rows_from_header(rows: Sequence[Row], *, weights: bool = False) -> list[Row]:
-    """Rows of a sheet with the header of the table in one row; those above it become comments."""
-    return below_title(rows, partial(find_header, weights=weights))
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:

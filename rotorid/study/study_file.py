@@ -28,8 +28,8 @@ from rotorid.files.settings import (
     listed,
     of,
     read_settings,
+    read_toml,
 )
-from rotorid.files.toml_file import read_toml
 from rotorid.files.units import Quantity
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def read_study(path: str | Path) -> Study:
     Raises
     ------
     InputError
-        With all problems of both.
+        With all problems of the study file, or of the rotor.
     """
     path, problems = Path(path), Problems()
     data = problems.need(read_toml(path, problems))

@@ -9,13 +9,12 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import cells, disk, excel_workbook, instruments, problems, toml_file
+from rotorid.files import cells, disk, excel_workbook, instruments, problems, settings
 from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-SECURITY = (DOCS / "security.md").read_text(encoding="utf-8")
 STABILITY = (DOCS / "stability.md").read_text(encoding="utf-8")
 MB = 10**6
 
@@ -26,8 +25,8 @@ MB = 10**6
         ("a file, and a workbook unpacked", f"{disk.MOST_BYTES // MB} MB"),
         ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
         ("cells of a table", f"{cells.MOST_CELLS:,}"),
-        ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
-        ("names in a list or table of a model", f"{toml_file.MOST_NAMES:,}"),
+        ("a TOML file", f"{settings.MOST_BYTES // MB} MB"),
+        ("names in a list or table of a model", f"{settings.MOST_NAMES:,}"),
         (
             "characters of an expression, and how deep it nests",
             f"{expressions.MAX_LENGTH:,}, {expressions.MAX_DEPTH}",
@@ -46,14 +45,14 @@ MB = 10**6
     ],
 )
 def test_a_limit_on_the_page_is_that_of_the_code(limit, value):
-    assert f"| {limit} | {value} |" in SECURITY
+    assert f"| {limit} | {value} |" in STABILITY
 
 
 def test_the_page_of_security_knows_the_guard_and_the_words():
-    assert f"serves {server.HOST} alone" in SECURITY
-    assert f"up to {problems.LONGEST_VALUE} characters" in SECURITY
+    assert f"serves {server.HOST} alone" in STABILITY
+    assert f"up to {problems.LONGEST_VALUE} characters" in STABILITY
     assert len(expressions.FUNCTIONS) == 14
-    assert "fourteen functions" in SECURITY
+    assert "fourteen functions" in STABILITY
 
 
 ENTITIES = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 11))
