@@ -3,7 +3,6 @@ PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
 HSBALANCE_VENV ?= .venv-hsbalance
-ROTA_ORDER_VENV ?= .venv-rota-order
 HOUSE_VENV ?= .venv-house
 LATEST_VENV ?= .venv-latest
 LOWEST_VENV ?= .venv-lowest
@@ -130,13 +129,13 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Five tasks beside ROSS, hsbalance and lmfit; bench-all: every row, CasADi and rota-order, too.
+# Five tasks beside ROSS, hsbalance and lmfit; bench-all: every row, CasADi, too.
 bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
 	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks
 
-bench-all: $(BENCH_VENV)/.bench-all $(HSBALANCE_VENV)/.peer $(ROTA_ORDER_VENV)/.peer
-	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python ROTORID_ROTA_ORDER_PYTHON=$(ROTA_ORDER_VENV)/bin/python \
-	  $(BENCH_VENV)/bin/python -m benchmarks --all --json docs/benchmarks.json
+bench-all: $(BENCH_VENV)/.bench-all $(HSBALANCE_VENV)/.peer
+	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python \
+	  $(BENCH_VENV)/bin/python -m benchmarks --all --page docs/benchmarks.md
 
 # Wheel and sdist, the wheel made from the sdist.
 DIST ?= dist
@@ -164,7 +163,7 @@ constraints:
 	$(UV_VENV)/bin/python -m pip -q install uv
 	$(UV_VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --upgrade --no-config --no-annotate \
 	  --custom-compile-command 'make constraints' --output-file constraints.txt pyproject.toml \
-	  --extra fast --extra instruments --extra worksheet --extra fleet --extra cluster --group dev --group bench --group bench-all --group peer --group peer-vectors --group house > /dev/null
+	  --extra fast --extra instruments --extra worksheet --extra fleet --extra cluster --group dev --group bench --group bench-all --group peer --group house > /dev/null
 
 $(VENV)/.pip: $(CONSTRAINTS)
 	$(call environment,$(VENV))
@@ -199,12 +198,6 @@ $(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	$(HSBALANCE_VENV)/bin/python -m pip -q uninstall -y xpress
 	touch $@
 
-# rota-order is under the GPL: in its own environment, with nothing of rotorid
-$(ROTA_ORDER_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
-	$(call environment,$(ROTA_ORDER_VENV))
-	$(ROTA_ORDER_VENV)/bin/python -m pip -q install --group peer-vectors
-	touch $@
-
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(ROTA_ORDER_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) $(HOUSE_VENV) $(WHEEL) build dist demo docs/_build
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) $(HOUSE_VENV) $(WHEEL) build dist demo docs/_build
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants

@@ -57,8 +57,8 @@ def by_ross(rotor: Any, read: np.ndarray) -> np.ndarray:
         left = (effects(rotor, START * factors) - read) / np.abs(read)
         return np.concatenate((left.real.ravel(), left.imag.ravel()))
 
-    found = least_squares(residual, np.ones(START.size), xtol=1e-10, ftol=1e-10)
-    return np.asarray(START * found.x)
+    solution = least_squares(residual, np.ones(START.size), xtol=1e-10, ftol=1e-10)
+    return np.asarray(START * solution.x)
 
 
 def readings(read: np.ndarray) -> RunReadings:
@@ -68,16 +68,8 @@ def readings(read: np.ndarray) -> RunReadings:
     weights = WEIGHT * np.vstack((np.zeros(2), np.eye(2)))
     bare = read.mean(axis=2) * WEIGHT
     Y = np.stack((bare, *(bare + WEIGHT * read[..., p] for p in (0, 1))))
-    trials = Trials(
-        ("bare", "left", "right"),
-        SPEEDS,
-        names,
-        ("left", "right"),
-        Y,
-        weights,
-        errors=ReadingErrors(0.01, np.radians(1.0)),
-        run_errors=RunScatter(0.0),
-    )
+    errors = {"errors": ReadingErrors(0.01, np.radians(1.0)), "run_errors": RunScatter(0.0)}
+    trials = Trials(("bare", "left", "right"), SPEEDS, names, ("left", "right"), Y, weights, **errors)
     return RunReadings(trials, PLANES, np.ones(2), sensors)
 
 
@@ -92,9 +84,9 @@ def run() -> list[Row]:
     theirs = lambda: ross_rotor(table(), BEARING, gyroscopic=True)  # noqa: E731
     read = effects(theirs(), TRUE)
     data = readings(read)
-    found = ours(make(), data)
+    values = ours(make(), data)
     peer, other = once(theirs, lambda rotor: by_ross(rotor, read))
-    pairs = ((found, TRUE), (other, TRUE), (found, other))
+    pairs = ((values, TRUE), (other, TRUE), (values, other))
     return [
         Row(
             task="calibration, 8 numbers of bearings, 2 × 4 × 5 effects",

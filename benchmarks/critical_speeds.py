@@ -1,37 +1,27 @@
-"""Five critical speeds and mode shapes of the reference rotor, 23, 92 and 460 elements, against ROSS.
+"""Five critical speeds and mode shapes of the reference rotor against ROSS `run_modal(speed=0)`.
 
-ROSS' `run_modal(speed=0)` finds each frequency twice, once per lateral plane, besides axial and torsional
-modes; `num_modes=22` is the smallest number that holds the fifth lateral one. At 23 elements its sparse and
-dense ways are both timed, and the faster one counts; the dense way takes minutes at larger sizes. At 460
-elements five frequencies take minutes the sparse way, too (ARPACK does not converge), so ROSS is asked for
-three there: the ratio is a lower bound.
-
-Answers: frequencies and shapes against ROSS at 23 elements. ROSS loses digits on fine meshes (its first
-frequency is wrong by 6e-4 at 460 elements), so both are compared there with the same equations solved in
-higher precision (19 digits, tests/helpers/dense_rotor.py); the note says how far ROSS is from that.
+ROSS finds each frequency twice, once per lateral plane, besides axial and torsional modes: `num_modes=22` is
+the smallest number that holds the fifth lateral one. Its dense way is the faster one here. Frequencies and
+shapes are compared.
 """
 
 from __future__ import annotations
 
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
 
 import fem
-from benchmarks.rotors import ROSS, SIZES, Bearing, judge, ross_rotor, rotorid_rotor, table
-from benchmarks.timing import Row, best_of, once, relative_difference, scaling
+from benchmarks.rotors import ROSS, Bearing, by_size, ross_rotor, rotorid_rotor, table
+from benchmarks.timing import Row, best_of, relative_difference
 
-REQUIRED = 50.0
 N = 5
-
-
-def with_ross(rotor: Any, sparse: bool = True) -> Any:
-    few = len(rotor.nodes) > 400
-    return rotor.run_modal(speed=0.0, num_modes=12 if few else 22, sparse=sparse)
+with_ross = methodcaller("run_modal", speed=0.0, num_modes=22, sparse=False)
 
 
 def lateral(modal: Any, nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies and shapes of the lateral modes among ROSS' modes, at most (5,) and (5, N)."""
+    """Frequencies and shapes of the lateral modes among ROSS' modes, (5,) and (5, N)."""
     frequencies, shapes = [], []
     vectors = modal.evectors[: 6 * nodes].reshape(nodes, 6, -1)
     for k, frequency in enumerate(modal.wn):
@@ -48,62 +38,28 @@ def in_one_plane(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     return (shape / shape[np.argmax(np.abs(shape))]).real
 
 
-def difference(ours: fem.Modes, frequencies: np.ndarray, shapes: np.ndarray) -> float:
-    mine = ours.shapes.T
-    mine = mine / mine[np.arange(len(mine)), np.argmax(np.abs(mine), axis=1)][:, None]
-    apart = np.abs(mine - shapes).max()
-    return max(relative_difference(ours.frequencies, frequencies), float(apart))
-
-
-def trusted(rotor: fem.Rotor, frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    found = [judge().polished(rotor, 0.0, 1j * omega, steps=2) for omega in frequencies]
-    return (
-        np.array([float(lam.imag) for lam, _, _ in found]),
-        np.array([in_one_plane(X, Y) for _, X, Y in found]),
-    )
+def difference(modes: fem.Modes, modal: Any) -> float:
+    frequencies, shapes = lateral(modal, modes.shapes.shape[0])
+    ours = modes.shapes.T
+    ours = ours / ours[np.arange(N), np.argmax(np.abs(ours), axis=1)][:, None]
+    return max(relative_difference(modes.frequencies, frequencies), float(np.abs(ours - shapes).max()))
 
 
 def task() -> Row:
-    return run({23: SIZES[23]})[0]
+    make, theirs = lambda: rotorid_rotor(table(), Bearing()), lambda: ross_rotor(table(), Bearing())
+    return Row(
+        task=f"{N} critical speeds and shapes, 23 elements",
+        ours="rotorid",
+        our_seconds=best_of(make, lambda rotor: fem.critical_speeds(rotor, n=N), 50),
+        peer=f"{ROSS} run_modal",
+        peer_seconds=best_of(theirs, with_ross, 5),
+        difference=difference(fem.critical_speeds(make(), n=N), with_ross(theirs())),
+        allowed=1e-6,
+        required_ratio=50.0,
+    )
 
 
-def run(sizes: dict[int, int] = SIZES) -> list[Row]:
-    result: list[Row] = []
-    seconds: dict[int, float] = {}
-    for n, times in sizes.items():
-        rows = table(times)
-        make = lambda rows=rows: rotorid_rotor(rows, Bearing())  # noqa: E731
-        theirs = lambda rows=rows: ross_rotor(rows, Bearing())  # noqa: E731
-        ours = fem.critical_speeds(make(), n=N)
-        seconds[n] = best_of(make, lambda rotor: fem.critical_speeds(rotor, n=N), 50)
-        if n == 23:
-            ways = {way: with_ross(theirs(), way) for way in (True, False)}
-            apart = max(difference(ours, *lateral(modal, n + 1)) for modal in ways.values())
-            peer, sparse = min(
-                (best_of(theirs, lambda rotor, way=way: with_ross(rotor, way), 5), way) for way in ways
-            )
-            way, note = "sparse" if sparse else "dense", ""
-        else:
-            peer, modal = once(theirs, with_ross)
-            frequencies, shapes = trusted(make(), ours.frequencies)
-            apart, way = difference(ours, frequencies, shapes), "sparse"
-            found = lateral(modal, n + 1)[0]
-            off = relative_difference(found, frequencies[: len(found)])
-            way += f", {len(found)} only" if len(found) < N else ""
-            note = f"of 19-digit arithmetic; {ROSS} is off by {off:.0e}"
-        result.append(
-            Row(
-                task=f"5 critical speeds and shapes, {n} elements",
-                ours="rotorid",
-                our_seconds=seconds[n],
-                peer=f"{ROSS} run_modal, {way}",
-                peer_seconds=peer,
-                difference=apart,
-                allowed=1e-6,
-                required_ratio=max([REQUIRED, *(row.ratio for row in result)]),
-                note=note,
-            )
-        )
-    if len(sizes) == 1:
-        return result
-    return [*result, scaling("5 critical speeds and shapes", seconds, 92, 460)]
+def run() -> list[Row]:
+    make = lambda times: rotorid_rotor(table(times), Bearing())  # noqa: E731
+    ours = lambda rotor: fem.critical_speeds(rotor, n=N)  # noqa: E731
+    return [task(), by_size(f"{N} critical speeds and shapes", make, ours)]

@@ -6,7 +6,6 @@ import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import TypeVar
 
 import numpy as np
@@ -37,12 +36,11 @@ class Row:
         return self.peer_seconds / self.our_seconds
 
     @property
-    def agrees(self) -> bool:
-        return bool(self.difference <= self.allowed)
-
-    @property
-    def fast_enough(self) -> bool:
-        return self.ratio >= self.required_ratio
+    def failure(self) -> str:
+        """What is wrong, or nothing."""
+        if not self.difference <= self.allowed:
+            return f"ANSWERS DIFFER by more than {self.allowed:.0e}"
+        return "TOO SLOW" if self.ratio < self.required_ratio else ""
 
 
 def best_of(make: Callable[[], T], call: Callable[[T], object], repeat: int) -> float:
@@ -52,12 +50,10 @@ def best_of(make: Callable[[], T], call: Callable[[T], object], repeat: int) -> 
     for _ in range(repeat):
         model = make()
         gc.disable()
-        try:
-            start = time.perf_counter()
-            call(model)
-            times.append(time.perf_counter() - start)
-        finally:
-            gc.enable()
+        start = time.perf_counter()
+        call(model)
+        times.append(time.perf_counter() - start)
+        gc.enable()
     return min(times)
 
 
@@ -67,36 +63,6 @@ def once(make: Callable[[], T], call: Callable[[T], R]) -> tuple[float, R]:
     start = time.perf_counter()
     answer = call(model)
     return time.perf_counter() - start, answer
-
-
-@cache
-def numpy_lstsq() -> float:
-    """Duration of `numpy.linalg.lstsq`, 1,000 equations with 60 unknowns, s: a unit without a peer."""
-    rng = np.random.default_rng(0)
-    A, b = rng.standard_normal((1000, 60)), rng.standard_normal(1000)
-    return best_of(lambda: None, lambda _: np.linalg.lstsq(A, b, rcond=None), 30)
-
-
-def against_numpy(
-    task: str, seconds: float, calls: int, difference: float, allowed: float, note: str = ""
-) -> Row:
-    """Work without a peer against so many calls of `numpy_lstsq`, which it must not exceed."""
-    peer = f"{calls} × numpy lstsq"
-    return Row(task, "rotorid", seconds, peer, calls * numpy_lstsq(), difference, allowed, 1.0, note)
-
-
-def scaling(task: str, seconds: dict[int, float], few: int, many: int) -> Row:
-    """Cost at `many` elements against that at `few`: no faster than linear, so the ratio is at least 1."""
-    return Row(
-        task=task,
-        ours=f"{many} elements",
-        our_seconds=seconds[many],
-        peer=f"{many / few:g} × {few} elements",
-        peer_seconds=many / few * seconds[few],
-        difference=0.0,
-        allowed=0.0,
-        required_ratio=1.0,
-    )
 
 
 def relative_difference(a: ArrayLike, b: ArrayLike) -> float:

@@ -18,18 +18,15 @@ import rotorid  # noqa: E402 - the environment must be set before NumPy loads
 project = "rotorid"
 author = "the rotorid developers"
 version = release = rotorid.__version__
-language = "en"
 
 extensions = [
     "sphinx.ext.autodoc",
     "numpydoc",
     "myst_parser",
     "commands",
-    "drawn",
+    "pictures",
     "mathml",
-    "methods",
     "names",
-    "results",
     "tables",
 ]
 exclude_patterns = ["_build", "_ext"]
@@ -39,11 +36,10 @@ myst_heading_anchors = 4
 default_role = "literal"
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # docs/_ext/names.py writes them as the source does
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
-suppress_warnings = ["ref.python"]  # two results are called TradeOff, one of each package
-autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 

@@ -21,8 +21,6 @@ def inline(self: HTML5Translator, node: nodes.math) -> None:
 def block(self: HTML5Translator, node: nodes.math_block) -> None:
     """A formula by itself, with its number if it has one."""
     self.body.append(self.starttag(node, "div", CLASS="math"))
-    if node.get("number"):
-        self.body.append(f'<span class="eqno">({node["number"]})</span>')
     self.body.append(convert(_text(node), display="block"))
     self.body.append("</div>\n")
     raise nodes.SkipNode

@@ -16,8 +16,6 @@ from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from sphinx.application import Sphinx
 
 
@@ -78,70 +76,12 @@ def _escaped(line: str) -> str:
     return out
 
 
-def _take_literally(
-    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
-) -> None:
-    lines[:] = plain(lines)
-
-
-def signature_of(value: Callable[..., object]) -> tuple[str, str]:
-    """Parameters and return type as the source writes them; defaults that are no plain values as `...`."""
-    found = inspect.signature(value)
-    params = []
-    for param in found.parameters.values():
-        if param.name in ("self", "cls"):
-            continue
-        known = isinstance(param.default, (type(None), bool, int, float, str, tuple))
-        default = param.default if known or param.default is param.empty else ...
-        params.append(param.replace(annotation=_Written.of(param.annotation), default=_Default.of(default)))
-    text = str(found.replace(parameters=params, return_annotation=found.empty))
-    returned = "" if inspect.isclass(value) else str(_Written.of(found.return_annotation) or "")
-    return text, returned
-
-
-class _Written(str):
-    """An annotation that prints as it is written."""
-
-    __slots__ = ()
-
-    __repr__ = str.__str__
-
-    @classmethod
-    def of(cls, annotation: object) -> object:
-        if annotation is inspect.Parameter.empty:
-            return annotation
-        if isinstance(annotation, str):
-            return cls(annotation.strip("'\""))
-        return cls(getattr(annotation, "__name__", None) or str(annotation).replace("typing.", ""))
-
-
-class _Default:
-    """A default that prints as source; None, numbers, texts, tuples of these, or `...`."""
-
-    def __init__(self, value: object) -> None:
-        self.value = value
-
-    def __repr__(self) -> str:
-        return "..." if self.value is ... else repr(self.value)
-
-    @classmethod
-    def of(cls, value: object) -> object:
-        return value if value is inspect.Parameter.empty else cls(value)
-
-
-def _signature(
-    app: Sphinx, what: str, name: str, obj: object, options: object, signature: str, returned: str
-) -> tuple[str, str] | None:
-    if what not in ("function", "method", "class", "exception") or not callable(obj):
-        return None
-    if inspect.isclass(obj) and issubclass(obj, BaseException) and "__init__" not in vars(obj):
-        return None  # made with a message
-    return signature_of(obj)
+def _take_literally(*event: Any) -> None:  # noqa: ANN401 - what autodoc hands over
+    event[-1][:] = plain(event[-1])
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directive, and the reading of docstrings before numpydoc."""
     app.add_directive("names", Names)
     app.connect("autodoc-process-docstring", _take_literally, priority=100)
-    app.connect("autodoc-process-signature", _signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""Tables of keys, `{keys}`, from the typed settings themselves."""
+"""Tables of the program itself: `{keys}` of typed settings, `{methods}` of a registry."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from docutils import nodes
 from pieces import table
 from sphinx.util.docutils import SphinxDirective
+
+from rotorid.base.text import sentence
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -25,6 +27,19 @@ class Keys(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """One row per key."""
         return [table((self.content[0], "meaning", "such as"), key_lines(settings_of(self.arguments)))]
+
+
+class Methods(SphinxDirective):
+    """`{methods} MODULE NAME`: the methods of a registry, each with its sentence, as `--help` has them."""
+
+    required_arguments = 2
+
+    def run(self) -> list[nodes.Node]:
+        """One row per method."""
+        module, name = self.arguments
+        methods = getattr(import_module(module), name)
+        rows = [(f"`{method.name}`", sentence(method.about)) for method in methods]
+        return [table(("name", "what it does"), rows)]
 
 
 def settings_of(words: Sequence[str]) -> Any:  # noqa: ANN401  a model of pydantic
@@ -60,6 +75,7 @@ def key_lines(settings: Any) -> list[tuple[str, str, str]]:  # noqa: ANN401  a m
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the directive."""
+    """Register the directives."""
     app.add_directive("keys", Keys)
+    app.add_directive("methods", Methods)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -137,14 +137,14 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
 
 def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """Vectors of each run in a table, and the files that were read."""
-    from rotorid.files.vectors_table import read_vectors
+    from rotorid.files.runs import read_vectors
 
     return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
 
 
 def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
     """The same of a record, or of those of a waveforms file."""
-    from rotorid.files.vectors_table import read_vectors
+    from rotorid.files.runs import read_vectors
     from rotorid.files.waveforms import read_vectors_grid
 
     given = {"tacho": options.tacho, "unit": options.unit, "phase": options.phase}

@@ -250,13 +250,15 @@ def whole(item: S, what: str, read: Callable[[S], T]) -> T:
     return values[0]
 
 
-def read_attached(file: Settings, at: Callable[[Place], int], folder: Path, problems: Problems) -> list[Any]:
-    """Supports and forces of a file, of which tables are named from its folder."""
-    return [
-        one
-        for kind in KEYS
-        for one in each(problems, getattr(file, kind), kind, lambda item: item.made(at(item), folder))
-    ]
+def read_attached(
+    file: Settings, at: Callable[[Place], int], folder: Path, problems: Problems
+) -> dict[str, list[Any]]:
+    """`supports` and `forces` of a file, of which tables are named from its folder."""
+    made: dict[str, list[Any]] = {"supports": [], "forces": []}
+    for kind in KEYS:
+        items = each(problems, getattr(file, kind), kind, lambda item: item.made(at(item), folder))
+        made["supports" if kind in ("bearing", "seal") else "forces"] += items
+    return made
 
 
 def _matrices(quantity: str, values: Mapping[str, Any]) -> FloatArray:

@@ -202,20 +202,17 @@ def parse_text(
     rows, complete = list[Row](), True
     for number, line in enumerate(lines, start=1):
         try:
-            if number < start:
-                cells: tuple[str, ...] = (f"# {clean(line)}",)
-            elif number == start and names:
-                cells = names
-            elif separator not in line and is_comment(text := clean(line)):
-                cells = (text,)  # in a comment quotes may stay open
-            else:
-                cells = _cells(line, separator)
-            rows.append((number, cells))
+            comment = number < start or (separator not in line and is_comment(clean(line)))
+            # in a comment quotes may stay open
+            rows.append((number, (clean(line),) if comment else _cells(line, separator)))
         except csv.Error as error:
             rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
             problems.add(source, number, None, None, f"{rule}: {error}")
             complete = False
-    return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+    place = start, names
+    return make_grid(
+        source, rows, separator, problems, place=place, complete=complete, may_be_empty=may_be_empty
+    )
 
 
 def _first_rows(lines: Iterable[str]) -> Iterator[Row]:
@@ -254,29 +251,18 @@ def header_place(rows: Iterable[Row], find: Finder | None) -> tuple[int, tuple[s
     return filled[last][0], () if first == last else tuple(names)
 
 
-def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
-    """Rows of a sheet with the header in one row; those above it become comments."""
-    start, names = header_place(rows, find)
-    above = (
-        (number, ("# " + " ".join(filter(None, map(show, cells))),))
-        for number, cells in rows
-        if number < start
-    )
-    return [*above, *((at, (at == start and names) or cells) for at, cells in rows if at >= start)]
-
-
-def _without_comments(rows: Iterable[Row]) -> tuple[list[str], list[Row]]:
-    """Comments, and the rows that hold something.
+def _without_comments(rows: Iterable[Row], start: int, names: tuple[str, ...]) -> tuple[list[str], list[Row]]:
+    """Comments, and the rows that hold something, from the header on, which may have other names.
 
     Below the header a comment stands alone in its row: labels such as "#12 coupling" begin with `#`, too.
     """
     comments, filled = list[str](), list[Row]()
     for number, cells in rows:
         first = str(cells[0]) if cells else ""
-        if is_comment(first) and (not filled or len(cells) == 1):
-            comments += filter(None, [" ".join(map(show, cells)).strip(_AROUND)])
+        if number < start or (is_comment(first) and (not filled or len(cells) == 1)):
+            comments += filter(None, [" ".join(filter(None, map(show, cells))).strip(_AROUND)])
         elif any(cell != "" for cell in cells):
-            filled.append((number, cells))
+            filled.append((number, (number == start and names) or cells))
     return comments, filled
 
 
@@ -286,6 +272,7 @@ def make_grid(
     separator: str,
     problems: Problems,
     *,
+    place: tuple[int, tuple[str, ...]] = (0, ()),
     complete: bool = True,
     may_be_empty: bool = False,
 ) -> Grid | None:
@@ -297,6 +284,8 @@ def make_grid(
         As in `Grid`; comments stand among the rows.
     problems
         Collects the complaints.
+    place
+        As `header_place` gives it: what stands above the header is comment.
     may_be_empty
         Whether a header without rows says something (a weights table: nothing was mounted).
 
@@ -305,7 +294,7 @@ def make_grid(
     Grid or None
         None if there is nothing to read; the problems say why.
     """
-    comments, filled = _without_comments(rows)
+    comments, filled = _without_comments(rows, *place)
     for version in filter(None, map(_VERSION.fullmatch, comments)):
         problems.refuse_newer(source, int(version[1]))
     if len(filled) < (1 if may_be_empty else 2):
@@ -325,10 +314,10 @@ def make_grid(
             lost = [k for k, cell in enumerate(cells) if cell != "" and not headings[k]]
             if lost:
                 expected = f"a name for column {lost[-1] + 1} in the header (row {header_row}), or no value"
-                if lost[-1] >= width and show(cells[0]).startswith("#"):
-                    expected += f"; a comment below the header begins with # and has no {separator} in it"
-                elif lost[-1] >= width and separator == ",":
-                    expected += "; numbers with a decimal comma need ; between the columns"
+                if lost[-1] >= width and separator == ",":
+                    expected += (
+                        "; numbers with a decimal comma need ; between the columns, comments have no ,"
+                    )
                 problems.add(source, number, None, show(cells[lost[-1]]), expected)
         body = [(number, (cells + ("",) * width)[:width]) for number, cells in body]
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)

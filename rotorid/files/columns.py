@@ -23,10 +23,10 @@ from rotorid.files.cells import (
     Grid,
     NotANumber,
     Shown,
-    below_title,
     check_size,
     decimal_comma,
     decode,
+    header_place,
     is_spreadsheet_error,
     make_grid,
     parse_number,
@@ -271,8 +271,10 @@ def read_grid(
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
             return None
-        rows = chosen[1] if find is None else below_title(chosen[1], find)
-        return make_grid(sheet_source(path, chosen[0]), rows, "", problems, may_be_empty=may_be_empty)
+        title, rows = chosen
+        place = header_place(rows, find)
+        source = sheet_source(path, title)
+        return make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data[:TOP] if top else data, problems)
     if text is None:
@@ -360,36 +362,33 @@ def _has_columns(
     problems: Problems,
 ) -> bool:
     """Whether it may be a table of this kind; at most one problem of unknown and missing columns."""
-    known = listing([example for column in columns for example in column.names], "and")
+    possible = listing([example for column in columns for example in column.names], "and")
     there = [*dict.fromkeys(name for row in grid.named or (grid.header,) for name in row if name)]
-    present, others, alone = listing(there, "and"), listing(unknown, "and") or None, len(unknown) == 1
-    kinds = (
-        f": it seems to be {kind}"
-        for kind, needed in KINDS.items()
-        if all(any(f"{name}_".startswith(f"{stem}_") for name in there) for stem in needed)
-    )
-    seems, fits = next(kinds, ""), bool(stems)
-    if not stems:
-        column, value = None, None
-        expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
+    present, others, alone = listing(there, "and"), listing(unknown, "and"), len(unknown) == 1
+    place = grid.source, grid.header_row
+    if not stems or (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
+        kinds = (
+            f": it seems to be {kind}"
+            for kind, its in KINDS.items()
+            if all(any(f"{name}_".startswith(f"{stem}_") for name in there) for stem in its)
+        )
+        seems = next(kinds, "; remarks go into 'note'")
+        names = f"; there are {present}" if stems else ""  # else it may be no table, but a secret
+        expected = (
+            f"a header row with the names of columns, separated by , or ; or tabs: {possible}{names}{seems}"
+        )
         problems.drop(grid.source)  # that rows are longer than a title is no news
-    elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
-        fits, column, value = False, unknown[0], None
-        end = seems or "; remarks go into 'note'"
-        expected = f"a table with the columns {known}; its columns are {present}{end}"
-    elif missing:
-        several = f"columns {listing([one.names[0] for one in missing], 'and')}"
-        needed = several if len(missing) > 1 else f"a column {listing(missing[0].names)}"
-        column, value, expected = missing[0].names[0], others, f"{needed}; the columns are {present}"
-    elif unknown:
-        column, value = unknown[0] if alone else None, others
-        what = "a known column" if alone else "known columns"
-        expected = f"{what}: {known}; remarks go into 'note'"
-    else:
-        return True
-    if not (fits and missing and problems.of(grid.source)):
-        problems.add(grid.source, grid.header_row, column, value, expected)
-    return fits
+        problems.add(*place, None, None, expected)
+        return False
+    if missing and not problems.of(grid.source):
+        needed = listing([one.names[0] for one in missing], "and")
+        what = f"columns {needed}" if len(missing) > 1 else f"a column {listing(missing[0].names)}"
+        expected = f"{what}; the columns are {present}"
+        problems.add(*place, missing[0].names[0], others or None, expected)
+    elif unknown and not missing:
+        expected = f"{'a known column' if alone else 'known columns'}: {possible}; remarks go into 'note'"
+        problems.add(*place, others if alone else None, others, expected)
+    return True
 
 
 def _field(
@@ -426,11 +425,10 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
         text = show(cell)
         if not text:
             raise NotANumber("a name")
-        if text[0] in "=@" or not text.isprintable():
-            words = "a name without control characters, which does not begin as a formula, with = or @"
-            raise NotANumber(words)
-        if is_spreadsheet_error(text) or not text.strip("#"):
-            raise NotANumber("a name, not an error of the spreadsheet")
+        if text[0] in "=@" or not text.isprintable() or is_spreadsheet_error(text) or not text.strip("#"):
+            raise NotANumber(
+                "a name, not an error of the spreadsheet, hidden characters or a formula, with = or @ first"
+            )
         return text
     if cell in doubtful:
         raise NotANumber(

@@ -22,7 +22,6 @@ from rotorid.files.units import UnitError, one_of
 READING, WEIGHT = ("amplitude", "phase"), ("mass", "angle")
 LONGEST = 100
 """Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
-_RUN = "run test trial state condition step measurement"
 _OF_RUNS = {
     "mounted": "weight weights wt mass correction",
     "amplitude": "amplitude ampl amp magnitude mag",
@@ -30,7 +29,8 @@ _OF_RUNS = {
     "vector": "vector",
     "speed": "speed rpm cpm frequency freq",
     "sensor": "sensor probe channel point transducer bearing",
-    "run": _RUN,
+    "run": "run",
+    "step": "test trial state condition step measurement",
     "repeat": "repeat",
     "vibration": "vibration vib velocity displacement severity",
 }
@@ -43,7 +43,8 @@ _OF_WEIGHTS = {
     "unit": "unit",
     "pieces": "pieces",
     "mass": "unbalance imbalance weight mass wt amount",
-    "run": _RUN,
+    "run": "run",
+    "step": "test trial state condition step measurement",
 }
 """Words for what a column holds; the first kind of which a heading has one counts."""
 _ROLES = {
@@ -53,7 +54,7 @@ _ROLES = {
 _LETTERS = re.compile(r"([^\W\d_]+)")
 _FILLERS = frozenset(
     _LETTERS.findall(
-        "name no nr number id shaft rotor machine running rotational nominal measurement measuring run "
+        "name no nr number id test shaft rotor machine running rotational nominal measurement measuring run "
         "measured position vibration vib balance balancing trial correction of"
     )
 )
@@ -198,10 +199,9 @@ def read_headings(header: Sequence[str], *, weights: bool = False) -> list[Headi
     """What the headings of a runs table, or of a weights table, say."""
     probes = weights or any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is no order
     headings = [_heading(Heading(i, name), probes=probes, weights=weights) for i, name in enumerate(header)]
-    plain = [h for h in headings if h.stem == "run" and re.search("run", h.name, re.IGNORECASE)]
-    if len(plain) == 1:  # beside it a column such as Condition says something else
-        headings = [replace(h, stem="note") if h.stem == "run" and h is not plain[0] else h for h in headings]
-    return headings
+    # beside a column Run one such as Condition says something else
+    step = "note" if any(heading.stem == "run" for heading in headings) else "run"
+    return [replace(heading, stem=step) if heading.stem == "step" else heading for heading in headings]
 
 
 def find_header(
@@ -266,7 +266,7 @@ def _heading(heading: Heading, *, probes: bool, weights: bool) -> Heading:
     name = heading.name
     if len(name) > LONGEST or name.startswith("//"):  # a line that was taken out
         return heading
-    if name.casefold().startswith(REMARKS) or (not weights and _BESIDE[False].match(name)):
+    if name.casefold().startswith(REMARKS) or _BESIDE[weights].match(name):
         return replace(heading, stem="note")
     if (tidy := _TIDY[weights].fullmatch(name)) is not None:
         stem = (tidy[1] or tidy[0]).replace("unbalance", "mass")
@@ -278,10 +278,8 @@ def _heading(heading: Heading, *, probes: bool, weights: bool) -> Heading:
     inside = " ".join([*_BRACKETS.findall(name), *_BEHIND.findall(plain)]).strip()
     words = {word.casefold() for word in _LETTERS.findall(plain)}
     heading = _by_words(heading, words, _BEHIND.sub(" ", plain), inside, weights=weights)
-    if heading.stem or heading.sensor:
+    if heading.stem or weights:
         return heading
-    if weights:
-        return replace(heading, stem="note") if _BESIDE[True].match(name) else heading
     if inside and readable("speed", inside):
         return replace(heading, stem="speed", unit=inside)
     if inside and readable("amplitude", inside):

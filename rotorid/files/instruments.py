@@ -22,7 +22,7 @@ import numpy as np
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files.cells import decode
-from rotorid.files.disk import file_content, first_bytes, read_bytes, why_unreadable
+from rotorid.files.disk import file_content, first_bytes, why_unreadable
 from rotorid.files.problems import InputError, Problems, printable, refusal
 from rotorid.files.units import FORCE, TIME, VIBRATION, Unit, spelt
 
@@ -107,6 +107,8 @@ def _reading(path: Path) -> Iterator[None]:
     except Exception as error:
         reason = f" ({printable(str(error)[:80])})" if isinstance(error, ValueError) else ""
         expected = f"a whole {path.suffix} file; it is damaged or of another kind{reason}"
+        if isinstance(error, NotImplementedError) and path.suffix.lower() == ".mat":
+            expected = "a MAT file before version 7.3: in MATLAB save('file.mat', 'names', …, '-v7')"
         raise refusal(path, expected) from error
 
 
@@ -137,8 +139,7 @@ def _read_text(path: Path) -> Sampled:
     import pandas as pd
 
     problems = Problems()
-    data = problems.need(read_bytes(path, problems))
-    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), data, problems)))
+    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), file_content(path), problems)))
     lines = text.split("\n", HEAD)[:HEAD]
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in lines[len(lines) // 2 :]))
     rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator), ()))] for line in lines]
@@ -180,32 +181,23 @@ def _read_wav(path: Path) -> Sampled:
     return Sampled({str(i): column for i, column in columns}, float(rate), scale)
 
 
-def _read_mat(path: Path) -> Sampled:
+def _read_arrays(path: Path) -> Sampled:
+    """Of a MAT file or an archive of NumPy, of which pickled objects are not read.
+
+    Vectors by their names, or a matrix (N, C) with its `channels`; times, a rate or `dt` beside them.
+    """
     from scipy.io import loadmat, whosmat
 
-    try:
-        _check_size(path, sum(int(np.prod(shape, dtype=float)) * 8 for _, shape, _ in whosmat(path)))
-        return _of_arrays(path, loadmat(path, squeeze_me=True))
-    except NotImplementedError:
-        expected = "a MAT file before version 7.3: in MATLAB save('file.mat', 'names', …, '-v7')"
-        raise refusal(path, expected) from None
-
-
-def _read_npz(path: Path) -> Sampled:
-    """Of an archive of NumPy; pickled objects in it are not read."""
-    with zipfile.ZipFile(path) as archive:
-        _check_size(path, sum(entry.file_size for entry in archive.infolist()))
-    with np.load(path, allow_pickle=False) as file:
-        return _of_arrays(path, file)
-
-
-def _check_size(path: Path, size: int) -> None:
+    if path.suffix.lower() == ".npz":
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    else:
+        size = sum(int(np.prod(shape, dtype=float)) * 8 for _, shape, _ in whosmat(path))
     if size > LARGEST:
         raise refusal(path, f"arrays of at most {LARGEST // 10**9} GB, not {size / 1e9:.3g} GB")
-
-
-def _of_arrays(path: Path, stored: Mapping[str, object]) -> Sampled:
-    """Vectors by their names, or a matrix (N, C) with its `channels`; times, a rate or `dt` beside them."""
+    stored = (
+        np.load(path, allow_pickle=False) if path.suffix.lower() == ".npz" else loadmat(path, squeeze_me=True)
+    )
     arrays = {name: np.squeeze(np.asarray(values)) for name, values in stored.items() if name[:2] != "__"}
     numbers = {name: array * 1 for name, array in arrays.items() if array.dtype.kind in "biuf" and array.size}
     channels = {name: array for name, array in numbers.items() if array.ndim == 1}
@@ -232,8 +224,8 @@ READERS: Mapping[str, Callable[[Path], Sampled]] = {
     ".csv": _read_text,
     ".txt": _read_text,
     ".wav": _read_wav,
-    ".mat": _read_mat,
-    ".npz": _read_npz,
+    ".mat": _read_arrays,
+    ".npz": _read_arrays,
 }
 """By the suffix of a file."""
 

@@ -6,6 +6,7 @@ import io
 import re
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,12 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell as as_json
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
-from rotorid.files.cells import BadCell, Cell, Grid, make_grid, show
+from rotorid.files.cells import BadCell, Cell, Grid, header_place, make_grid, show
 from rotorid.files.columns import REMARKS, sheet_source
 from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.headings import find_header
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
-from rotorid.files.layout import rows_from_header
 from rotorid.files.problems import Problems, refusal
 from rotorid.files.settings import Place
 
@@ -48,11 +49,15 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
             problems.add(str(path), None, None, title, expected)
     for name in (name for name in SHEETS[:-1] if name in titles):
         rows = sheets[titles[name]]
-        if name in (*READINGS, *WEIGHT_TABLES):
-            rows = rows_from_header(rows, weights=name in WEIGHT_TABLES)
+        find = (
+            partial(find_header, weights=name in WEIGHT_TABLES)
+            if name in (*READINGS, *WEIGHT_TABLES)
+            else None
+        )
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
         source = sheet_source(path, titles[name])
-        grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)
+        place = header_place(rows, find)
+        grid = make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
         if grid is not None and name in TABLES:
             job.tables[name] = grid
         elif grid is not None:

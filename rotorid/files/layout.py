@@ -13,15 +13,14 @@ import warnings
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
 from rotorid.base.text import listing
-from rotorid.files.cells import Cell, Grid, Row, below_title, show
+from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
-from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
+from rotorid.files.conventions import PHASES, Conventions, Phase
 from rotorid.files.headings import (
     BOTH_UNITS,
     LONGEST,
@@ -46,6 +45,7 @@ _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 MOUNTED = "note of weights: "
 """Begins the name of a column of weights, which belong into a weights table."""
+_OF_READING = ("run", "speed", "repeat")
 _NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
@@ -78,11 +78,6 @@ def _unclear(grid: Grid, column: _Column, expected: str, cell: Cell | None = Non
     return InputError([Problem(grid.source, row, column.heading.name, value, expected)])
 
 
-def rows_from_header(rows: Sequence[Row], *, weights: bool = False) -> list[Row]:
-    """Rows of a sheet with the header of the table in one row; those above it become comments."""
-    return below_title(rows, partial(find_header, weights=weights))
-
-
 def files_of_runs(source: object) -> tuple[Path, ...]:
     """The files of a folder with one file a run, step2 before step10; none for anything else."""
     if not isinstance(source, (str, Path)) or not Path(source).is_dir():
@@ -93,15 +88,15 @@ def files_of_runs(source: object) -> tuple[Path, ...]:
 
 def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
-    words = set[str]()
+    directions = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file that is read once more
             grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
         for heading in read_headings(grid.header) if grid else ():
             if heading.stem == "phase" and readable("phase", heading.unit):
-                words |= {*PHASES} & {read_unit("phase", heading.unit)[1]}
-    return as_phase(words.pop()) if len(words) == 1 else None
+                directions.add(read_unit("phase", heading.unit)[1])
+    return next((phase for phase in PHASES if directions - {""} == {phase}), None)
 
 
 def read_runs_grids(
@@ -140,7 +135,7 @@ def joined(grids: Sequence[Grid] | None, problems: Problems) -> Grid | None:
         return grids[0] if grids else None
     first, rows = grids[0], list[Row]()
     for grid in grids:
-        if sorted(grid.header) != sorted(first.header):
+        if {*grid.header} != {*first.header}:
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
             problems.add(grid.source, grid.header_row, None, listing(grid.header, "and"), expected)
             return None
@@ -191,11 +186,12 @@ def long_rows(
             sensors = {"1": sensors[""]}
     groups = []
     for name, by_stem in sensors.items():
-        own = [by_stem[stem] for stem in pair if stem in by_stem]
-        named = [_Column(own[0].heading, key, "", [name] * n)] if name else []
+        both = [by_stem[stem] for stem in pair if stem in by_stem]
+        named = [_Column(both[0].heading, key, "", [name] * n)] if name else []
         if conventions.exchanged and key == "sensor":
-            own = [c._replace(heading=o.heading, cells=o.cells) for c, o in zip(own, own[::-1], strict=True)]
-        groups.append([*common, *named, *own])
+            turned = zip(both, both[::-1], strict=True)
+            both = [one._replace(heading=other.heading, cells=other.cells) for one, other in turned]
+        groups.append([*common, *named, *both])
     header = [column.name(k) for k, column in enumerate(groups[0])]
     for column, k in ((column, k) for group in groups for k, column in enumerate(group)):
         if column.name(k) != header[k]:
@@ -204,9 +200,6 @@ def long_rows(
     long = [(number, cells) for (number, _), each in zip(grid.rows, rows, strict=True) for cells in each]
     taken = [tuple(column.heading.name for column in group) for group in groups]
     return replace(grid, header=tuple(header), rows=tuple(long), named=tuple(taken) * n)
-
-
-_OF_READING = ("run", "speed", "repeat")
 
 
 def _columns(
@@ -316,7 +309,7 @@ def _by_name(
         return {"": loose}
     for names in combinations([*sensors], 2):  # `A1 (mm/s)` and `P1 (deg)` are no two sensors, but 1
         numbers = {re.sub(r"^[^\W\d_]{1,3}(?=[0-9]+$)", "", name) for name in names}
-        halves = [own for name in names if len(own := sensors.get(name, {})) == 1]
+        halves = [sensors[name] for name in names if len(sensors.get(name, {})) == 1]
         if len(numbers) == 1 and len(halves) == 2 and len({**halves[0], **halves[1]}) == 2:
             for name in names:
                 del sensors[name]
@@ -324,9 +317,11 @@ def _by_name(
     if len(sensors) == 1 and len(loose) == 1 and not loose.keys() & next(iter(sensors.values())).keys():
         next(iter(sensors.values())).update(loose)  # one sensor, named in one of its headings
         loose = {}
-    for own in (loose, *sensors.values()):
-        if own and (own is loose or len(own) < 2):
+    for by_stem in (loose, *sensors.values()):
+        if by_stem and (by_stem is loose or len(by_stem) < 2):
             one = next(iter(sensors))
             words = f"in columns such as '{one} {pair[0]}' and '{one} {pair[1]}'"
-            raise _unclear(grid, next(iter(own.values())), f"{pair[0]} and {pair[1]} of each {key}, {words}")
+            raise _unclear(
+                grid, next(iter(by_stem.values())), f"{pair[0]} and {pair[1]} of each {key}, {words}"
+            )
     return sensors

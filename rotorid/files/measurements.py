@@ -84,10 +84,10 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     free = np.full(len(table), not model.has_constant_terms)
     for name in {*model.inputs} & rows.signals.keys():
         free &= rows.signals[name] == 0
-    lost = next((f", or columns {_forms(name)}" for name in model.inputs if name not in rows.signals), "")
+    excited = f"0, or an amplitude of {listing(model.inputs)} that excites this row: {_FREE}"
     for name in measured:
-        expected = f"0{lost}: nothing excites this row, and {_FREE}"
-        table.complain_where(free & (np.abs(rows.signals[name].imag) > 0), _stems(table, name)[-1], expected)
+        unlike = free & (np.abs(rows.signals[name].imag) > 0)
+        table.complain_where(unlike, _stems(table, name)[-1], excited)
     problems.stop()
     if lacking := {*model.outputs} - {*measured} - unmeasured:
         message = f"{table.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"
@@ -252,8 +252,8 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
         second = np.where(half, 0.0, table.numbers(other))
         wrong = np.where(blank, ~half, half & ~(is_polar & (first == 0)))
         table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
-        turn = np.abs(second) <= FULL_TURN
-        table.must_be(other, turn | ~np.array(is_polar), "a phase from -360 to 360 degrees")
+        largest = FULL_TURN if is_polar else np.inf
+        table.must_be(other, np.abs(second) <= largest, "a phase from -360 to 360 degrees")
     if blank.all():
         table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
     if not is_polar:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from pydantic import BeforeValidator, Field, PlainValidator
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.attached import whole
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.problems import Problems
 from rotorid.files.settings import (
     MOST_NAMES,
     NotNegative,
@@ -153,21 +152,20 @@ class ModelFile(Settings):
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Two forms in one, matrices of several sizes."""
         for form, others in _NOT_BESIDE.items():
-            for other in others if self.has(form) else ():
-                if self.has(other):
-                    yield other, f"equations, matrices or states: nothing of this name beside {form}"
+            for other in self.model_fields_set.intersection(others) if self.has(form) else ():
+                yield other, f"equations, matrices or states: nothing of this name beside {form}"
         for table in ("bounds", "prior", "start"):
-            for name in sorted(getattr(self, table).keys() - self.estimate.keys()):
+            for name in getattr(self, table).keys() - self.estimate.keys():
                 yield table, f"names of estimate; {name} is none{did_you_mean(name, self.estimate)}"
         for name, (low, high) in self.bounds.items():
             value = self.start.get(name, self.estimate.get(name))
             if not low < high or (value is not None and not low <= value <= high):
                 yield (
                     "bounds",
-                    f"[lowest, highest] of {name}, such as [0, inf], with its starting value between",
+                    f"[lowest, highest] of {name}, [0, inf] or so, with its starting value between",
                 )
-        rows = [row for matrix in (self.M, self.K, self.damping) for row in matrix]
-        if len({len(self.M), len(self.K), len(self.damping), len(self.names), *map(len, rows)}) > 1:
+        n = len(self.names)
+        if any([*map(len, matrix)] != n * [n] for matrix in (self.M, self.K, self.damping)):
             example = 'M = [["a", 0], [0, 2.5]]'
             yield "M", f"square matrices M, K and perhaps C of one size, with a name for each row: {example}"
 
@@ -224,10 +222,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
     `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
     those not in the table are 0. An output that is a number times a displacement is measured in place of it;
-    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
-    parameter of initial values alone is left out, with a warning. Explicit time, constant loads and
-    nonlinear terms are refused. An amplitude that `[outputs]` do not show, or that is not measured, is
-    predicted.
+    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither. Explicit time,
+    constant loads, nonlinear terms and parameters of initial values alone are refused. An amplitude that
+    `[outputs]` do not show, or that is not measured, is predicted.
 
     Parameters
     ----------
@@ -242,47 +239,32 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     ------
     InputError
         With the problems of the file, each with its key.
-
-    Warns
-    -----
-    TableWarning
-        Where a parameter of a model in time has no influence on amplitudes.
     """
-    path = Path(path)
 
     def read(file: ModelFile) -> HarmonicFile:
-        equations, inputs, unseen = file.equations, file.inputs, list[str]()
-        estimate, errors = file.estimate, None
-        if file.M:
-            equations, inputs, unseen = _of_amplitudes(file)
-            used = {*_TOKEN.findall(" ".join(equations))}
-            estimate = {name: value for name, value in estimate.items() if name in used}
-            if lost := listing(sorted(file.estimate.keys() - used), "and"):
-                words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
-                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
+        equations, inputs = _of_amplitudes(file) if file.M else (file.equations, file.inputs)
         if not equations:
             raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
         model = harmonic_model(
-            equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
+            equations, known=file.known, estimate=[*file.estimate], inputs=inputs, varying=file.varying
         )
         if file.M:
             strange = {*model.signals, *model.varying} - {*file.names, *file.outputs, *model.inputs}
-            for name in sorted(strange | (estimate.keys() & {*file.per_record})):
+            for name in sorted(strange | {*file.per_record}):
                 raise ValueError(
                     f"{name} has no meaning for amplitudes: M, C and K hold parameters and known numbers; "
                     "what changes with the time t must be a measured input"
                 )
             if model.has_constant_terms:
                 raise ValueError("a load without any amplitude has no influence on amplitudes: leave it out")
+        errors, start = None, {name: value for name, value in file.estimate.items() if value is not None}
         if given := file.errors:
             phase = math.radians(given.phase_deg)
             errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
-        start = {name: value for name, value in estimate.items() if value is not None} | file.start
-        tables: tuple[dict[str, Any], ...] = file.bounds, start, file.prior
-        bounds, guess, prior = ({k: v for k, v in one.items() if k in estimate} for one in tables)
-        return HarmonicFile(model, bounds, guess, errors, tuple({*unseen} & {*model.outputs}), prior)
+        unmeasured = tuple({*model.outputs} - {*file.outputs} if file.outputs else ())
+        return HarmonicFile(model, file.bounds, start | file.start, errors, unmeasured, file.prior)
 
-    return whole(_read(path), "model of amplitudes", read)
+    return whole(_read(Path(path)), "model of amplitudes", read)
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -362,8 +344,8 @@ def _read(path: Path) -> ModelFile:
     return problems.need(read_settings(ModelFile, data, str(path), problems))
 
 
-def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
-    """Matrices as equations of amplitudes, what excites, and displacements that outputs do not show."""
+def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str]]:
+    """Matrices as equations of amplitudes, and what excites."""
     y, inputs, force = file.names, file.inputs or [], file.force
     if not inputs and not force:
         inputs = [f"{FORCE}{x}" for x in y]
@@ -389,6 +371,5 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str], list[str]]:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )
-    unseen = [x for x in y if x not in put] if file.outputs else []
     put |= {f"v_{x}": f"(p*{put.get(x, x)})" for x in y}
-    return [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in equations], inputs, unseen
+    return [_TOKEN.sub(lambda word: put.get(word[0], word[0]), text) for text in equations], inputs

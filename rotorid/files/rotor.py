@@ -19,7 +19,6 @@ from fem import (
     Calibration,
     Disc,
     Model,
-    NodeForce,
     Rotor,
     Support,
 )
@@ -29,6 +28,7 @@ from rotorid.base.tables import csv_bytes
 from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.attached import (
+    OUTWARDS,
     Attached,
     Place,
     each,
@@ -58,12 +58,12 @@ from rotorid.files.small_model import is_small, is_small_model, read_small_model
 from rotorid.files.units import one_of
 
 USUAL = {
-    "length": (5e-5, 50.0, "m"),
-    "diameter": (5e-4, 10.0, "m"),
-    "youngs_modulus": (1e9, 1e12, "Pa"),
-    "density": (100.0, 3e4, "kg/m³"),
+    "length": (5e-5, 50.0, units.LENGTH),
+    "diameter": (5e-4, 10.0, units.LENGTH),
+    "youngs_modulus": (1e9, 1e12, units.MODULUS),
+    "density": (100.0, 3e4, units.DENSITY),
 }
-"""From where to where quantities of machines are, in which unit."""
+"""From where to where quantities of machines are, in SI, and units in which they may have been meant."""
 
 
 class Material(Settings):
@@ -129,13 +129,12 @@ class DiscKeys(Place):
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Neither of both, or some of both."""
-        sizes = self.model_fields_set & {"width", "outer_diameter", "inner_diameter", "density"}
+        both = {"width", "outer_diameter"}
+        sizes = self.model_fields_set & {*both, "inner_diameter", "density"}
         if bool(sizes) == self.has("mass"):
             yield "mass", "either the mass of the disc or its geometry: width_m, outer_diameter_m"
-        elif sizes and (self.polar_inertia or self.diametral_inertia):
-            yield "polar_inertia", "nothing beside the geometry, which gives it"
-        elif sizes and not {"width", "outer_diameter"} <= sizes:
-            yield "width", "the disc's width and outer diameter"
+        elif sizes and (self.has("polar_inertia") or self.has("diametral_inertia") or not both <= sizes):
+            yield "width", "the disc's width and outer diameter, and no moments of inertia beside them"
 
     def made(self, node: int, density: float) -> Disc:
         """The disc at a node, of the material's density."""
@@ -260,8 +259,7 @@ def read_rotor(path: str | Path) -> Rotor:
     parts["discs"] += each(problems, file.disc, "disc", lambda item: item.made(at(item), density))
     attached = read_attached(file, at, path.parent, problems)
     problems.stop()
-    parts["supports"] += [one for one in attached if isinstance(one, Support)]
-    parts["forces"] = [one for one in attached if isinstance(one, NodeForce)]
+    parts |= {"forces": attached["forces"], "supports": parts["supports"] + attached["supports"]}
     effects, has_ratio = file.model.model_dump(), parts.pop("has_ratio") or file.material.has("poisson_ratio")
     if not file.model.has("shear"):  # nothing else depends on the ratio
         effects["shear"] = has_ratio
@@ -312,14 +310,17 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
     table.must_be("inner_diameter", ~thick | ~elements, "less than the outer diameter")
     for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in OF_NODES)):
-        table.must_be(stem, values[stem] >= 0, "a number of 0 or more")
+        table.must_be(stem, values[stem] >= 0, OUTWARDS if "support" in stem else "a number of 0 or more")
     problems.stop()
-    for stem, (low, high, unit) in USUAL.items():
+    for stem, (low, high, of) in USUAL.items():
         odd = elements & (values[stem] > 0) & ((values[stem] < low) | (values[stem] > high))
-        expected = f"{low:g} to {high:g} {unit}; is this in another unit?"
-        replace(table, problems=doubts).must_be(stem, ~odd, expected)
-        if (odd & np.isnan(table.numbers(stem))).any():
-            material.complain(doubts, stem, expected)
+        for value in values[stem][odd][:1].tolist():
+            written = value * (table.unit(stem).scale if stem in table else 1.0)
+            meant = [name for name, unit in of.items() if low <= unit.to_si(written) <= high]
+            expected = f"{low:g} to {high:g} {next(iter(of))}; is this in {[*meant, 'another unit'][0]}?"
+            replace(table, problems=doubts).must_be(stem, ~odd, expected)
+            if np.isnan(table.numbers(stem)[odd]).any():
+                material.complain(doubts, stem, expected)
     if len(doubts):
         warnings.warn(str(InputError(doubts)), TableWarning, stacklevel=3)
     rows = np.array([values[column.stem] for column in OF_NODES]).T.tolist()

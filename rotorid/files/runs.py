@@ -1,7 +1,7 @@
 """Runs tables: what the sensors read, one row per run × speed × sensor (and repeat).
 
-A table in another layout is brought into this form first (`layout`). With the weights tables they
-make trials.
+A table in another layout is brought into this form first (`layout`). With the weights tables they make
+trials; with times and standard deviations, or without, vectors over speed.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from rotorid.files.weights import read_weights
 
 if TYPE_CHECKING:
     from rotorid.files.job_models import Errors
+    from rotorid.identify.modes_result import Readings
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
@@ -51,6 +52,11 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
+OVER_SPEED = (
+    *(column for column in COLUMNS if column.stem not in ("repeat", "time_s")),
+    Column("time", one_of(units.TIME), ("time_s",), required=False),
+)
+"""Columns of vectors over speed."""
 ROUNDING = 1e-12
 UNSAID = 0.1
 """Per cent within which no machine keeps its speed from run to run, so that nothing need be said."""
@@ -389,3 +395,64 @@ def _complain_about_gaps(
             hint = f"its nearest speed is {show_speed(near, unit)}, speeds count as one within "
             hint += f"{tolerance_percent:g} %"
             table.as_whole(column, f"readings of {place}; {hint}")
+
+
+def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
+    """Read the vectors of each run over speed, by rising time or, without times, speed.
+
+    The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
+    `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
+    one standard deviation. Vectors of one time were read at one speed; without times a speed stands once.
+    The table may have any layout of a runs table, such as columns for each sensor; without a column `run` it
+    is one run, named as the file.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    from rotorid.identify.modes_result import Readings
+
+    problems = Problems()
+    files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
+    grids = read_runs_grids(files, Conventions(Labels(phase=phase)), problems, first=True)
+    grid = problems.need(joined(grids, problems))
+    table = problems.need(readings_table(grid, problems, OVER_SPEED))
+    instants = _instants(table)
+    problems.stop()
+    unit, sweeps = table.unit("amplitude"), []
+    labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
+    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    stated = covariances(table, vectors) if "amplitude_std" in table else None
+    runs, names, speeds = np.array(table.texts("run")), table.texts("sensor"), table.numbers("speed")
+    for run in dict.fromkeys(runs.tolist()):
+        rows = np.flatnonzero(runs == run)
+        instant, first, place = np.unique(instants[rows], return_index=True, return_inverse=True)
+        sensors = tuple(dict.fromkeys(names[row] for row in rows))
+        at = place, [sensors.index(names[row]) for row in rows]
+        Z, its = np.full((len(instant), len(sensors)), complex(np.nan, np.nan)), None
+        Z[at] = vectors[rows]
+        if stated is not None:
+            its = np.full((*Z.shape, 2, 2), np.nan)
+            its[at] = stated[rows]
+        timed = instant if "time" in table else None
+        sweeps.append(Readings(run, timed, speeds[rows][first], sensors, Z, its, labels))
+    return tuple(sweeps)
+
+
+def _instants(table: Table) -> FloatArray:
+    """Times, or else speeds; a sensor is read once at a time, and all at one speed."""
+    stem, where = "time", "time"
+    if "time" not in table:
+        stem, where = "speed", "speed; vectors read one after the other need a column time_s"
+    runs, instants, speeds = table.texts("run"), table.numbers(stem), table.numbers("speed")
+    keys = [*zip(runs, table.texts("sensor"), instants.tolist(), strict=True)]
+    unlike = f"another sensor than in row {{}}, which has the same run and {where}"
+    table.once("sensor", (None if np.isnan(key[2]) else key for key in keys), unlike)
+    first: dict[tuple[str, float], int] = {}
+    for row, (run, _, instant) in enumerate(keys):
+        other = first.setdefault((run, instant), row)
+        if abs(speeds[row] - speeds[other]) > 1e-9 * speeds[other]:
+            expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
+            table.complain(row, "speed", expected)
+    return instants

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from fem import GRAVITY, Motion, NodeForce, Support
+from fem import GRAVITY, Motion
 from rotorid.base.arrays import polar
 from rotorid.files import units
 from rotorid.files.attached import (
@@ -130,22 +130,20 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     def vector(item: UnbalanceKeys) -> tuple[int, complex]:
         return at(item), complex(polar(item.size, item.angle))
 
-    attached = read_attached(file, at, path.parent, problems)
+    parts: dict[str, Any] = read_attached(file, at, path.parent, problems)
     unbalance = each(problems, file.unbalance, "unbalance", vector)
     bow = each(problems, file.bow, "bow", vector)
     if len(dict(bow)) < len(bow):
         file.complain(problems, "bow", "each node once")
     problems.stop()
-    parts: dict[str, Any] = {name: getattr(file, name) for name in ARRAYS}
+    parts |= {name: getattr(file, name) for name in ARRAYS}
     parts["weight"] = file.weight or GRAVITY * np.array(file.masses)
-    parts["supports"] = [one for one in attached if isinstance(one, Support)]
-    parts["forces"] = [one for one in attached if isinstance(one, NodeForce)]
     parts["unbalance"] = dict.fromkeys(dict(unbalance), 0j)
     for node, value in unbalance:
         parts["unbalance"][node] += value
     model = whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow)))
     held = float(model.stiffness.sum())
-    if abs(held) > _HELD * np.abs(model.stiffness).max() and attached:
+    if abs(held) > _HELD * np.abs(model.stiffness).max() and (model.supports or model.forces):
         words = (
             f"the shaft alone, with all digits: it resists a shift with {held:.4g} N/m, and what holds it "
             "stands in tables such as [[bearing]]"
@@ -156,13 +154,11 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
 
 def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Motion:
     """At a speed, rad/s; of one plane where nothing couples both and they are not asked for."""
-    motion = model.motion(speed)
-    y = np.array(["y" in name for name in motion.coordinates])
-    across = np.ix_(~y, y)
-    plane = "both" if both_planes or motion.C[across].any() or motion.K[across].any() else "x"
-    with suppress(ValueError):  # damped supports stay, as states of first order
-        return model.motion(speed, plane, condensed=True)
-    return model.motion(speed, plane)
+    for plane in ("x", "both")[both_planes:]:
+        for condensed in (True, False):  # damped supports stay, as states of first order
+            with suppress(ValueError):
+                return model.motion(speed, plane, condensed=condensed)
+    return model.motion(speed)
 
 
 def equations_of(
@@ -204,6 +200,7 @@ def equations_of(
     names, damping = names[on].tolist(), C.astype(float).astype(object)
     for i in [names.index(name) for name in dampers]:
         damping[i, i] = f"{damping[i, i]!r} + d_{names[i]}" if damping[i, i] else f"d_{names[i]}"
+    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
     data: dict[str, Any] = {
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],
@@ -213,9 +210,8 @@ def equations_of(
         "K": K.tolist(),
         "force": {name.removeprefix(FORCE): name for name in inputs},
         "outputs": {name: name for name in outputs or ()},
-        "bounds": {f"d_{name}": [0.0, math.inf] for name in dampers},
+        "bounds": {name: [0.0, math.inf] for name in estimate},
     }
-    estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
     return {name: part for name, part in data.items() if part} | {"estimate": estimate}
 
 

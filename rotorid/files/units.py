@@ -65,58 +65,60 @@ UnitReader = Callable[[str], Unit]
 _SPELLING = str.maketrans(
     {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "/": "_", "·": "_", "*": "_"}
 )
-_POUND, _POUND_FORCE = 0.45359237, 4.4482216152605
-
-
-def _table(kind: str, **factors: tuple[float, float]) -> dict[str, Unit]:
-    return {name: Unit(name, kind, up, down) for name, (up, down) in factors.items()}
-
-
-LENGTH = _table(
-    "length", m=(1.0, 1.0), mm=(1.0, 1e3), um=(1.0, 1e6), mil=(254.0, 1e7), **{"in": (254.0, 1e4)}
-)
-MASS = _table("mass", kg=(1.0, 1.0), g=(1.0, 1e3), mg=(1.0, 1e6), oz=(_POUND, 16.0), lb=(_POUND, 1.0))
-UNBALANCE = {
-    f"{name}_{radius}": Unit(
-        f"{name}_{radius}",
-        "unbalance",
-        mass.multiply * LENGTH[radius].multiply,
-        mass.divide * LENGTH[radius].divide,
-    )
-    for name, mass in MASS.items()
-    for radius in ("m", "mm", "in")
+_FACTORS = {
+    **dict.fromkeys(("m", "kg", "s", "N", "Pa", "rad"), (1.0, 1.0)),
+    **dict.fromkeys(("mm", "g", "ms", "mPa", "cP"), (1.0, 1e3)),
+    **dict.fromkeys(("um", "mg", "us"), (1.0, 1e6)),
+    "kN": (1e3, 1.0),
+    "mil": (254.0, 1e7),
+    "in": (254.0, 1e4),
+    "oz": (0.45359237, 16.0),
+    "lb": (0.45359237, 1.0),
+    "lbf": (4.4482216152605, 1.0),
+    "psi": (4.4482216152605 * 1e8, 254.0**2),
+    "MPa": (1e6, 1.0),
+    "GPa": (1e9, 1.0),
+    "min": (60.0, 1.0),
+    "rpm": (2.0 * pi, 60.0),
+    "Hz": (2.0 * pi, 1.0),
+    "deg": (pi, 180.0),
 }
+"""SI = value × first / second."""
+
+
+def _units(kind: str, names: str) -> dict[str, Unit]:
+    """Units of one kind; a name may be a product of others, behind `_per_` a quotient: `lbf_s_per_in`."""
+    units = {}
+    for name in names.split():
+        size = [1.0, 1.0]
+        for side, parts in enumerate(name.split("_per_")):
+            for part in parts.split("_"):
+                base = part if part in _FACTORS else part[:-1]
+                for k, factor in enumerate(_FACTORS[base]):
+                    size[k ^ side] *= factor ** int(part.removeprefix(base) or 1)
+        units[name] = Unit(name, kind, *size)
+    return units
+
+
+LENGTH = _units("length", "m mm um mil in")
+MASS = _units("mass", "kg g mg oz lb")
+UNBALANCE = _units("unbalance", " ".join(f"{mass}_{radius}" for mass in MASS for radius in ("m", "mm", "in")))
 WEIGHT = MASS | UNBALANCE
-SPEED = _table("speed", rpm=(2.0 * pi, 60.0), rad_s=(1.0, 1.0), Hz=(2.0 * pi, 1.0))
-ANGLE = _table("angle", deg=(pi, 180.0), rad=(1.0, 1.0))
-INERTIA = _table("inertia", kg_m2=(1.0, 1.0), lb_in2=(_POUND * 254.0**2, 1e8))
-STIFFNESS = _table(
-    "stiffness",
-    N_per_m=(1.0, 1.0),
-    N_per_mm=(1e3, 1.0),
-    N_per_um=(1e6, 1.0),
-    lbf_per_in=(_POUND_FORCE * 1e4, 254.0),
-)
-DAMPING = _table(
-    "damping", N_s_per_m=(1.0, 1.0), N_s_per_mm=(1e3, 1.0), lbf_s_per_in=(_POUND_FORCE * 1e4, 254.0)
-)
-MODULUS = _table("modulus", Pa=(1.0, 1.0), MPa=(1e6, 1.0), GPa=(1e9, 1.0), psi=(_POUND_FORCE * 1e8, 254.0**2))
-DENSITY = _table("density", kg_per_m3=(1.0, 1.0), g_per_cm3=(1e3, 1.0), lb_per_in3=(_POUND * 1e12, 254.0**3))
-FORCE = _table("force", N=(1.0, 1.0), kN=(1e3, 1.0), lbf=(_POUND_FORCE, 1.0))
-TIME = _table("time", s=(1.0, 1.0), ms=(1.0, 1e3), us=(1.0, 1e6), min=(60.0, 1.0))
-VELOCITY = _table("velocity", m_s=(1.0, 1.0), mm_s=(1.0, 1e3), in_s=(254.0, 1e4))
-VISCOSITY = _table("viscosity", Pa_s=(1.0, 1.0), mPa_s=(1.0, 1e3), cP=(1.0, 1e3))
-CUBIC_STIFFNESS = _table(
-    "cubic stiffness",
-    N_per_m3=(1.0, 1.0),
-    N_per_mm3=(1e9, 1.0),
-    lbf_per_in3=(_POUND_FORCE * 1e12, 254.0**3),
-)
-_PEAK = {
-    **LENGTH,
-    **VELOCITY,
-    **_table("acceleration", g=(STANDARD_GRAVITY, 1.0), m_s2=(1.0, 1.0), mm_s2=(1.0, 1e3)),
-}
+SPEED = _units("speed", "rpm rad_s Hz")
+ANGLE = _units("angle", "deg rad")
+INERTIA = _units("inertia", "kg_m2 lb_in2")
+STIFFNESS = _units("stiffness", "N_per_m N_per_mm N_per_um lbf_per_in")
+DAMPING = _units("damping", "N_s_per_m N_s_per_mm lbf_s_per_in")
+MODULUS = _units("modulus", "Pa MPa GPa psi")
+_GRAMS = {"g_per_cm3": Unit("g_per_cm3", "density", 1e3)}
+DENSITY = _units("density", "kg_per_m3") | _GRAMS | _units("density", "lb_per_in3")
+FORCE = _units("force", "N kN lbf")
+TIME = _units("time", "s ms us min")
+VELOCITY = _units("velocity", "m_s mm_s in_s")
+VISCOSITY = _units("viscosity", "Pa_s mPa_s cP")
+CUBIC_STIFFNESS = _units("cubic stiffness", "N_per_m3 N_per_mm3 lbf_per_in3")
+_G = Unit("g", "acceleration", STANDARD_GRAVITY)
+_PEAK = LENGTH | VELOCITY | {"g": _G} | _units("acceleration", "m_s2 mm_s2")
 VIBRATION = {
     name + suffix: Unit(name + suffix, unit.kind, unit.multiply * up, unit.divide * down)
     for name, unit in _PEAK.items()

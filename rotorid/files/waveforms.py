@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
 from balancing import Labels
-from rotorid.base.arrays import significant
+from rotorid.base.arrays import AnyArray, significant
 from rotorid.base.choices import did_you_mean
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, Phase, listing
@@ -178,16 +178,10 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     records, amplitude = list[WaveformRecord](), file.amplitude
     for run, name in file.records.items():
         try:
-            record, measured = _record(run, folder / name, file)
+            record, amplitude = _record(run, folder / name, file, amplitude)
+            records.append(record)
         except InputError as error:
             problems.extend(error.problems)
-            continue
-        records.append(record)
-        amplitude = amplitude or measured[0]
-        for sensor, unit in zip(record.sensors, measured, strict=True):
-            if unit.kind != amplitude.kind and not {unit.kind, amplitude.kind} <= DERIVATIVE.keys():
-                expected = f"a unit that can become that of the amplitudes, {amplitude.name or 'none'}"
-                problems.add(record.source, None, sensor.name, unit.name, expected)
     problems.stop()
     unit = problems.need(amplitude)
     return Waveforms(
@@ -201,49 +195,59 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     )
 
 
-def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, list[Unit]]:
-    """The record and the unit of each of its sensors; raises InputError."""
+def _record(
+    run: str, path: Path, file: WaveformsFile, amplitude: Unit | None
+) -> tuple[WaveformRecord, Unit | None]:
+    """The record and the unit of amplitudes, without one that of its first sensor; raises InputError."""
     sampled = read_samples(path)
     rate = file.rate or sampled.rate
     if rate is None:
         raise refusal(path, "a rate: a channel t_s of times, or rate_Hz in a waveforms file")
-    if sampled.rate is not None and abs(rate / sampled.rate - 1.0) > SAME_RATE:
+    if abs(rate / (sampled.rate or rate) - 1.0) > SAME_RATE:
         raise refusal(path, f"the rate that the file has, {sampled.rate:.6g} Hz, not {rate:.6g} Hz")
     parts = {column: _parted(column) for column in sampled.channels}
     stems = Counter(stem for stem, _ in parts.values())
     short = {stem if stems[stem] == 1 else column: column for column, (stem, _) in parts.items()}
-    columns = short | {column: column for column in parts}  # with or without the unit in the name
     there = f"; the channels are {listing(parts, 'and')}"
-    if file.tacho is None:
-        expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file)"
-        raise refusal(path, expected + there)
-    marks = columns.get(file.tacho)
-    keys = file.channels or {name: ChannelKeys() for name, column in short.items() if column != marks}
-    channels, measured = list[Channel](), list[Unit]()
-    for name, stated in (("tacho", ChannelKeys(channel=file.tacho)), *keys.items()):
-        column = columns.get(stated.channel or name, "")
-        if not column:
-            hint = did_you_mean(stated.channel or name, columns)
-            raise refusal(path, f"a channel of this name{hint}{there}", column=stated.channel or name)
-        samples, in_name = sampled.channels[column], parts[column][1]
+
+    def channel(name: str) -> tuple[str, AnyArray]:
+        """A channel, named with or without its unit, and its samples without gaps."""
+        column = short.get(name, name)
+        if column not in parts:
+            hint = did_you_mean(name, {**short, **parts})
+            raise refusal(path, f"a channel of this name{hint}{there}", column=name)
+        samples = sampled.channels[column]
         for at in np.flatnonzero(~np.isfinite(samples))[:1]:
             value = "" if np.isnan(samples[at]) else str(samples[at])
             raise refusal(path, "a number in each sample", int(at) + sampled.first_row, column, value)
-        unit = stated.unit or in_name or file.unit or Unit("", "label ''")
+        return column, samples
+
+    if file.tacho is None:
+        expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file)"
+        raise refusal(path, expected + there)
+    marks, pulses = channel(file.tacho)
+    others = {name: ChannelKeys() for name, column in short.items() if column != marks}
+    sensors = list[Channel]()
+    for name, keys in (file.channels or others).items():
+        column, samples = channel(keys.channel or name)
+        in_name = parts[column][1]
+        unit = keys.unit or in_name or file.unit or Unit("", "label ''")
+        amplitude = amplitude or unit
         if in_name is not None and in_name.name != unit.name:
             raise refusal(path, f"the unit {in_name.name} of its name, not {unit.name}", column=column)
         if unit.name.endswith(("_pp", "_rms")) and unit.kind in DERIVATIVE:
             expected = f"the unit of a sample, {unit.name.rpartition('_')[0]}, not {unit.name}"
             raise refusal(path, expected, column=column)
-        factor = stated.scale * unit.to_si(sampled.scale)
-        signal_path = SignalPath(stated.high_pass, stated.high_pass_order, stated.delay)
-        channels.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
-        measured.append(unit)
-    pulses, *sensors = channels
+        if unit.kind != amplitude.kind and not {unit.kind, amplitude.kind} <= DERIVATIVE.keys():
+            expected = f"a unit that can become that of the amplitudes, {amplitude.name or 'none'}"
+            raise refusal(path, expected, None, name, unit.name)
+        factor = keys.scale * unit.to_si(sampled.scale)
+        signal_path = SignalPath(keys.high_pass, keys.high_pass_order, keys.delay)
+        sensors.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
     if not sensors:
         raise refusal(path, "a channel besides that of the tacho")
-    tacho = Channel(str(marks), pulses.samples * np.float32(sampled.scale))
-    return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), measured[1:]
+    tacho = Channel(marks, pulses * np.float32(sampled.scale))
+    return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), amplitude
 
 
 def _parted(name: str) -> tuple[str, Unit | None]:

@@ -88,8 +88,8 @@ def read_weights(
     expected = "a weight above 0 (a run without weights has no row here; what was removed is one 180° away)"
     table.must_be("mass", size > 0, expected)
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
-    known = {name.casefold(): name for name in runs or ()}
-    run = [name if name in (runs or ()) else known.get(name.casefold(), name) for name in names]
+    folded = {name.casefold(): name for name in runs or ()}
+    run = [name if name in (runs or ()) else folded.get(name.casefold(), name) for name in names]
     values = conventions.labels.weight_from(size, _angles(table, conventions)).tolist()
     rows: dict[tuple[str, str, complex], int] = {}
     for i, row in enumerate(zip(run, plane, values, strict=True)):

@@ -2,7 +2,7 @@
 
 With the angle θ(t), Ω = θ' and s = −ζω + iω√(1 − ζ²), z'' + 2ζω z' + ω² z = ω² (Ω² − iΩ') e^{iθ} has the
 answer z = (z_s − z_s̄) / (s − s̄), where z_s' = s z_s + ω² (Ω² − iΩ') e^{iθ}; a vector is z e^{−iθ}. From step
-to step of a uniform grid z_s is exact but for a Gauss quadrature of the force (docs/theory/run_up.md).
+to step of a uniform grid z_s is exact but for a Gauss quadrature of the force (docs/theory/identify.md).
 """
 
 from __future__ import annotations

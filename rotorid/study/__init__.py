@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+__all__ = ["StudyOptions", "study"]
+
 UNDETERMINED = "the readings do not determine a correction"
 
 

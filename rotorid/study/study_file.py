@@ -164,7 +164,7 @@ def read_study(path: str | Path) -> Study:
     Raises
     ------
     InputError
-        With all problems of both.
+        With all problems of the study file, or of the rotor.
     """
     path, problems = Path(path), Problems()
     data = problems.need(read_toml(path, problems))

@@ -1,143 +1,251 @@
-"""What the worksheet shows, computed by the commands in a process of its own: one JSON line a request.
+"""What the worksheet shows, computed by the commands in processes beside the server.
 
-    python -m rotorid.worksheet.calculation
-
-Each line of standard input is {"do": NAME, …arguments}; its answer is {"value": …}, or {"refused": sentence},
-or {"problems": […]} of files. The page computes nothing, and neither does this: it calls what the command
-line calls.
+The page computes nothing, and neither does this: it calls what the command line calls.
 """
 
 from __future__ import annotations
 
 import errno
-import json
+import functools
 import math
 import os
-import signal
-import sys
+import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rotorid.base.tables import Column, Table, html
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
+    from balancing import Labels
     from rotorid.commands.balance import Balance
     from rotorid.files import Job
-    from rotorid.report.outcome import Outcome
+    from rotorid.worksheet.runs_so_far import Effect
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
-_kept: dict[str, tuple[Balance, list[str]]] = {}
-"""Newest balances by what was asked for: the result (for pictures and sheets), what was warned of."""
+_NOT_TO_DO = re.compile(
+    r"^(do not|measure|make a trial|fail|not as)|Take off what|Add nothing yet", re.I | re.M
+)
+_TWO = partial(figures, digits=2)
+_SHOWN: Mapping[str, Callable[[Any], str]] = {"mass": figures, "angle_deg": "{:.1f}°".format}
 _read: dict[str, int] = {}
 """Names of the files that were read, and when each was changed before that (ns)."""
 
 
-def main() -> None:
-    """Answer requests until standard input ends."""
+class Asked(NamedTuple):
+    """A balance that is wanted, of a version of the files: with the check run, in pieces, with a trim."""
+
+    job: str
+    version: int
+    checked: bool = True
+    split: bool = False
+    refine: bool = False
+
+
+def answered(folder: str, do: str, *given: object) -> dict[str, Any]:
+    """Do what is asked for in a folder: its `value`, or why it is `refused`; which files were `read`."""
     from rotorid.files.disk import reading
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    reading.set(_noted)
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    sys.stdout = sys.stderr  # nothing that is printed may come between the answers
-    for line in sys.stdin:
-        request = json.loads(line)
-        answer = {**_answered(request.pop("do"), request.pop("folder"), request), "read": _read}
-        print(json.dumps(answer), file=answers, flush=True)
+    reading.set(_note)
+    answer: dict[str, Any]
+    try:
+        os.chdir(folder)  # each time: another one may have been put in its place
+        answer = {"value": REQUESTS[do](*given)}
+    except (ValueError, OSError, ArithmeticError) as error:
+        answer = {"refused": str(error)}
+    except Exception as error:  # a defect of the program, of which the page must not wait for ever
+        answer = {"refused": f"the calculation failed, {type(error).__name__}: {error}"}
+    return {**answer, "read": dict(_read)}
 
 
-def _noted(path: Path) -> None:
+def _note(path: Path) -> None:
     """Refuse a file outside of the folder, by whatever file it is named."""
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(".")):
         raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
     _read[str(path)] = path.stat().st_mtime_ns if path.exists() else 0
 
 
-def _answered(name: str, folder: str, request: dict[str, Any]) -> dict[str, Any]:
+def _problems(error: Exception) -> tuple[dict[str, Any], ...]:
+    return tuple({**vars(one), "text": str(one)} for one in getattr(error, "problems", ()))
+
+
+class Results(NamedTuple):
+    """What a window shows beside the files.
+
+    Attributes
+    ----------
+    effects
+        Of the trial weights, as `runs_so_far.Effect`.
+    problems, refused
+        Of the files, as `Problem` with their `text`; why there is no answer.
+    answer, asked
+        As `balanced` gives it, and of what; None: there is none.
+    more
+        What takes longer, and is to come in its place.
+    busy, version
+        What is being computed; another number for another answer.
+    """
+
+    effects: tuple[Effect, ...] = ()
+    problems: tuple[dict[str, Any], ...] = ()
+    refused: str = ""
+    answer: dict[str, Any] | None = None
+    asked: Asked | None = None
+    more: Asked | None = None
+    busy: str = ""
+    version: int = 0
+
+
+def whole_job(job: str, version: int) -> Results:
+    """What the finished rows say, the answer or the problems of the files, and what takes longer.
+
+    While a check run is being typed, or is wrong, the answer is that of the runs before it.
+    """
     from rotorid.files.problems import InputError
+    from rotorid.worksheet.runs_so_far import runs_so_far
 
-    try:
-        os.chdir(folder)  # each time: another one may have been put in its place
-        return {"value": REQUESTS[name](**request)}
-    except InputError as error:
-        return {"problems": [{**vars(one), "text": str(one)} for one in error.problems]}
-    except (ValueError, OSError, ArithmeticError) as error:
-        return {"refused": str(error)}
+    seen = Results()
+    with suppress(ValueError, OSError):  # the balance says it, too
+        seen = seen._replace(effects=tuple(runs_so_far(Path(job)).effects()))
+    for asked in (Asked(job, version), Asked(job, version, checked=False)):
+        try:
+            made = _balance(asked)[0]
+            more = asked._replace(split=bool(made.job.holes), refine=made.job.check is not None)
+            return seen._replace(answer=balanced(asked), asked=asked, more=None if more == asked else more)
+        except (ValueError, OSError, ArithmeticError) as error:
+            if asked.checked:
+                why = "" if isinstance(error, InputError) else str(error)
+                seen = seen._replace(problems=_problems(error), refused=why)
+    return seen
 
 
-def _balance(job: str, asked: dict[str, Any]) -> tuple[Balance, list[str]]:
+@functools.lru_cache(maxsize=2)
+def _balance(asked: Asked) -> tuple[Balance, list[str]]:
     """The job as it is now, balanced once for each version of its files, and what reading it warned of."""
     from rotorid.base.answer import kinds
     from rotorid.commands.balance import BalanceOptions, balance
 
-    name = json.dumps(asked)
-    if name not in _kept:
-        options = BalanceOptions(split=asked["split"], refine=asked["refine"])
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            made = balance(Path(job) if asked["checked"] else _without_check(Path(job)), options)
-        if len(_kept) > 1:
-            _kept.clear()
-        _kept[name] = (
-            made,
-            kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)),
-        )
-    return _kept[name]
+    job, options = Path(asked.job), BalanceOptions(split=asked.split, refine=asked.refine)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = balance(job if asked.checked else _without_check(job), options)
+    return made, kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
 
 
 def _without_check(path: Path) -> Job:
-    """The job as it is before its check run."""
+    """The job as it is before its check run; InputError where it has none."""
     from rotorid.files.job import job_of, open_job
-    from rotorid.files.problems import Problems
+    from rotorid.files.problems import InputError, Problems
 
     problems = Problems()
     written = open_job(path, problems)
+    if "check" not in {**written.settings, **written.tables}:
+        raise InputError(())
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
     return job_of(written, problems)
 
 
-def in_words(outcome: Outcome) -> dict[str, Any]:
-    """The document of `--json`, and what a person reads."""
-    answer = outcome.answer
+def balanced(asked: Asked) -> dict[str, Any]:
+    """The answer: what to do, with its tables as HTML; what there is to mount, and a list of it to tick."""
+    made, read = _balance(asked)
+    answer, document, labels = made.answer, made.document, made.job.trials.labels
+    path = "mounting.holes" if "mounting" in document else "corrections"
+    boxes = Column("mounted", [f"{k}" for k in range(len(_at(document, path)))], _box)
     return {
         "judgement": answer.judgement,
-        "lines": answer.numbers,
-        "warnings": list(answer.warnings),
+        "against": bool(_NOT_TO_DO.search(answer.judgement)),
+        "tables": str(_tables(document, made, labels)),
+        "warnings": [*([] if asked.checked else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": list(answer.notes),
-        "document": outcome.document,
+        "to_mount": [dict(row) for row in _at(document, path)],
+        "unit": labels.weight_unit,
+        "list": str(html(_table(document, path, _work(labels), more=[boxes]))),
     }
 
 
-def balanced(job: str, asked: dict[str, Any]) -> dict[str, Any]:
-    """Weights, pieces in holes, a trim; `within` is what 95 % of such weights keep to, mass and degrees.
+def _box(row: str) -> str:
+    from markupsafe import Markup
 
-    What was warned of when the files were read stands first among the warnings.
-    """
-    import numpy as np
-
-    made, warned = _balance(job, asked)
-    answer, (sizes, angles) = in_words(made), made.result.half_widths()
-    scale = made.job.trials.labels.weight_scale, 180 / math.pi
-    within = [
-        {
-            key: value if math.isfinite(value) else None
-            for key, value in zip(("mass", "angle_deg"), row, strict=True)
-        }
-        for row in (np.column_stack([sizes, angles]) * scale).tolist()
-    ]
-    first = [] if asked["checked"] else [NOT_FINISHED]
-    return {**answer, "warnings": [*first, *warned, *answer["warnings"]], "within": within}
+    box = '<label class="check"><input type="checkbox" name="{0}" aria-label="mounted, {0}" checked></label>'
+    return Markup(box).format(row)
 
 
-def so_far(job: str) -> dict[str, Any]:
-    """What the finished rows of a job say."""
-    from rotorid.worksheet.runs_so_far import runs_so_far
+def _work(labels: Labels) -> dict[str, str]:
+    """Headings of what is to be done, by the keys of the document."""
+    places = {"plane": "plane", "action": "", "hole": "hole", "pieces": "pieces"}
+    return {**places, "mass": labels.weight_in, "angle_deg": "at"}
 
-    return runs_so_far(Path(job)).to_dict()
+
+def _tables(document: Mapping[str, Any], made: Balance, labels: Labels) -> Markup:
+    """What to mount, with 95 % of it, or what is left to do."""
+    from markupsafe import Markup
+
+    left, pieces, last = document.get("left_to_do"), document.get("mounting"), document["mounted_in_last_run"]
+    table, work, words = partial(_table, document), _work(labels), f"For {document['corrections_refer_to']}. "
+    tables = []
+    if left:
+        words = ""
+        if left["word"] == "trim":
+            tables += [table("left_to_do.holes" if left["holes"] else "left_to_do.add", work, "To add")]
+        tables += [table("left_to_do.mounted", work, f"Mounted in {left['run']}")]
+    elif pieces:
+        tables += [table("mounting.holes", work)]
+    else:
+        sizes, angles = made.result.half_widths()
+        within = [
+            Column(f"± {labels.weight_in}", sizes * labels.weight_scale, _TWO),
+            Column("± °", np.degrees(angles), _TWO),
+        ]
+        tables += [table("corrections", work, more=within)]
+        words += "95 of 100 such weights lie within ±. "
+        if last and any(row["mass"] for row in last["weights"]):
+            tables += [table("add_to_mounted", work, f"Instead, if the weights of {last['run']} stay")]
+        if document["other_readings"]:
+            tables += [table("other_readings", {"if": "if", **work}, "Under another convention")]
+    words += f"Angles count {labels.angles}, phase {labels.phase}."
+    first, *others = map(html, tables)
+    return Markup("\n").join([first, Markup("<p>{}</p>").format(words), *others])
+
+
+def _at(document: Mapping[str, Any], path: str) -> Sequence[Mapping[str, Any]]:
+    rows: Any = document
+    for part in path.split("."):
+        rows = rows[part]
+    return rows  # type: ignore[no-any-return]
+
+
+def _table(
+    document: Mapping[str, Any],
+    path: str,
+    headings: Mapping[str, str],
+    name: str = "",
+    *,
+    more: Sequence[Column] = (),
+) -> Table:
+    """Rows of the document; columns in which nothing stands are left out."""
+    rows = _at(document, path)
+    if all(row.get("action") == "add" for row in rows):  # which needs no words
+        headings = {key: text for key, text in headings.items() if key != "action"}
+    columns = []
+    for key, heading in headings.items():
+        shown = _SHOWN.get(key, str)
+        if key == "angle_deg" and all(row.get("remove_at_deg") is not None for row in rows):
+            key = "remove_at_deg"  # where it is drilled
+        if key.endswith("_deg") and any("hole" in row for row in rows):
+            shown = "{:.6g}°".format  # holes are where they are
+        columns.append(Column(heading, [row.get(key) for row in rows], shown, f"{path}.*.{key}"))
+    return Table(name, (*(one for one in columns if any(one.texts)), *more))
 
 
 def channel(job: str, speed: str, sensor: str) -> str:
@@ -147,31 +255,29 @@ def channel(job: str, speed: str, sensor: str) -> str:
     return _svg(runs_so_far(Path(job)).figure(speed, sensor), f"Runs of {sensor} at {speed}")
 
 
-def picture(job: str, asked: dict[str, Any]) -> str:
+def picture(asked: Asked) -> str:
     """Weights and readings before and after, or discs with pieces in their holes."""
-    made = _balance(job, asked)[0]
+    made = _balance(asked)[0]
     return _svg(made.figure(), made.answer.judgement)
 
 
-def _svg(figure: Figure, title: str) -> str:
-    from rotorid.report.page import inline_svg
-
-    return str(inline_svg(figure, title))
-
-
-def sheet(job: str, asked: dict[str, Any]) -> str:
+def sheet(asked: Asked) -> str:
     """The balancing sheet."""
-    return _balance(job, asked)[0].sheet().decode()
+    return _balance(asked)[0].sheet().decode()
 
 
-def trial(job: str | None, options: dict[str, Any]) -> dict[str, Any]:
-    """A first trial weight, with the job's coefficients or from the load alone."""
+def trial(job: str | None, options: dict[str, Any]) -> str:
+    """A first trial weight, with the job's coefficients or from the load alone, in HTML."""
+    from markupsafe import Markup
+
     from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
 
     made = trial_weight(None if job is None else Path(job), TrialWeightOptions(**options))
-    answer = in_words(made)
-    to_draw = all(one["angle_deg"] is not None for one in answer["document"]["trial_weights"])
-    return {**answer, "picture": _svg(made.figure(), answer["judgement"]) if to_draw else ""}
+    answer, weights = made.answer, made.document["trial_weights"]
+    lines = [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]
+    words = Markup("").join(Markup("<p>{}</p>").format(line) for line in lines if line)
+    to_draw = all(one["angle_deg"] is not None for one in weights)
+    return words + Markup(_svg(made.figure(), answer.judgement) if to_draw else "")
 
 
 def convention(phase: str, angles: str) -> str:
@@ -187,9 +293,12 @@ def convention(phase: str, angles: str) -> str:
     return turning + _svg(phase_figure(labels), f"A reading over time: {title}")
 
 
-REQUESTS: Mapping[str, Callable[..., Any]] = {
-    one.__name__: one for one in (so_far, balanced, channel, picture, sheet, trial, convention)
-}
+def _svg(figure: Figure, title: str) -> str:
+    from rotorid.report.page import inline_svg
 
-if __name__ == "__main__":
-    main()
+    return str(inline_svg(figure, title))
+
+
+REQUESTS: Mapping[str, Callable[..., Any]] = {
+    one.__name__: one for one in (whole_job, balanced, channel, picture, sheet, trial, convention)
+}

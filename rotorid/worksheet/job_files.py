@@ -17,8 +17,8 @@ from rotorid.files.excel_workbook import SUFFIXES, is_workbook
 from rotorid.files.job import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems
-from rotorid.worksheet.job_settings import setting, settings_in, with_setting
-from rotorid.worksheet.text_table import Table, read_table, shown
+from rotorid.worksheet.job_settings import setting, settings_in, text_of, value_of, with_setting
+from rotorid.worksheet.text_table import Line, Table, read_table, shown
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""
@@ -28,11 +28,7 @@ Files = dict[Path, bytes | None]
 
 
 class Conflict(ValueError):
-    """A cell was changed meanwhile; `now` is what it holds."""
-
-    def __init__(self, message: str, now: Any) -> None:  # noqa: ANN401  any type of JSON
-        super().__init__(message)
-        self.now = now
+    """What an edit changes is not what it was."""
 
 
 class _OutsideError(Exception):
@@ -77,7 +73,9 @@ class JobFiles:
     job
         Its file.
     now
-        What it says.
+        What its files say.
+    done, undone
+        What files held before each step that can be undone, and after each that can be done again.
     """
 
     def __init__(self, given: Path) -> None:
@@ -85,31 +83,9 @@ class JobFiles:
         self._held: Files = {}
         self._stamps: dict[Path, object] = {}
         self._noticed: list[str] = []
-        self._done: list[Files] = []
-        self._undone: list[Files] = []
+        self.done: list[Files] = []
+        self.undone: list[Files] = []
         self.now = self._job()
-
-    def state(self) -> dict[str, Any]:
-        """What the page shows, in types of JSON."""
-        now = self.now
-        return {
-            "job": self.job.name,
-            "folder": self.job.parent.name,
-            "exists": now.text is not None,
-            "read_only": now.read_only,
-            "tables": {
-                key: {
-                    "file": table.path.name,
-                    "header": list(table.header),
-                    "rows": [{"id": row.id, "row": row.number, "cells": row.cells} for row in table.rows()],
-                    "read_only": now.read_only or table.read_only,
-                }
-                for key, table in now.tables.items()
-            },
-            "settings": now.settings,
-            "undo": bool(self._done),
-            "redo": bool(self._undone),
-        }
 
     def place(self, file: str, row: int | None) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
@@ -142,8 +118,8 @@ class JobFiles:
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
 
-    def apply(self, edits: Sequence[Mapping[str, Any]]) -> list[str | None]:
-        """Carry out edits, all or none, as one step of undo; the ids of new rows.
+    def apply(self, edits: Sequence[Mapping[str, Any]]) -> None:
+        """Carry out edits, all or none, as one step of undo.
 
         Raises
         ------
@@ -155,24 +131,25 @@ class JobFiles:
         for _ in range(MOST_TRIES):
             draft = self._job()
             try:
-                made = [self._edit(draft, edit) for edit in edits]
+                for edit in edits:
+                    self._edit(draft, edit)
             except (LookupError, TypeError, AttributeError) as error:
                 raise ValueError(f"an edit of an unknown form: {error}") from error
             changed = {table.path: table.data() for table in draft.tables.values() if table.changed}
             with suppress(_OutsideError):
                 if step := self._write({self.job: draft.text, **changed}):
-                    self._done, self._undone = [*self._done[1 - MOST_STEPS :], step], []
-                return made
+                    self.done, self.undone = [*self.done[1 - MOST_STEPS :], step], []
+                return
             self._reload()
         raise ValueError("another program goes on changing the files of the job: try again in a moment")
 
     def undo(self) -> None:
         """Go back to the files before the last step; ValueError where that is impossible."""
-        self._go(self._done, self._undone, "undo")
+        self._go(self.done, self.undone, "undo")
 
     def redo(self) -> None:
         """Go forth to the files that were undone; ValueError where that is impossible."""
-        self._go(self._undone, self._done, "redo")
+        self._go(self.undone, self.done, "redo")
 
     def _go(self, steps: list[Files], others: list[Files], word: str) -> None:
         if not steps:
@@ -201,7 +178,7 @@ class JobFiles:
     def _reload(self) -> None:
         """Take what is on disk; what another program has changed is noticed, and ends undo."""
         before, self._held = self._held, {}
-        self._done, self._undone = [], []
+        self.done, self.undone = [], []
         self.now = self._job()
         both = self._held.keys() & before.keys()
         self._noticed += [path.name for path in before if path in both and self._held[path] != before[path]]
@@ -296,37 +273,37 @@ class JobFiles:
             if data is None:
                 path.unlink(missing_ok=True)
 
-    def _edit(self, draft: Job, edit: Mapping[str, Any]) -> str | None:
-        """Carry out one edit on a draft; the id of a new row."""
+    def _edit(self, draft: Job, edit: Mapping[str, Any]) -> None:
+        """Carry out one edit on a draft."""
         if draft.read_only:
             raise ValueError(draft.read_only)
         if "key" in edit:
-            key = [str(part) for part in edit["key"]]
-            if not _is_done(setting(draft.settings, key), edit["new"], edit, ".".join(key)):
-                draft.set(key, edit["new"])
-            return None
+            key, new = [str(part) for part in edit["key"]], edit["new"]
+            now, typed = setting(draft.settings, key), bool(edit.get("typed"))
+            if not _is_done(text_of(now) if typed else now, new, edit, ".".join(key)):
+                draft.set(key, value_of(key[-1], new) if typed else new)
+            return
         if "create" in edit:
             self._create(draft, edit["create"], edit["header"])
-            return None
+            return
         table = draft.tables[edit["table"]]
         if table.read_only:
             raise ValueError(table.read_only)
         if "cells" in edit:
-            return table.add({name: str(text) for name, text in edit["cells"].items()})
-        line = table.row(edit.get("row") or edit["delete"])
+            table.add({name: str(text) for name, text in edit["cells"].items()})
+            return
+        line, what = table.row(edit.get("row") or edit["delete"]), f"a row of {table.path.name}"
         if line is None:
-            raise Conflict(f"a row of {table.path.name} is not there any more", None)
+            raise Conflict(f"{what} is not there any more")
         if "delete" in edit:
-            _is_done(line.cells, None, edit, f"a row of {table.path.name}")
-            table.remove(line)
-            return None
-        column, new = edit["column"], clean(str(edit["new"]))
-        old = {"old": clean(str(edit["old"]))} if "old" in edit else {}
-        if not _is_done(
-            line.cells[table.column(column)], new, old, f"{column} in a row of {table.path.name}"
-        ):
-            table.write(line, {column: new})
-        return None
+            _is_done(line.cells, None, edit, what)
+            table.lines.remove(line)
+            table.changed = True
+            return
+        texts = {key: clean(str(edit[key])) for key in ("old", "new") if key in edit}
+        column = edit["column"]
+        if not _is_done(line.cells[table.column(column)], texts["new"], texts, f"{column} in {what}"):
+            table.write(line, {column: texts["new"]})
 
     def _create(self, draft: Job, key: str, header: Sequence[str]) -> None:
         """Begin a table in a file that the job names then."""
@@ -337,21 +314,19 @@ class JobFiles:
             names = (f"{key}{end}.csv" for end in ("", *(f"_{n}" for n in range(2, 1000))))
             name = next(name for name in names if not self.job.with_name(name).exists())
             draft.set([key], name)
-        separators = [one.separator for one in draft.tables.values() if one.lines]
-        line = (separators or [","])[0].join(header)
+        separator = next((one.separator for one in draft.tables.values() if one.lines), ",")
+        lines = [Line(separator.join(header), id="header"), Line("")]
         # with a mark, because Excel takes a file without it for its own 8-bit encoding
-        made = read_table(self.job.with_name(name), key, f"{line}\n".encode("utf-8-sig"))
-        if made.read_only:
-            raise ValueError(made.read_only)
-        made.encoding, made.changed = "utf-8-sig", True
-        draft.tables[key] = made
+        draft.tables[key] = Table(
+            self.job.with_name(name), header, lines, separator=separator, encoding="utf-8-sig", changed=True
+        )
 
 
 def _is_done(now: Any, new: Any, edit: Mapping[str, Any], what: str) -> bool:  # noqa: ANN401
     """Whether a value is the new one already; Conflict if it is not the old one either."""
     if now != new and now != edit.get("old", now):
         there = "nothing" if now is None else repr(now)
-        raise Conflict(f"{what} was changed meanwhile: {there} is there now", now)
+        raise Conflict(f"{what} was changed meanwhile: {there} is there now")
     return bool(now == new)
 
 
@@ -373,15 +348,15 @@ def _job_in(given: Path) -> Path:
     if not given.suffix and not given.exists() and given.parent.is_dir():
         given.mkdir()
     if not given.is_dir():
-        there = given.is_file() or (given.suffix.lower() == ".toml" and given.parent.is_dir())
-        if given.suffix.lower() not in (".toml", *SUFFIXES) or not there:
+        kind = given.suffix.lower()
+        if kind not in (".toml", *SUFFIXES) or not (given.parent if kind == ".toml" else given).exists():
             raise ValueError(f"{given}: expected a folder, or a job (.toml or .xlsx) that exists")
         return given
     jobs = [path for path in sorted(given.glob("*.toml")) if path.name[0] != "." and _is_job(path)]
     if len(jobs) > 1:
         names = listing([path.name for path in jobs], "and")
         raise ValueError(f"{given} holds {names}: name the one to open")
-    return jobs[0] if jobs else given / "job.toml"
+    return [*jobs, given / "job.toml"][0]
 
 
 def _is_job(path: Path) -> bool:

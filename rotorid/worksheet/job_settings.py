@@ -10,6 +10,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
+_LISTS = ("available", "stock", "holes_")
+"""Settings that are lists, however few values they have."""
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+
 
 def settings_in(data: bytes) -> dict[str, Any]:
     """What a job file holds, in types of JSON; ValueError if it is no TOML."""
@@ -26,6 +30,32 @@ def setting(settings: Mapping[str, Any], key: Sequence[str]) -> Any:  # noqa: AN
     for part in key:
         inner = inner.get(part) if isinstance(inner, Mapping) else None
     return inner
+
+
+def text_of(value: object) -> str:
+    """A setting as one types it: a list "5; 10", values by name "3000: 20; 4500: 30"."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {text_of(one)}" for key, one in value.items())
+    if isinstance(value, list):
+        return "; ".join(map(text_of, value))
+    return "" if value is None else str(value).removesuffix(".0")
+
+
+def value_of(key: str, text: str) -> Any:  # noqa: ANN401
+    """The setting that was typed; None for nothing."""
+    parts = [part.strip() for part in text.split(";") if part.strip()]
+    if ":" in text:
+        return {name.strip(): _one(value) for name, _, value in (part.partition(":") for part in parts)}
+    if len(parts) > 1 or (parts and key.startswith(_LISTS)):
+        return [_one(part) for part in parts]
+    return _one(parts[0]) if parts else None
+
+
+def _one(word: str) -> float | str:
+    word, number = word.strip(), word.strip().replace(",", ".")
+    if not _NUMBER.fullmatch(number):
+        return word
+    return int(number) if number.lstrip("+-").isdigit() else float(number)
 
 
 def with_setting(data: bytes, key: Sequence[str], new: Any) -> bytes:  # noqa: ANN401

@@ -7,6 +7,7 @@ import hmac
 import logging
 import os
 import secrets
+import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
@@ -46,6 +47,8 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
     from rotorid.worksheet.job_files import JobFiles
     from rotorid.worksheet.session import Session
 
+    if hasattr(signal, "SIGPIPE"):  # a process that was ended reads no more; Windows has none
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     session = Session(JobFiles(job))
     digest = hmac.new(_secret(), str(session.files.job).encode(), hashlib.sha256)
     token = digest.hexdigest()[:32]

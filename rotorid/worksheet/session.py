@@ -4,16 +4,85 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import signal
 from collections.abc import AsyncIterator
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any
 
-from rotorid.files.problems import quote
+from rotorid.base.worker_processes import worker_pool
+from rotorid.worksheet.calculation import Results, answered
 from rotorid.worksheet.job_files import JobFiles
-from rotorid.worksheet.workers import Refused, Worker
+from rotorid.worksheet.page import page
 
 LOOK = 0.25
 """Seconds between two looks at the files."""
-_NOTHING: dict[str, Any] = {"busy": "", "runs": None, "problems": [], "refused": "", "answer": None}
+GRACE = 0.3
+"""Seconds that a computation may go on when nobody wants it: a new process takes longer to start."""
+
+
+class Refused(ValueError):
+    """What was asked cannot be computed."""
+
+
+class Worker:
+    """A process that computes in the folder of a job, one request at a time.
+
+    Attributes
+    ----------
+    read
+        Names of all files that it has read so far, and when each was changed before that (ns).
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.read: dict[str, int] = {}
+        self._folder = str(folder)
+        self._lock = asyncio.Lock()
+        self._pool: Executor | None = None
+        self._process: Future[int]
+
+    async def ask(self, do: str, *given: object) -> Any:  # noqa: ANN401 - what the request gives
+        """What a request of `calculation` gives; ended when nobody waits for it any more.
+
+        Raises
+        ------
+        Refused
+            If it cannot be computed.
+        """
+        async with self._lock:
+            if self._pool is None:
+                self._pool = worker_pool(1)
+                self._process = self._pool.submit(os.getpid)
+            request = self._pool.submit(answered, self._folder, do, *given)
+            asked = asyncio.wrap_future(request)
+            asked.add_done_callback(lambda one: one.cancelled() or one.exception())  # nobody may wait
+            try:
+                answer = await asyncio.shield(asked)
+            except asyncio.CancelledError:
+                if not (await asyncio.wait({asked}, timeout=GRACE))[0]:
+                    self.stop()
+                raise
+            except BrokenProcessPool as error:
+                self.stop()
+                raise Refused("the calculation ended unexpectedly: try again") from error
+        self.read |= answer["read"]
+        if "refused" in answer:
+            raise Refused(answer["refused"])
+        return answer["value"]
+
+    def stop(self) -> None:
+        """End the process, as soon as it has started."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            self._process.add_done_callback(_end)
+            pool.shutdown(wait=False)
+
+
+def _end(process: Future[int]) -> None:
+    with contextlib.suppress(BrokenProcessPool, ProcessLookupError):
+        os.kill(process.result(), signal.SIGTERM)
 
 
 class Session:
@@ -25,18 +94,16 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    front, drawing, aside
-        What answers at once, what draws, and what may take its time.
+    drawing
+        The process that draws; beside it are one that answers at once, and one that may take its time.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
         self.front, self.drawing, self.aside = self._workers = [Worker(files.job.parent) for _ in range(3)]
-        self._of_files = 1
         self._notice = ""
-        self._asked: dict[str, Any] = {}
-        self._results = dict(_NOTHING)
+        self.results = Results()
         self._news, self._left = asyncio.Event(), False
         self._computing: asyncio.Task[None] | None = None
 
@@ -49,42 +116,41 @@ class Session:
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        await asyncio.gather(*(worker.stop() for worker in self._workers))
+        for worker in self._workers:
+            worker.stop()
 
     async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
-        """All that a window shows, as soon as it is newer, or after so many seconds."""
+        """The page that a window shows, as soon as it is newer, or after so many seconds."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 while self.version <= version and not self._left:
                     await self._news.wait()
-        news = {"version": self.version, "notice": self._notice, "results": self._results}
-        return {**self.files.state(), **news}
+        state = {"version": self.version, "busy": self.results.busy, "notice": self._notice}
+        return {**state, "html": page(self.files, self.results, self._notice)}
 
     def leave(self) -> None:
         """Answer those who wait for news, since the program ends."""
         self._left = True
         self._news.set()
 
-    def changed(self, notice: str = "") -> int:
+    def changed(self, notice: str = "") -> None:
         """Say that the files are others, and compute them anew; what is being computed is given up."""
         self._notice = notice
-        self._of_files += 1
         if self._computing is not None:
             self._computing.cancel()
         self._publish(busy="computing")
-        self._computing = asyncio.ensure_future(self._compute())
-        return self.version
+        self._computing = asyncio.ensure_future(self._compute(self.version))
 
     async def drawn(self, do: str) -> str:
         """The picture or the sheet of the answer."""
-        if not self._asked:
+        asked = self.results.asked
+        if asked is None:
             raise ValueError("there is no answer yet")
-        final = self._asked["split"] or self._asked["refine"]  # which may take long
-        worker = self.aside if final else self.drawing
-        return str(await worker.ask(do, job=self.files.job.name, asked=self._asked))
+        worker = self.aside if asked.split or asked.refine else self.drawing  # which may take long
+        return str(await worker.ask(do, asked))
 
-    def _publish(self, **results: object) -> None:
-        self._results = {**self._results, **results}
+    def _publish(self, **results: Any) -> None:  # noqa: ANN401
+        self.results = self.results._replace(**results)
         self.version += 1
         self._news.set()
         self._news = asyncio.Event()
@@ -96,57 +162,23 @@ class Session:
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
-    async def _compute(self) -> None:
-        """Runs, then the weights at once; pieces in the holes and the trim aside, in place of these."""
-        job, state = self.files.job.name, self.files.state()
-        planes = state["settings"].get("planes", {})
-        has_holes = any(
-            "holes" in key for plane in planes.values() if isinstance(plane, dict) for key in plane
-        )
-        asked = {"version": self._of_files, "checked": True, "split": False, "refine": False}
-        if not state["exists"]:
-            self._publish(**_NOTHING)
+    async def _compute(self, version: int) -> None:
+        """The weights at once; pieces in the holes and the trim aside, in place of these."""
+        seen, words = Results(), ""
+        if self.files.now.text is not None:
+            try:
+                seen = await self.front.ask("whole_job", self.files.job.name, version)
+            except Refused as error:
+                seen = Results(refused=str(error))
+        if (more := seen.more) is not None:
+            words = "choosing pieces for the holes" if more.split else "computing the trim"
+        self._publish(**{**seen._asdict(), "busy": words, "version": self.version})
+        if more is None or seen.answer is None:
             return
+        answer, asked = seen.answer, seen.asked
         try:
-            self._publish(runs=await self.front.ask("so_far", job=job))
-        except Refused:
-            self._publish(runs=None)
-        try:
-            answer = await self.front.ask("balanced", job=job, asked=asked)
-            self._publish(problems=[], refused="")
+            answer, asked = await self.aside.ask("balanced", more), more
         except Refused as error:
-            problems = [self._problem(one) for one in error.problems]
-            self._publish(problems=problems, refused=str(error))
-            answer = None
-        if answer is None and "check" in state["tables"]:
-            asked["checked"] = False
-            with contextlib.suppress(Refused):
-                answer = await self.front.ask("balanced", job=job, asked=asked)
-        refine = answer is not None and asked["checked"] and "check" in state["tables"]
-        final = {**asked, "split": has_holes, "refine": refine}
-        self._asked = {} if answer is None else asked
-        if answer is None or final == asked:
-            self._publish(answer=answer, busy="")
-            return
-        self._publish(
-            answer=answer, busy="choosing pieces for the holes" if has_holes else "computing the trim"
-        )
-        try:
-            answer = await self.aside.ask("balanced", job=job, asked=final)
-            self._asked = final
-            self._publish(answer=answer, busy="")
-        except Refused as error:
-            why = str(error) or "; ".join(one["text"] for one in error.problems)
-            what = "trim" if refine else "pieces"
-            answer["warnings"].append(f"no {what}: {why}")
-            self._publish(answer=answer, busy="")
-
-    def _problem(self, problem: dict[str, Any]) -> dict[str, Any]:
-        """A problem of a file, with the cell of the page."""
-        table, row = self.files.place(problem["file"], problem["row"]) or (None, None)
-        column, value, text = problem["column"], problem["value"], problem["text"]
-        if row:
-            text = f"{'' if value is None else f'{quote(value)} stands here; '}expected {problem['expected']}"
-        elif (problem["row"], column) == (None, "weights"):
-            text = "no trial run yet"
-        return {"table": table, "row": row, "column": column, "text": text, "missing": not value}
+            warning = f"no {'trim' if more.refine else 'pieces'}: {error}"
+            answer = {**answer, "warnings": [*answer["warnings"], warning]}
+        self._publish(answer=answer, asked=asked, busy="", version=self.version)

@@ -86,25 +86,15 @@ class Table:
         csv.writer(stream, delimiter=self.separator, lineterminator="").writerow(map(_plain, line.cells))
         line.text, self.changed = stream.getvalue(), True
 
-    def add(self, cells: Mapping[str, str]) -> str:
-        """A new row below the last of the same run, else below all rows; its id."""
-        rows = list(self.rows())
-        same = [
-            line
-            for line in rows
-            if "run" in self.header and line.cells[self.column("run")] == cells.get("run")
-        ]
+    def add(self, cells: Mapping[str, str]) -> None:
+        """A new row below the last of the same run, else below all rows."""
+        rows, run = list(self.rows()), self.header.index("run") if "run" in self.header else 0
+        same = [line for line in rows if line.cells[run] == cells.get("run")]
         made = Line("", cells=[""] * len(self.header))
         above = [*(line for line in self.lines if line.id == "header"), *rows, *same][-1]
         self.lines.insert(self.lines.index(above) + 1, made)
         self.write(made, cells)
         self.name_rows()
-        return made.id
-
-    def remove(self, line: Line) -> None:
-        """Remove a row."""
-        self.lines.remove(line)
-        self.changed = True
 
     def name_rows(self) -> None:
         """Give rows their ids: run, speed and sensor, or run, and how many times these stood above."""

@@ -16,10 +16,7 @@ for _folder in (DOCS / "_ext", DOCS):
     sys.path.insert(0, str(_folder))
 
 import commands as command_pages  # noqa: E402 - of docs/_ext
-import drawings  # noqa: E402
-import figures  # noqa: E402
 import mathml  # noqa: E402
-import names  # noqa: E402
 
 pytestmark = pytest.mark.full
 PACKAGES = (
@@ -32,6 +29,7 @@ PACKAGES = (
     "rotorid.files",
     "rotorid.commands",
 )
+PICTURE = re.compile(r"^```\{picture\} (.*)$", re.MULTILINE)
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source|video|audio|object|embed)[^>]+(?:src|data)=\"(?:https?:)?//"
     r"|<link[^>]+href=\"(?:https?:)?//|url\([\"']?(?:https?:)?//|@import",
@@ -127,63 +125,14 @@ def test_every_command_has_an_example():
         assert all(example.startswith(f"rotorid {name}") for example in examples)
 
 
-DRAWN = re.compile(
-    r'<figure class="drawn" id="figure-([\w-]+)"><img alt="([^"]{20,})" width="(\d+)" src="data:image/'
-)
-
-
-def test_figures_are_drawn_by_the_commands_of_their_pages(built):
-    shown = {}
-    for path in built.rglob("*.html"):
-        for name, *_ in DRAWN.findall(path.read_text(encoding="utf-8")):
-            if path.stem != "gallery":
-                shown[name] = (DOCS / path.relative_to(built)).with_suffix(".md").read_text(encoding="utf-8")
+def test_pictures_are_drawn_by_a_command_that_the_page_shows(built):
+    pages = {path: path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md")}
+    shown = [(path, command) for path, text in pages.items() for command in re.findall(PICTURE, text)]
     assert len(shown) >= 7
-    for name, source in shown.items():
-        assert f"$ rotorid {figures.FIGURES[name].command.replace(chr(39), chr(34))}" in source, name
-
-
-def test_the_gallery_has_every_picture_with_its_command_and_what_it_lets_one_read(built):
-    text = page(built, "gallery")
-    said = {name: (html.unescape(caption), int(wide)) for name, caption, wide in DRAWN.findall(text)}
-    assert list(said) == [one.name for one in figures.GALLERY]
-    for one in figures.GALLERY:
-        caption, wide = said[one.name]
-        assert caption == one.read
-        assert caption.endswith(".")
-        assert wide <= 7 * 108 + 1, f"{one.name}: wider than 7 inches"
-        assert all(f"$ {line}" in text_of(text) for line in one.typed.splitlines())
-    assert 'href="gallery.html' in page(built, "index")
-
-
-def test_every_command_that_draws_is_in_the_gallery():
-    able = {
-        name
-        for name, command in command_pages.all_commands()
-        if any("--plot" in param.opts for param in command.params)
-    }
-    drawn = [one.command for one in figures.GALLERY]
-    assert {name for name in able if any(command.startswith(f"{name} ") for command in drawn)} == able
-
-
-def test_drawings_are_on_a_page_and_the_same_every_time():
-    sources = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
-    shown = " ".join(re.findall(r"^```{drawing} (.*)$", sources, re.MULTILINE)).split()
-    assert set(shown) == set(drawings.DRAWINGS)
-    assert drawings.svg("turning") == drawings.svg("turning")
-
-
-def test_signatures_are_written_as_in_the_source():
-    import fem
-    import rotorid
-
-    text, returned = names.signature_of(rotorid.reduce)
-    assert text.startswith(
-        "(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2, *, speed: float | None = None"
-    )
-    assert returned == "Reduction"
-    assert names.signature_of(fem.Response.at) == ("(sensor: SensorLike)", "ComplexArray")
-    assert "inner_diameter: FloatArray = ..." in names.signature_of(fem.Rotor)[0]
+    for path, command in shown:
+        assert f"$ rotorid {command}" in pages[path]
+    drawn = "".join(path.read_text(encoding="utf-8") for path in built.rglob("*.html"))
+    assert drawn.count('<figure class="drawn"') == len(shown)
 
 
 def test_formulas_are_mathml(built):

@@ -14,7 +14,7 @@ from rotorid.samples import sample_data
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
-QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
+QUESTIONS = [DOCS / "questions.md"]
 BOOK = sorted(
     set((DOCS.parent / "examples" / "book").glob("*.md"))
     - {
@@ -22,7 +22,7 @@ BOOK = sorted(
         for name in ("README.md", "covered.md", "numbers.md", "words.md")
     }
 )
-SINGLE = [DOCS / "rk4.md", DOCS / "rk4_calibrated.md", DOCS / "fleet.md"]
+SINGLE = [DOCS / "sure.md", DOCS / "fleet.md"]
 EVERY_TIME = ("getting_started/balancing", "getting_started/identification", "book/rotor")
 """Pages of which `make test` runs the blocks; `make docs` runs all."""
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]

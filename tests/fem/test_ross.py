@@ -1,4 +1,4 @@
-"""Side by side with ROSS on random rotors; how its answers were made: benchmarks/ross_reference.py.
+"""Side by side with ROSS on random rotors; how its answers were made: tests/data/README.md.
 
 Without shear both programs have the same cubic elements with rotary inertia and gyroscopic effect, so answers
 must agree on the mesh as it is; what is left is rounding, most of it in ROSS (measured against

@@ -31,35 +31,27 @@ def work(number, seed, folder):
 def main():
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
-    parser.add_argument("--mutants", type=int, default=5000)
-    parser.add_argument("--first", type=int, default=0, help="number of the first mutant")
-    parser.add_argument("--seed", default="1")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--minutes", type=float, default=60.0, help="in all, at most")
+    for name, default in {"mutants": 5000, "first": 0, "seed": "1", "jobs": 2, "minutes": 60.0}.items():
+        parser.add_argument(f"--{name}", type=type(default), default=default)
     chosen = parser.parse_args()
-    numbers = range(chosen.first, chosen.first + chosen.mutants)
-    begun, found = time.monotonic(), []
+    end, counts = time.monotonic() + 60 * chosen.minutes, Counter()
     with (
         tempfile.TemporaryDirectory(prefix="fuzz") as folder,
         multiprocessing.get_context("fork").Pool(chosen.jobs) as pool,
     ):
         examined = functools.partial(work, seed=chosen.seed, folder=folder)
-        outcomes = pool.imap_unordered(examined, numbers)
-        while len(found) < len(numbers) and time.monotonic() - begun < 60 * chosen.minutes:
+        outcomes = pool.imap_unordered(examined, range(chosen.first, chosen.first + chosen.mutants))
+        while counts.total() < chosen.mutants and time.monotonic() < end:
             try:
-                found.append(outcomes.next(PATIENCE))
+                outcome = outcomes.next(PATIENCE)
             except multiprocessing.TimeoutError:
                 print(f"nothing for {PATIENCE} s: a process has died, or waits for something")
                 break
-            if found[-1].result == FINDING:
-                print(found[-1], flush=True)
-    print("\nAccepted files with another answer, each as its content written plainly gives it:")
-    for outcome in sorted((o for o in found if o.result == CHANGED), key=lambda o: o.number):
-        print(outcome)
-    counts = Counter(outcome.result for outcome in found)
-    said = ", ".join(f"{n} {what}" for what, n in sorted(counts.items()))
-    print(f"\n{len(found)} mutants of seed {chosen.seed} in {time.monotonic() - begun:.0f} s: {said}")
-    sys.exit(1 if counts[FINDING] or len(found) < chosen.mutants else 0)
+            counts[outcome.result] += 1
+            if outcome.result in (FINDING, CHANGED):  # another answer, as the content written plainly has it
+                print(outcome, flush=True)
+    print(f"\n{counts.total()} mutants of seed {chosen.seed}:", dict(counts))
+    sys.exit(1 if counts[FINDING] or counts.total() < chosen.mutants else 0)
 
 
 if __name__ == "__main__":

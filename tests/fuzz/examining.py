@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import random
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from functools import cache
 import openpyxl
 import tomli_w
 
-from fuzz import meaning, mutations
+from fuzz import meaning
+from fuzz import mutations as m
 from fuzz.judging import answer, same
 from fuzz.spreadsheets import dress, mutate_workbook
 from fuzz.subjects import SUBJECTS
@@ -63,9 +65,7 @@ def mutate(rng, kind, data):
     """(what was done, the mutated file, its text where that is known and not plain UTF-8)."""
     if kind == "workbook":
         return *mutate_workbook(rng, data), None
-    m, more = mutations, (mutations.SETTINGS,)
-    if kind == "table":
-        more = (m.COLUMNS, (dress,), m.ENCODINGS)
+    more = (m.COLUMNS, m.ENCODINGS, (dress,)) if kind == "table" else (m.SETTINGS,)
     done = rng.choice(rng.choice((m.BYTES, m.LINES, m.NUMBERS, m.NUMBERS, *more)))
     changed = done(rng, data)
     if done is dress:
@@ -143,19 +143,15 @@ def _sorted(content):
 
 
 def _texts(data):
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        encodings = ("utf-16",)
-    else:
-        encodings = ("utf-8-sig",)
-        try:
-            data.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            encodings = ("cp1252", "cp1251")
-    for encoding in encodings:
-        try:
-            yield data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
+    marked = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    for encodings in (("utf-16",),) if marked else (("utf-8-sig",), ("cp1252", "cp1251")):
+        texts = []
+        for encoding in encodings:
+            with contextlib.suppress(UnicodeDecodeError):
+                texts.append(data.decode(encoding))
+        if texts:
+            return texts
+    return []
 
 
 def _book(content):

@@ -6,6 +6,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from fuzz.meaning import PLAIN
 from rotorid.samples import sample_data
 
 
@@ -56,33 +57,18 @@ def _influence(folder):
 def _workbook(folder):
     import openpyxl
 
+    sheets = {
+        "planes": "plane,max_mass_g\n1,6.5\n2,7.5\n",
+        "settings": "key,value\nphase,lag\nangles,with rotation\nerrors.phase_deg,2\n",
+    }
+    sheets |= {name: (folder / f"{name}.csv").read_text(encoding="utf-8") for name in ("runs", "weights")}
     book = openpyxl.Workbook()
     book.remove(book.active)
-    for name in ("runs", "weights"):
+    for name in ("runs", "weights", "planes", "settings"):
         sheet = book.create_sheet(name)
-        for line in (folder / f"{name}.csv").read_text(encoding="utf-8").splitlines():
-            sheet.append([_cell(text) for text in line.split(",")])
-    sheets = {
-        "planes": [["plane", "max_mass_g"], ["1", 6.5], ["2", 7.5]],
-        "settings": [
-            ["key", "value"],
-            ["phase", "lag"],
-            ["angles", "with rotation"],
-            ["errors.phase_deg", 2],
-        ],
-    }
-    for name, lines in sheets.items():
-        sheet = book.create_sheet(name)
-        for line in lines:
-            sheet.append(line)
+        for line in sheets[name].splitlines():
+            sheet.append([float(text) if PLAIN.fullmatch(text) else text for text in line.split(",")])
     book.save(folder / "job.xlsx")
-
-
-def _cell(text):
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 MADE = {"influence.csv": _influence, "job.xlsx": _workbook}

@@ -1,4 +1,4 @@
-"""Random balancing problems from seeds: NumPy only, for the tests and for benchmarks/minmax_reference.py."""
+"""Random balancing problems from seeds: NumPy only."""
 
 from dataclasses import dataclass
 

@@ -5,6 +5,7 @@ start is nothing share one for each job, whose files are put back.
 """
 
 import contextlib
+import html
 import http.client
 import io
 import json
@@ -70,15 +71,22 @@ class Served:
         return answer.status, json.loads(content) if kind.startswith("application/json") else content
 
     def state(self, after=0):
-        """What a window shows."""
+        """What a window shows: its `html`, and of that `cells` with their attributes, `numbers`, `words`."""
         status, state = self.ask(f"/state?after={after}")
         assert status == 200, state
+        page = html.unescape(state["html"])
+        cells = re.findall(r"<input id=\"([^\"]*)\" value=\"([^\"]*)\" data-edit='([^']*)'", state["html"])
+        state["cells"] = {
+            html.unescape(name): (html.unescape(text), json.loads(edit)) for name, text, edit in cells
+        }
+        state["numbers"] = dict(re.findall(r'data-key="([^"]*)"[^>]*>([^<]*)<', page))
+        state["words"] = " ".join(re.sub("<[^>]*>", " ", page).split())
         return state
 
     def settled(self):
         """The state when nothing is being computed any more."""
         state = self.state()
-        while state["results"]["busy"]:
+        while state["busy"]:
             state = self.state(state["version"])
         return state
 
@@ -92,6 +100,11 @@ class Served:
     def edit(self, *edits):
         """Status and answer of one edit."""
         return self.ask("/edit", {"edits": list(edits)})
+
+    def type(self, cell, text, **more):
+        """Status and answer of a text in a cell, as the page sends it."""
+        old, edit = self.state()["cells"][cell]
+        return self.edit({**edit, "old": old, "new": text, **more})
 
     def kill(self):
         """As by kill -9."""
@@ -144,8 +157,7 @@ class SharedJobs:
 
 def _shown(state):
     """What the files of a job say in its state."""
-    tables = {key: [row["cells"] for row in table["rows"]] for key, table in state["tables"].items()}
-    return state["settings"], tables
+    return state["cells"], "The job says: phase lead, angles with" in state["words"]
 
 
 def _put_back(folder, sample):

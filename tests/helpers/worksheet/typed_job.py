@@ -16,30 +16,30 @@ def type_job(window, sample, radius=None):
     runs, weights = rows(sample / "runs.csv"), rows(sample / "weights.csv")
     names = list(dict.fromkeys(row["run"] for row in runs))
     own = {name: [row for row in runs if row["run"] == name] for name in names}
-    window.type("#setup-sensors", ", ".join(row["sensor"] for row in own[names[0]]))
-    window.type("#setup-speeds", runs[0]["speed_rpm"])
-    window.push("#setup-make")
-    window.push("#convention-lead-with", SPACE)
+    window.type('[name="sensors"]', ", ".join(row["sensor"] for row in own[names[0]]))
+    window.type('[name="speeds"]', runs[0]["speed_rpm"])
+    window.push("#setup button")
+    window.push('[id="convention lead with rotation"]', SPACE)
     for name in names:
-        card = f'#runs [data-run="{name}"]' if name != names[0] else "#baseline"
+        card = f'[id="run {name}"]' if name != names[0] else "#baseline"
         mounted = [row for row in weights if row["run"] == name]
         if mounted:
-            window.type("#new-name", name)
-            window.type("#new-plane", mounted[0]["plane"])
+            window.type('#new-run [name="name"]', name)
+            window.type('#new-run [name="plane"]', mounted[0]["plane"])
             window.push("#add-run")
         for k, weight in enumerate(mounted, 1):
-            cell = f'{card} tr:nth-child({k}) [data-cell^="weights|"]'
+            cell = f'{card} tr:nth-child({k}) [id^="weights|"]'
             if k > 1:
-                window.push(f'[data-add="{name}"]')
-                window.type(f'{cell}[data-cell$="|plane"]', weight["plane"])
-            window.type(f'{cell}[data-cell$="|mass_g"]', weight["mass_g"])
+                window.push(f"{card} > button")
+                window.type(f'{cell}[id$="|plane"]', weight["plane"])
+            window.type(f'{cell}[id$="|mass_g"]', weight["mass_g"])
             window.next(weight["angle_deg"])
         first, *others = (text for row in own[name] for text in (row["amplitude"], row["phase_deg"]))
-        window.type(f'{card} [data-cell^="runs|"]', first)
+        window.type(f'{card} [id^="runs|"]', first)
         for text in others:
             window.next(text)
         window.leave()
     for plane in dict.fromkeys(row["plane"] for row in weights) if radius else ():
-        window.type(f'[data-key="planes.{plane}.radius_mm"]', str(radius))
+        window.type(f'[id="planes.{plane}.radius_mm"]', str(radius))
         window.leave()
     window.saved()

@@ -18,11 +18,13 @@ return Array.from(document.querySelectorAll(arguments[0])).map(
   e => e.dataset.value ?? (e.matches('input, select') ? e.value : e.textContent));
 """
 _NUMBERS = """
-return Array.from(document.querySelectorAll(arguments[0])).map(e => [e.dataset.key, e.dataset.value]);
+return Array.from(document.querySelectorAll(arguments[0])).map(e => [e.dataset.key, e.textContent]);
 """
-_COPY = """
-const [text, done] = arguments;
-navigator.clipboard.writeText(text).then(() => done(''), e => done(String(e)));
+_PASTE = """
+const clipboardData = new DataTransfer();
+clipboardData.setData('text', arguments[0]);
+const kind = {clipboardData, bubbles: true, cancelable: true};
+document.activeElement.dispatchEvent(new ClipboardEvent('paste', kind));
 """
 MOST_TRIES = 20
 
@@ -115,15 +117,13 @@ class Window:
         return self.texts(selector)[0]
 
     def texts(self, selector):
-        """What all of them show: the number of a value, the text of a cell."""
+        """What all of them show: the text, or what a cell holds."""
         return self.driver.execute_script(_TEXTS, selector)
 
-    def document(self, name="answer"):
-        """Numbers of a document that the page shows, by their paths."""
-        return dict(self.driver.execute_script(_NUMBERS, f'[data-doc="{name}"] .value'))
+    def numbers(self):
+        """Numbers of the answer, as shown, by their places in the document."""
+        return dict(self.driver.execute_script(_NUMBERS, "#answer [data-key]"))
 
-    def clipboard(self, text):
-        """Put a text where Ctrl+V takes it from."""
-        rights = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
-        self.driver.execute_cdp_cmd("Browser.grantPermissions", rights)
-        assert self.driver.execute_async_script(_COPY, text) == ""
+    def paste(self, text):
+        """What Ctrl+V does with a text from a spreadsheet."""
+        self.driver.execute_script(_PASTE, text)

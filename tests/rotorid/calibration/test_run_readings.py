@@ -66,6 +66,16 @@ def test_derivatives_are_differences_of_the_dense_rotor():
         assert abs(own - expected).max() < 1e-6 * abs(expected).max(), path
 
 
+@pytest.mark.parametrize("path", ["bearing.tilting_stiffness", "bearing[1].cxx"])
+def test_a_number_that_a_search_brings_near_zero_has_the_derivatives_of_zero(path):
+    supports = [replace(each, tilting_stiffness=40.0) for each in machine().supports]
+    rotor, runs = replace(machine(), supports=supports), Runs(free=False)
+    data = runs.data(runs.readings(rotor))
+    there, near = (data.coefficients(rotor, {path: value}, [path])[1] for value in (0.0, 1e-13))
+    assert np.abs(there).max() > 0
+    np.testing.assert_allclose(near, there, rtol=1e-6)
+
+
 def joint_covariance(data, W, run):
     """Of all rows (S, x, C, real and imaginary), by loops over what each error does to each reading."""
     own, common, loads, further = run.typical
@@ -132,16 +142,6 @@ def test_whitening_is_that_of_one_joint_covariance(free, scatter):
     assert residual.size == x.size
     assert residual @ residual == pytest.approx(x @ np.linalg.solve(C, x), rel=1e-6)
     assert rows.stated
-
-
-def test_errors_that_are_assumed_are_not_called_stated():
-    runs = Runs()
-    exact = runs.readings(machine())
-    W = coefficients_of(runs, machine())
-    assert not runs.data(exact).rows(W).stated
-    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal((4, *exact.shape))
-    assert not runs.data(exact * noise).rows(W).stated  # the repeats say nothing of errors between runs
-    assert runs.data(exact * noise, errors=ERRORS).rows(W).stated
 
 
 @pytest.mark.parametrize(("tables", "tilting"), [(False, 0.0), (True, 1e5)])

@@ -58,5 +58,5 @@ def test_tables_stand_in_place_of_a_small_model_s_own(tmp_path):
     np.testing.assert_array_equal(whole.unbalance[[*whole.index(3)]], system.unbalance[[x, y]])
     assert system.bow[x].real == pytest.approx(4e7 * 20e-6)
     (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n4,2,0\n")
-    with pytest.raises(InputError, match=r"row 2, column plane: .* one of the nodes 1, 3 or 5"):
+    with pytest.raises(InputError, match=r"row 2, column plane: .* the small model has 1, 3 and 5"):
         moving(SMALL, tmp_path / "u.csv")

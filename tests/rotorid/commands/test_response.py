@@ -90,13 +90,13 @@ def test_table_and_orbits_of_a_response_are_those_of_the_model(cli, files, model
 BAD_UNBALANCE = [
     ([["plane", "unbalance_g_mm"], ["4", 1]], "angle_deg"),
     ([["plane", "unbalance_g_mm", "angle_deg"], ["wheal", 1, 0]], "did you mean 'wheel'?"),
-    ([["plane", "unbalance_g_mm", "angle_deg"], ["9", 1, 0]], "a node from 1 to 7 or a station"),
-    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 0, 0]], "a number above 0"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["9", 1, 0]], "the rotor has nodes 1 to 7"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", -1, 0]], "a number of 0 or more"),
     ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 1, 400]], "an angle from -360 to 360 degrees"),
     ([["plane", "mass_g", "angle_deg"], ["4", 1, 0]], "either a column unbalance_<unit>, or both"),
     ([["plane", "mass_g", "radius_mm", "unbalance_g_mm", "angle_deg"], ["4", 1, 1, 1, 0]], "either a column"),
-    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node, not both: a node or a station"),
-    ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "plane or node, not both"),
+    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "a column plane"),
+    ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "a known column"),
     ([["plane", "unbalance_gmm", "angle_deg"], ["4", 1, 0]], "unbalance_gmm"),
 ]  # fmt: skip
 

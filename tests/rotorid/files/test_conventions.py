@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import Labels, correct, estimate_influence
 from balancing.conventions import opposite
 from rotorid.files import job_from_files, read_influence, read_job, write_influence
-from rotorid.files.conventions import STATED_ANGLES, resolve_angles
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'
@@ -91,34 +91,22 @@ BAD = [
     ('rotation = "with"\n', "rotation", "with", "'clockwise' or 'counter-clockwise'"),
     ('angles = "clockwise"\nrotation = 3\n', "rotation", "3", "'clockwise' or 'counter-clockwise'"),
     ('rotation = "clockwise"\nview = "left"\n', "view", "left", "'drive end' or 'free end'"),
+    ("key_phasor = {}\n", "key_phasor.angle_deg", None, "the direction of the key phasor"),
+    ("key_phasor = { angle_deg = 361 }\n", "key_phasor.angle_deg", "361", "a number up to 360"),
+    ("key_phasor = { angle_deg = 'x' }\n", "key_phasor.angle_deg", "x", "a number"),
+    ("key_phasor = { angle_deg = 3, speed = 2 }\n", "key_phasor.speed", "2", "a known key"),
 ]
 
 
-@pytest.mark.parametrize(("text", "key", "value", "words"), BAD)
+@each_of("text, key, value, words", BAD)
 def test_what_cannot_be_understood(job, text, key, value, words):
     the_only(complaints(job, text), "job.toml", None, key, value, words)
 
 
-BAD_MARKS = [
-    ("[key_phasor]\n", "key_phasor.angle_deg", None, "the direction of the key phasor"),
-    ("[key_phasor]\nangle_deg = 361\n", "key_phasor.angle_deg", "361", "a number up to 360"),
-    ('[key_phasor]\nangle_deg = "x"\n', "key_phasor.angle_deg", "x", "a number"),
-    ("[key_phasor]\nangle_deg = 3\nspeed = 2\n", "key_phasor.speed", "2", "a known key"),
-]
-
-
-@pytest.mark.parametrize(("text", "key", "value", "words"), BAD_MARKS)
-def test_bad_key_phasors(folder, text, key, value, words):
-    (folder / "job.toml").write_text(TABLES + text, encoding="utf-8")
-    the_only(complaints(read_job, folder / "job.toml"), "job.toml", None, key, value, words)
-
-
-def test_the_key_phasor_counts_as_the_angles_do(folder):
-    for words, expected in (("", 40.0), ('angles = "against rotation"\n', -40.0)):
-        (folder / "job.toml").write_text(words + TABLES + "[key_phasor]\nangle_deg = 40\n", encoding="utf-8")
-        assert read_job(folder / "job.toml").key_phasor == expected
-    (folder / "job.toml").write_text(TABLES, encoding="utf-8")
-    assert read_job(folder / "job.toml").key_phasor == 0.0
+def test_the_key_phasor_counts_as_the_angles_do(job):
+    assert job("key_phasor = { angle_deg = 40 }\n").key_phasor == 40.0
+    assert job('angles = "against rotation"\nkey_phasor = { angle_deg = 40 }\n').key_phasor == -40.0
+    assert job("").key_phasor == 0.0
 
 
 def test_stored_coefficients_know_nothing_of_clocks(job, folder):
@@ -128,11 +116,11 @@ def test_stored_coefficients_know_nothing_of_clocks(job, folder):
     now = CLOCKWISE + 'angles = "counter-clockwise"\nruns = "runs.csv"\ninfluence = "influence.json"\n'
     (folder / "now.toml").write_text(now, encoding="utf-8")
     write_csv(folder / "runs.csv", RUNS[:3])
-    found = read_job(folder / "now.toml")
-    assert found.trials.labels == found.influence.labels
-    assert found.trials.labels.angle_words == "counter-clockwise"
+    now_read = read_job(folder / "now.toml")
+    assert now_read.trials.labels == now_read.influence.labels
+    assert now_read.trials.labels.angle_words == "counter-clockwise"
     np.testing.assert_allclose(
-        correct(found.influence, found.trials).weights, correct(influence).weights, rtol=1e-9
+        correct(now_read.influence, now_read.trials).weights, correct(influence).weights, rtol=1e-9
     )
 
 
@@ -143,22 +131,13 @@ def test_files_without_a_job_cannot_say_how_the_rotor_turns(folder):
     assert job_from_files(files, angles="against rotation").conventions.labels.angle_sign == -1
 
 
-def test_words():
-    for rotation in ("clockwise", "counter-clockwise"):
-        assert resolve_angles(rotation, rotation) == "with rotation"
-        assert {resolve_angles(word, rotation) for word in STATED_ANGLES[:2]} == set(STATED_ANGLES[:2])
-    assert resolve_angles("clockwise", "counter-clockwise") == "against rotation"
-    with pytest.raises(ValueError, match="'clockwise' or 'counter-clockwise', not 'left'"):
-        resolve_angles("left", None)
-    for bad in (
-        {"phase": "late"},
-        {"angles": "clockwise"},
-        {"rotation": "left"},
-        {"view": "free end"},
-        {"clock": True},
-    ):
-        with pytest.raises(ValueError):
-            Labels(**bad)
+@pytest.mark.parametrize(
+    "bad",
+    [{"phase": "late"}, {"angles": "clockwise"}, {"rotation": "left"}, {"view": "free end"}, {"clock": True}],
+)
+def test_words_that_labels_do_not_know(bad):
+    with pytest.raises(ValueError):
+        Labels(**bad)
 
 
 @pytest.mark.parametrize("rotation", ["clockwise", "counter-clockwise"])

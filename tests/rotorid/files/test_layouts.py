@@ -1,332 +1,202 @@
-"""Exports of instruments: the same content as a runs table, or one message that says what to change."""
+"""Runs tables as fitters and instruments write them: the same trials, or one message."""
 
 from __future__ import annotations
 
-import csv
-import io
 import re
-from dataclasses import fields
 
 import numpy as np
+import openpyxl
 import pytest
 from cases import each_of
-from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
+from pump_job import EIGHT_HOLES, JOB, LONG, PUMP, WIDE, assert_same, job_of, refused, rows, trials_of, write
+from tables_data import write_book
 
-from rotorid.files import InputError, read_job, read_trials
+import balancing
+from rotorid.files import read_trials
+from rotorid.samples import sample_data
 
-UNITS_ROW = """\
-run,speed,sensor,amplitude,phase
-,rpm,,um pp,deg
-initial,1000,A,7.2,238
-initial,1000,B,13.5,296
-trial 1,1000,A,4.9,114
-trial 1,1000,B,9.2,347
-trial 2,1000,A,4.0,79
-trial 2,1000,B,12.0,292
-"""
-PREAMBLE = """\
-Vibration analyser 7;serial 12,5 / "B"
-Date;1.5.2024;10:30;
-Speed: 1000 rpm;Phase: see below
-
-Run;Speed (rpm);Sensor;Amplitude (µm pk-pk);Phase (°)
-initial;1000;A;7,2;238
-initial;1000;B;13,5;296
-trial 1;1000;A;4,9;114
-trial 1;1000;B;9,2;347
-trial 2;1000;A;4,0;79
-trial 2;1000;B;12,0;292
-"""
-CELLS_WITH_UNITS = """\
-Run\tSpeed\tSensor\tAmplitude\tPhase
-initial\t1000 rpm\tA\t7.2 um pp\t238°
-initial\t1000 rpm\tB\t13.5 µm p-p\t296 deg
-trial 1\t1000 rpm\tA\t4.9UM PP\t114°
-trial 1\t1000 rpm\tB\t9.2 um peak to peak\t347 °
-trial 2\t1000 RPM\tA\t4.0 um pp\t79 degrees
-trial 2\t1000 rpm\tB\t12.0 um pp\t292°
-"""
-VECTORS = """\
-RUN;RPM;PROBE;1X [um pp]
-initial;1000;A;7,2 @ 238°
-initial;1000;B;13,5<296°
-trial 1;1000;A;4,9∠114°
-trial 1;1000;B;9,2 / 347°
-trial 2;1000;A;4,0@79 deg
-trial 2;1000;B;12,0 < 292°
-"""
-VECTORS_WITH_UNITS = """\
-Run no.,Shaft speed [r/min],Point,Vector
-initial,1000,A,7.2 um pp @ 238
-initial,1000,B,13.5 um pp @ 296
-trial 1,1000,A,4.9 um pp @ 114
-trial 1,1000,B,9.2 um pp @ 347
-trial 2,1000,A,4.0 um pp @ 79
-trial 2,1000,B,12.0 um pp @ 292
-"""
-SLASHES = """\
-run,speed_rpm,sensor,Amplitude / Phase (um pp / deg)
-initial,1000,A,7.2 / 238
-initial,1000,B,13.5 / 296
-trial 1,1000,A,4.9 / 114
-trial 1,1000,B,9.2 / 347
-trial 2,1000,A,4.0 / 79
-trial 2,1000,B,12.0 / 292
-"""
-HEADINGS = """\
-Phase angle [°],1X Ampl. pk-pk [um],Channel,Speed rpm,Run
-238,7.2,A,1000,initial
-296,13.5,B,1000,initial
-114,4.9,A,1000,trial 1
-347,9.2,B,1000,trial 1
-79,4.0,A,1000,trial 2
-292,12.0,B,1000,trial 2
-"""
-WIDE = """\
-run,speed_rpm,A_amplitude_um_pp,A_phase_deg,B_amplitude_um_pp,B_phase_deg,note
-initial,1000,7.2,238,13.5,296,cold
-trial 1,1000,4.9,114,9.2,347,
-trial 2,1000,4.0,79,12.0,292,
-"""
-WIDE_COMMAS = """\
-sep=;
-Run;Speed (rpm);A 1X Ampl (um pp);A 1X Phase (deg);B 1X Ampl (um pp);B 1X Phase (deg);
-initial;1000;7,2;238;13,5;296;
-trial 1;1000;4,9;114;9,2;347;
-trial 2;1000;4,0;79;12,0;292;
-"""
-WIDE_VECTORS = """\
-Run;RPM;A;B
-;;um pp;um pp
-initial;1000;7,2 @ 238°;13,5 @ 296°
-trial 1;1000;4,9 @ 114°;9,2 @ 347°
-trial 2;1000;4,0 @ 79°;12,0 @ 292°
-"""
-WIDE_BY_WORD = """\
-Balancing protocol
-Pump 3
-run,Speed,Ampl A,Phase A,Ampl B,Phase B
--,rpm,um p-p,deg,um p-p,deg
-initial,1000,7.2,238,13.5,296
-trial 1,1000,4.9,114,9.2,347
-trial 2,1000,4.0,79,12.0,292
-"""
-SENSORS_1_2 = """\
-run,speed (rpm),1 ampl (um pp),1 phase (deg),2 ampl (um pp),2 phase (deg)
-initial,1000,7.2,238,13.5,296
-trial 1,1000,4.9,114,9.2,347
-trial 2,1000,4.0,79,12.0,292
-"""
-PROBES_X_Y = SENSORS_1_2.replace("1 ampl", "1X ampl").replace("1 phase", "1X phase")
-PROBES_X_Y = PROBES_X_Y.replace("2 ampl", "1Y ampl").replace("2 phase", "1Y phase")
-COMMENTS = """\
-# made by hand; 5,5
-Pump 3, as found
-
-"# quoted; comment";;
-Run;Speed (rpm);Sensor;Amplitude;Phase
-# and here
-;;;um pp;°
-
-initial;1000;A;7,2;238
-initial;1000;B;13,5;296
-trial 1;1000;A;4,9;114
-# between
-trial 1;1000;B;9,2;347
-trial 2;1000;A;4,0;79
-trial 2;1000;B;12,0;292
-"""
-LABELS = """\
-Run,Speed (Hz),Sensor,Amplitude,Phase (rad)
-initial,20,A,7.2,2.38
-initial,20,B,13.5,2.96
-trial 1,20,A,4.9,1.14
-trial 1,20,B,9.2,3.47
-trial 2,20,A,4.0,0.79
-trial 2,20,B,12.0,2.92
-"""
-DIRECTION = PREAMBLE.replace("Phase (°)", "Phase lag (°)").replace("238", "238 lag")
-READ = {
-    "units row": UNITS_ROW,
+SIX, VECTORS = "{},1485,{},{},{},{}", "{},1485,{} @ {}°,{} @ {}°"
+PREAMBLE = rows(
+    'Analyser 7;serial 12,5 / "B"\nDate;1.5.2024;10:30;\nSpeed: 1000 rpm;Phase: see below\n\n'
+    "Run;Speed (rpm);Sensor;Amplitude (mm/s peak);Phase (°)",
+    "{};1485;{};{};{}",
+    LONG,
+).replace(".", ",")
+COMMENTS = rows('# by hand; 5,5\nPump 3\n\n"# quoted; too";;\nRun;Speed (rpm);Sensor;Amplitude;Phase\n'
+                "# and here\n;;;mm/s;°\n", "# between\n{};1485;{};{};{}", LONG)  # fmt: skip
+CELLS = rows("Run\tSpeed\tSensor\tAmplitude\tPhase", "{}\t1485 rpm\t{}\t{} mm/s\t{}°", LONG)
+NO_UNITS = rows("Phase,1X Ampl. pk [mm/s],Channel,Speed rpm,Run", "{3},{2},{1},1485,{0}", LONG)
+UNITS_ROW = rows("run,speed,sensor,amplitude,phase\n,rpm,,mm/s,deg", "{},1485,{},{},{}", LONG)
+LAG = rows("Run,RPM,Sensor,mm/s,Phase lag (°)", "{},1485,{},{},{} lag", LONG)
+PROBE = rows("RUN;RPM;PROBE;1X [mm/s]", "{};1485;{};{} @ {}°", LONG)
+ONE_UNIT = rows("Run,rpm,DE mm/s,DE deg,NDE mm/s,NDE deg", SIX)
+WIDE_VECTORS = rows("Run,rpm,DE,NDE\n,,mm/s,mm/s", VECTORS)
+TIDY = rows("run,speed_rpm,DE_amplitude_mm_s,DE_phase_deg,NDE_amplitude_mm_s,NDE_phase_deg,note", f"{SIX},x")
+SAME = {
     "preamble": PREAMBLE,
-    "cells with units": CELLS_WITH_UNITS,
-    "vectors": VECTORS,
-    "vectors with units": VECTORS_WITH_UNITS,
-    "slashes": SLASHES,
-    "headings": HEADINGS,
-    "wide": WIDE,
-    "wide, commas": WIDE_COMMAS,
-    "wide, vectors": WIDE_VECTORS,
-    "wide, by word": WIDE_BY_WORD,
-    "sensors 1 and 2": SENSORS_1_2,
-    "probes X and Y": PROBES_X_Y,
-    "comments": COMMENTS,
-    "labels": LABELS,
-    "direction": DIRECTION,
+    "comments": COMMENTS.replace(".", ","),
+    "units in cells": CELLS,
+    "headings": NO_UNITS.replace("Phase", "Phase angle [°]"),
+    "units row": UNITS_ROW,
+    "lag": LAG,
+    "vectors": PROBE,
+    "vectors with units": rows(
+        "Run no.,Shaft speed [r/min],Point,Vector", "{},1485,{},{} mm/s pk @ {}", LONG
+    ),
+    "slashes": rows("run,speed_rpm,sensor,Amplitude / Phase (mm/s / deg)", "{},1485,{},{} / {}", LONG),
+    "tidy": TIDY,
+    "wide, commas": rows(
+        "sep=;\nRun;Speed (rpm);DE 1X Ampl (mm/s);DE 1X Phase (deg);NDE 1X Ampl (mm/s);NDE 1X Phase (deg);",
+        "{};1485;{};{};{};{};",
+    ).replace(".", ","),
+    "wide, by word": rows(
+        "Protocol\nPump 3\nrun,Speed,Ampl DE,Phase DE,Ampl NDE,Phase NDE\n-,rpm,mm/s,deg,mm/s,deg", SIX
+    ),
+    "unit at the end": ONE_UNIT,
+    "wide vectors": WIDE_VECTORS,
+    "no sign of degrees": rows("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{}<{},{}∠{}"),
+    "with a word": rows("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} at {}°,{} at {} deg"),
+    "L": rows("Run,RPM,DE,NDE", "{},1485,{} mm/s L{},{} mm/s L{}"),
+    "sign and unit behind": rows("Run,RPM,DE mm/s@deg,NDE (mm/s / deg)", "{},1485,{}@{},{}/{}"),
+    "coefficients beside": rows(
+        "Date,Time,Run,Condition,RPM,DE overall,DE mm/s,DE deg,NDE mm/s,NDE deg,Amp. Coeff. plane 1",
+        "2026-01-02,10:11,{},hot,1485,9.9,{},{},{},{},0.1",
+    ),
+} | {
+    header: rows(header, SIX)
+    for header in (
+        "Run,Speed,DE Amp,DE Phase,NDE Amp,NDE Phase\n,rpm,mm/s,deg,mm/s,deg",
+        "Run,rpm,DE Vib (mm/s),DE Angle (deg),NDE Vib (mm/s),NDE Angle (deg)",
+        "Run,rpm,DE mm/s,DE Phase,NDE mm/s,NDE Phase",
+        "RUN #,SPEED RPM,DE AMP (MM/S),DE PHASE (DEG),NDE AMP (MM/S),NDE PHASE (DEG)",
+        "Step,CPM,DE mm/sec,DE deg,NDE mm/sec,NDE deg",
+        "Test,n [1/min],DE_mm_s,DE_deg,NDE_mm_s,NDE_deg",
+        "Run,Speed rpm,DE Vib mm/s,DE Ph deg,NDE Vib mm/s,NDE Ph deg",
+        "Run,rpm,DE,,NDE,\n,,mm/s,deg,mm/s,deg",
+        "Run,RPM,DE,DE,NDE,NDE\n,,mm/s,deg,mm/s,deg",
+        ",,DE,DE,NDE,NDE\nCondition,RPM,mm/s,deg,mm/s,deg",
+        ",,DE,,NDE,\nRun,rpm,Amp (mm/s),Phase (deg),Amp (mm/s),Phase (deg)",
+        ",,DE,,NDE,\nRun,RPM,Amplitude,Phase,Amplitude,Phase\n,,mm/s,deg,mm/s,deg",
+        ",,Pump 3,,,\nRun,rpm,DE mm/s,DE deg,NDE mm/s,NDE deg",
+    )
 }
-SENSORS = {"sensors 1 and 2": ("1", "2"), "probes X and Y": ("1X", "1Y")}
-DIGITS = [["7.2", "238"], ["13.5", "296"], ["4.9", "114"], ["9.2", "347"], ["4.0", "79"], ["12.0", "292"]]
 
 
-def tidy_text(name):
-    """The same content as a runs table, in the same digits."""
-    names = dict(zip("AB", SENSORS.get(name, "AB"), strict=True))
-    rows = [[line[0], "1000", names[line[2]], *digits] for line, digits in zip(RUNS[1:], DIGITS, strict=True)]
-    if name == "labels":
-        rows = [[run, "20", sensor, size, f"{int(phase) / 100:g}"] for run, _, sensor, size, phase in rows]
-        return csv_text([["run", "speed_Hz", "sensor", "amplitude", "phase_rad"], *rows])
-    return csv_text([RUNS[0], *rows])
+@each_of("name", SAME)
+def test_each_layout_is_the_same_runs(tmp_path, name):
+    assert_same(trials_of(tmp_path, SAME[name]), trials_of(tmp_path))
 
 
-def job_text(*, phase="lag", more=""):
-    return f'runs = "runs.csv"\nweights = "weights.csv"\nphase = "{phase}"\n{more}'
-
-
-def read(folder, text, more="", **options):
-    """Read a job of these runs."""
-    (folder / "runs.csv").write_text(text, encoding="utf-8")
-    write_csv(folder / "weights.csv", WEIGHTS)
-    (folder / "job.toml").write_text(job_text(more=more, **options), encoding="utf-8")
-    return read_job(folder / "job.toml")
-
-
-def refused(folder, text, more="", **options):
-    """The one message about a job of these runs, without the folder."""
-    with pytest.raises(InputError) as caught:
-        read(folder, text, more, **options)
-    return str(caught.value).replace(f"{folder}/", "")
-
-
-def assert_same(a, b):
-    """All that trials hold: names, readings, weights, digits, units, and without further words."""
-    for field in fields(a):
-        one, other = getattr(a, field.name), getattr(b, field.name)
-        if isinstance(one, np.ndarray):
-            np.testing.assert_array_equal(one, other, err_msg=field.name)
-        else:
-            assert one == other, field.name
-
-
-def sheet_of(text):
-    """Cells of a sheet: numbers as numbers, where they have a decimal point or none; the rest as text."""
-    lines = text.splitlines()
-    separator = ";" if ";" in text else "\t" if "\t" in text else ","
-    cells = [next(csv.reader(io.StringIO(line), delimiter=separator), []) for line in lines]
-    number = re.compile(r"[0-9]+(\.[0-9]+)?")
-    return [
-        [float(cell) if number.fullmatch(cell) else cell or None for cell in line]
-        for line in cells
-        if not line[:1] or not line[0].startswith("sep=")
-    ]
-
-
-@each_of("name", READ)
-def test_an_export_is_read_as_the_same_runs_table(tmp_path, name):
-    assert_same(read(tmp_path, READ[name]).trials, read(tmp_path, tidy_text(name)).trials)
-
-
-@each_of("name", READ)
+@each_of("name", SAME)
 def test_the_same_as_a_sheet(tmp_path, name):
-    """The digits are those that a sheet keeps, 4 of 4.0."""
-    write_book(tmp_path / "tidy.xlsx", {"runs": sheet_of(tidy_text(name))})
-    write_book(tmp_path / "export.xlsx", {"runs": sheet_of(READ[name])})
-    weights = write_csv(tmp_path / "weights.csv", WEIGHTS)
-    tidy = read_trials(tmp_path / "tidy.xlsx", weights, phase="lag")
-    assert_same(read_trials(tmp_path / "export.xlsx", weights, phase="lag"), tidy)
+    text = SAME[name].removeprefix("sep=;\n")
+    separator = next(sign for sign in "\t;," if sign in text.splitlines()[-1])
+    number = re.compile(r"[0-9]+(\.[0-9]+)?")
+    cells = [
+        [float(cell) if number.fullmatch(cell) else cell or None for cell in line.split(separator)]
+        for line in text.replace('"', "").splitlines()
+    ]
+    sheet = read_trials(write_book(tmp_path / "runs.xlsx", {"runs": cells}), None, phase="lag")
+    assert_same(sheet, trials_of(tmp_path))
 
 
-VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
+@pytest.mark.parametrize(
+    "names", [("1", "2"), ("1X", "1Y"), ("Bearing 1", "Bearing 2"), ("Displacement 1", "Displacement 2")]
+)
+def test_names_of_sensors(tmp_path, names):
+    one, two = names
+    header = f"run,speed (rpm),{one} ampl (um pp),{one} phase (deg),{two} ampl (um pp),{two} phase (deg)"
+    expected = tuple(name.replace("Displacement ", "") for name in names)
+    assert trials_of(tmp_path, rows(header, SIX)).sensors == expected
+    paired = rows("Run;n [1/min];A1 [µm];φ1 [°];A2 [µm];φ2 [°]", "{};1485;{};{};{};{}")
+    assert trials_of(tmp_path, paired).sensors == ("1", "2")
+
+
 EXPLAINED = {
     "radians or degrees": (
-        re.sub("(?m)^[0-9]+,", "3,", HEADINGS.replace("Phase angle [°]", "Phase")),
-        "runs.csv, row 1, column Phase: found 'Phase', expected "
-        "its unit, as in 'Phase (deg)' or 98°: phases so small may be radians",
+        re.sub("(?m)^[0-9]+,", "3,", NO_UNITS),
+        "row 1, column Phase: found 'Phase', expected its unit, as in 'Phase (deg)'",
     ),
     "radians or degrees in vectors": (
-        re.sub(r"([@<∠/]) ?[0-9]+(°| deg)", r"\1 3", VECTORS.replace(" / ", "@")),
-        "runs.csv, row 1, column 1X [um pp]: found '1X [um pp]', expected its unit, as in "
-        "'Phase (deg)' or 98°: phases so small may be radians",
+        re.sub(r"@ [0-9]+°", "@ 3", PROBE),
+        "row 1, column 1X [mm/s]: found '1X [mm/s]', expected its unit",
     ),
     "amplitude units differ": (
-        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9 mil pp"),
-        "runs.csv, row 4, column Amplitude: found '4.9 mil pp', expected a number in um_pp, as row 2 says",
+        CELLS.replace("10.4 mm/s", "10.4 mil"),
+        "row 4, column Amplitude: found '10.4 mil', expected a number in mm_s, as row 2 says",
     ),
     "peak or peak to peak": (
-        CELLS_WITH_UNITS.replace("4.9UM PP", "4.9um"),
-        "runs.csv, row 4, column Amplitude: found '4.9um', expected a number in um_pp, as row 2 says",
+        CELLS.replace("10.4 mm/s", "10.4mm/s pp"),
+        "row 4, column Amplitude: found '10.4mm/s pp', expected a number in mm_s, as row 2",
     ),
     "two speeds": (
-        HEADINGS.replace("\n", ",1001\n").replace("Run,1001", "Run,RPM"),
-        "runs.csv, row 1, column RPM: found 'RPM', expected one column of the speed, and 'Speed rpm' could "
-        "be it too: begin the name of one with note",
+        NO_UNITS.replace("\n", ",1001\n").replace("Run,1001", "Run,RPM"),
+        "row 1, column RPM: found 'RPM', expected one column of the speed, and 'Speed rpm'",
     ),
-    "no run": (
-        re.sub(r",[^,\n]*\n", "\n", HEADINGS),
-        "runs.csv, row 1, column run: expected a column run; the columns are Channel, Speed rpm, 1X "
-        "Ampl. pk-pk [um] and Phase angle [°]",
-    ),
+    "no run": (re.sub(r",[^,\n]*\n", "\n", SAME["headings"]), "row 1, column run: expected a column run"),
     "lag and lead": (
-        DIRECTION.replace("238 lag", "238 lead"),
-        "runs.csv, row 6, column Phase lag (°): found '238 lead', expected phases that lag, as the job says "
-        'or is assumed: state phase = "lag" or "lead" in the job, as the instrument shows it, without words '
-        "here",
+        LAG.replace("202 lag", "202 lead"),
+        "row 4, column Phase lag (°): found '202 lead', expected phases that lag, as the job says",
     ),
     "two orders": (
-        SENSORS_1_2.replace("1 ampl", "1X ampl").replace("2 ampl", "2X ampl"),
-        "runs.csv, row 1, column 2X ampl (um pp): found '2X ampl (um pp)', expected readings at the running "
-        "speed (1X) alone: delete the column, or begin its name with note (if it is a probe: with P)",
+        SAME["wide, commas"].replace("NDE 1X Ampl", "NDE 2X Ampl"),
+        "row 1, column NDE 2X Ampl (mm/s): found 'NDE 2X Ampl (mm/s)', expected readings at the running",
     ),
-    "fractions": (
-        VECTORS.replace("∠114°", " / 114"),
-        "runs.csv, row 4, column 1X [um pp]: found '114', expected a number in deg, as row 2 says",
+    "a fraction among vectors": (
+        PROBE.replace("@ 202°", "/ 202"),
+        "row 4, column 1X [mm/s]: found '202', expected a number in deg, as row 2 says",
     ),
     "a comma beside the sign": (
-        VECTORS.replace("@79", "@,79"),
-        f"runs.csv, row 6, column 1X [um pp]: found '4,0@,79 deg', {VECTOR}",
+        PROBE.replace("@ 202", "@,202"),
+        "row 4, column 1X [mm/s]: found '10.4 @,202°', expected amplitude and phase",
     ),
     "a sensor without a phase": (
-        WIDE.replace("B_phase_deg", "note 2"),
-        "runs.csv, row 1, column B_amplitude_um_pp: found 'B_amplitude_um_pp', expected amplitude and "
-        "phase of each sensor, in columns such as 'A amplitude' and 'A phase'",
+        TIDY.replace("NDE_phase_deg", "note 2"),
+        "row 1, column NDE_amplitude_mm_s: found 'NDE_amplitude_mm_s', expected amplitude and phase of each",
     ),
     "sensors in a column and in headings": (
-        WIDE.replace("run,", "run,sensor,").replace("\ninitial,", "\ninitial,A,").replace("\ntrial ", "\nt,"),
-        "runs.csv, row 1, column A_amplitude_um_pp: found 'A_amplitude_um_pp', expected the amplitude alone, "
-        "as another column has the sensors: leave 'A' out, or begin the name with note",
+        TIDY.replace("run,", "run,sensor,").replace(",1485", ",DE,1485"),
+        "row 1, column DE_amplitude_mm_s: found 'DE_amplitude_mm_s', expected the amplitude alone",
     ),
     "a sensor in another unit": (
-        WIDE.replace("B_amplitude_um_pp", "B_amplitude_mil_pp"),
-        "runs.csv, row 1, column B_amplitude_mil_pp: found 'B_amplitude_mil_pp', expected the unit of all "
-        "sensors, amplitude_um_pp",
+        TIDY.replace("NDE_amplitude_mm_s", "NDE_amplitude_in_s"),
+        "row 1, column NDE_amplitude_in_s: found 'NDE_amplitude_in_s', expected the unit of all sensors",
     ),
     "a reading without its sensor": (
-        WIDE.replace("B_", ""),
-        "runs.csv, row 1, column amplitude_um_pp: found 'amplitude_um_pp', expected amplitude and phase "
-        "of each sensor, in columns such as 'A amplitude' and 'A phase'",
+        TIDY.replace("NDE_", ""),
+        "row 1, column amplitude_mm_s: found 'amplitude_mm_s', expected amplitude and phase of each sensor",
     ),
     "units row against headings": (
         UNITS_ROW.replace("amplitude,", "amplitude_um,"),
-        "runs.csv, row 2, column amplitude (um, um pp): found 'amplitude (um, um pp)', expected a unit of "
-        "vibration, such as um pp or mm/s rms, not 'um, um pp' (a label: amplitude_div)",
+        "row 2, column amplitude (um, mm/s): found 'amplitude (um, mm/s)', expected a unit of vibration",
     ),
     "units row with a word": (
-        UNITS_ROW.replace("um pp", "um px"),
-        "runs.csv, row 2, column amplitude (um px): found 'amplitude (um px)', expected a unit of vibration, "
-        "such as um pp or mm/s rms, not 'um px' (a label: amplitude_div)",
+        UNITS_ROW.replace("mm/s", "um px"),
+        "row 2, column amplitude (um px): found 'amplitude (um px)', expected a unit of vibration",
     ),
     "a unit against the heading": (
-        PREAMBLE.replace("4,9", "4,9 um"),
-        "runs.csv, row 8, column Amplitude (µm pk-pk): found '4,9 um', expected a number in um_pp, as the "
-        "heading says",
+        PREAMBLE.replace("10,4", "10,4 um"),
+        "row 8, column Amplitude (mm/s peak): found '10,4 um', expected a number in mm_s, as the heading",
     ),
     "thousands": (
-        VECTORS.replace("4,9∠", "1.004,9∠"),
-        "runs.csv, row 4, column 1X [um pp]: found '1.004,9', expected a number without thousands separators",
+        PROBE.replace(".", ",").replace("10,4", "1.010,4"),
+        "row 4, column 1X [mm/s]: found '1.010,4', expected a number without thousands separators",
     ),
     "commas between commas": (
-        VECTORS_WITH_UNITS.replace("4.9 um pp @ 114", '"4,9 um pp @ 114"'),
-        "runs.csv, row 4, column Vector: found '4,9', expected a number with a decimal point: in a "
-        "comma-separated file a comma is not a decimal sign (separate by ;)",
+        SAME["vectors with units"].replace("10.4 mm/s pk @ 202", '"10,4 mm/s pk @ 202"'),
+        "row 4, column Vector: found '10,4', expected a number with a decimal point",
+    ),
+    "batches": (
+        rows("Run,rpm,DE Amp (mm/s),DE deg,Batch", "{},1485,{},{},1/12"),
+        "row 1, column Batch: found 'Batch', expected a known column",
+    ),
+    "a header that was taken out": (
+        f"//{PUMP}",
+        "row 1, column //run: found '//run', expected a known column",
+    ),
+    "three unknown columns": (
+        PUMP.replace("_deg", "_deg,who,when,why").replace("\n", ",,,\n").replace("why,,,", "why"),
+        "row 1: found 'who, when and why', expected known columns: run, speed_rpm",
     ),
 }
 
@@ -334,12 +204,163 @@ EXPLAINED = {
 @each_of("name", EXPLAINED)
 def test_what_is_not_clear_is_explained_in_one_message(tmp_path, name):
     text, message = EXPLAINED[name]
-    assert refused(tmp_path, text) == message
+    words = refused(trials_of, tmp_path, text)
+    assert words.startswith(f"{tmp_path}/runs.csv, {message}")
+    assert "\n" not in words
 
 
-def test_a_phase_that_says_lag_must_be_what_the_job_says(tmp_path):
-    for phase in ("lag", "lead"):
-        text = PREAMBLE.replace("Phase (°)", f"Phase ({phase}, deg)")
-        assert read(tmp_path, text, phase=phase).conventions.labels.phase == phase
-        other = {"lag": "lead", "lead": "lag"}[phase]
-        assert f"expected phases that {other}, as the job says" in refused(tmp_path, text, phase=other)
+FAN = """\
+Run,RPM,Bearing 1 mils,Bearing 1 deg,Bearing 2 mils,Bearing 2 deg
+Original,1185,4.8,212,3.1,188
+TW plane 1,1186,3.4,255,2.7,203
+TW plane 2,1184,4.1,197,4.4,222
+"""
+FAN_WEIGHTS = "run,plane,mass_oz,angle_deg\nTW plane 1,1,2.5,0\nTW plane 2,2,2.5,0\n"
+
+
+@pytest.mark.parametrize("form", ["sheet", "text", "merged"])
+def test_two_rows_of_headings_and_the_weights_that_follow(tmp_path, form):
+    """README: 4.332 oz at 42.7° and 1.668 oz at 113.2°, lag and against the rotation."""
+    write(tmp_path, fan=FAN, weights=FAN_WEIGHTS)
+    runs = tmp_path / "fan.csv"
+    if form != "text":
+        runs, book = tmp_path / "fan.xlsx", openpyxl.Workbook()
+        book.active.append(["Fan 3 - two plane"])
+        book.active.append([None, None, "Bearing 1", None, "Bearing 2", None])
+        book.active.append(["Run", "RPM", "mils", "deg", "mils", "deg"])
+        for line in FAN.splitlines()[1:]:
+            name, *numbers = line.split(",")
+            book.active.append([name, *map(float, numbers)])
+        for cells in ("A1:G1", "C2:D2", "E2:F2") if form == "merged" else ():
+            book.active.merge_cells(cells)
+        book.save(runs)
+    trials = read_trials(runs, tmp_path / "weights.csv", phase="lag", angles="against rotation")
+    assert trials.sensors == ("Bearing 1", "Bearing 2")
+    assert (trials.labels.vibration_unit, trials.labels.weight_unit) == ("mil", "oz")
+    weights = np.linalg.solve(balancing.estimate_influence(trials).W[0], -trials.readings[0, 0, 0])
+    np.testing.assert_allclose(
+        trials.labels.weight(weights), [[4.332, 1.668], [42.7, 113.2]], atol=0.06, rtol=2e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "unit", "words"),
+    [
+        ("DE mm/s", "DE Velocity mm/s", "mm_s_rms", "is read as mm/s rms"),
+        ("mm/s", "mm/s", "mm_s", "'DE mm/s' is read as mm/s peak"),
+        ("mm/s", "mm/s pk", "mm_s", ""),
+        ("mm/s", "in/s", "in_s", ""),
+        ("mm/s", "ips", "in_s", ""),
+        ("mm/s", "mils pp", "mil_pp", ""),
+        ("mm/s", "in/s rms", "in_s_rms", ""),
+    ],
+)
+def test_units_of_readings(tmp_path, old, new, unit, words):
+    """mm/s alone are rms where the heading says velocity, and the warning says which."""
+    trials = trials_of(tmp_path, ONE_UNIT.replace(old, new))
+    assert trials.labels.vibration_unit == unit
+    assert len(trials.warnings) == bool(words)
+    assert all(words in word for word in trials.warnings)
+    size, _ = trials.labels.vibration(trials.readings)
+    np.testing.assert_allclose(size[0, :, 0, 0], [line[1] for line in WIDE], rtol=1e-14)
+
+
+def test_what_the_headings_say_of_phases(tmp_path):
+    runs = "Run,RPM,Amp (mils),Lag (deg)\nfirst,1185,4.8,212\nsecond,1185,3.4,255\n"
+    trials = trials_of(tmp_path, runs, phase=None)
+    assert (trials.sensors, trials.labels.phase, trials.labels.assumed) == (("1",), "lag", ())
+    np.testing.assert_allclose(trials.labels.vibration(trials.readings)[1].ravel(), [212, 255])
+    assert "expected phases that lead, as the job says" in refused(trials_of, tmp_path, runs, phase="lead")
+    job = job_of(tmp_path, phase=None, runs=ONE_UNIT.replace("DE deg", "DE phase lag"))
+    assert (job.trials.labels.phase, job.trials.labels.assumed) == ("lag", ())
+
+
+def test_one_sensor_and_one_speed_need_no_columns(tmp_path):
+    """The speed is the job's; two readings of one run are no single sensor."""
+    runs = "Run,Amp (mils),Phase (deg)\nfirst,4.8,212\nsecond,3.4,255\n"
+    tables = {"runs": runs, "weights": "run,plane,mass_oz,angle_deg\nsecond,1,2.5,0\n"}
+    trials = job_of(tmp_path, f"{JOB}speed_rpm = 1185\n", **tables).trials
+    assert (trials.sensors, trials.labels.speed_unit) == (("1",), "rpm")
+    np.testing.assert_allclose(trials.speeds, [1185 * np.pi / 30], rtol=1e-15)
+    assert "a column speed_rpm" in refused(trials_of, tmp_path, runs)
+    tables["runs"] = runs.replace("\nfirst", "\nfirst,1.2,7\nfirst")
+    assert "a column sensor" in refused(job_of, tmp_path, f"{JOB}speed_rpm = 1185\n", **tables)
+
+
+STEP = "Sensor position;Rotational speed [rpm];Amplitude [mm/s RMS];Phase [°];Amp. Coeff. plane 1\n"
+STEPS = {
+    "step1": f"{STEP}Drive end;1490;6,21;123;\nFan end;1490;4,08;98;\n",
+    "step2": f"{STEP}Drive end;1491;4,77;160;0,152\nFan end;1491;3,62;121;0,071\n",
+}
+
+
+@pytest.mark.parametrize("runs", ['["step1.csv", "step2.csv"]', '"steps"'])
+def test_one_file_a_run(tmp_path, runs):
+    (tmp_path / "steps").mkdir()
+    write(tmp_path / "steps" if runs == '"steps"' else tmp_path, **STEPS)
+    settings = f'runs = {runs}\nweights = "w.csv"\n'
+    job = job_of(tmp_path, settings, w="run,plane,mass_g,angle_deg\nstep2,P1,10,0\n")
+    assert (job.trials.runs, job.trials.sensors) == (("step1", "step2"), ("Drive end", "Fan end"))
+    shown = np.reshape(job.trials.labels.vibration(job.trials.readings), (2, 4))
+    np.testing.assert_allclose(shown, [[6.21, 4.08, 4.77, 3.62], [123, 98, 160, 121]], rtol=1e-13)
+    assert {file.name for file in job.files} == {"job.toml", "step1.csv", "step2.csv", "w.csv"}
+    if runs != '"steps"':
+        words = refused(job_of, tmp_path, settings, step2=STEPS["step2"].replace("4,77", "n/a"))
+        assert "step2.csv, row 2, column Amplitude [mm/s RMS]: found 'n/a'" in words
+        assert "\n" not in words
+
+
+def test_files_in_the_order_of_their_numbers(tmp_path):
+    write(tmp_path, **{f"step{k}": STEPS["step1"] for k in (1, 2, 10)})
+    assert read_trials(tmp_path, None, phase="lag").runs == ("step1", "step2", "step10")
+
+
+def test_a_column_of_weights_among_the_readings_is_passed_over_and_said(tmp_path):
+    runs = rows("Run,rpm,DE mm/s,DE deg,NDE mm/s,NDE deg,Trial weight (g)", f"{SIX},10 g at 90° in P1")
+    trials = trials_of(tmp_path, runs)
+    assert_same(trials, trials_of(tmp_path))
+    assert len([word for word in trials.warnings if "'Trial weight (g)' is passed over" in word]) == 1
+
+
+def test_exchanged_columns_are_asked_about_and_the_answer_is_a_key(tmp_path, cli):
+    numbers = [(176, 3.51), (258, 2.59), (113, 2.23), (240, 2.09), (194, 3.09), (300, 4.17)]
+    values = [(*row[:2], *pair) for row, pair in zip(LONG, numbers, strict=True)]
+    runs = rows("run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg", "{},1485,{},{},{}", values)
+    words = refused(job_of, tmp_path, runs=runs)
+    assert words.count("?") == 1
+    outcome = cli("balance", tmp_path / "job.toml")
+    assert (outcome.code, outcome.out) == (2, "")
+    answers = ("exchanged = false", "exchanged = true")
+    assert all(answer in words for answer in answers)
+    read = [job_of(tmp_path, f"{answer}\n{EIGHT_HOLES}", runs=runs).trials for answer in answers]
+    shown = [np.reshape(trials.labels.vibration(trials.readings), (2, 6)) for trials in read]
+    np.testing.assert_allclose(shown[0].T, numbers, rtol=1e-12)
+    np.testing.assert_allclose(shown[1], shown[0][::-1], rtol=1e-12)
+    assert trials_of(tmp_path, runs.replace(",176,", ",176.2,")).sensors == ("DE", "NDE")
+
+
+def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
+    runs = PUMP.replace("1485,DE", "1486.02,DE").replace("1485,NDE", "1482.7,NDE")
+    trials = trials_of(tmp_path, runs)
+    np.testing.assert_allclose(trials.speeds, [1484.36 * np.pi / 30], rtol=1e-12)
+    assert trials.readings.shape == (1, 3, 1, 2)
+    assert trials.warnings == ("speeds within 0.5 % count as one: 1482.7, 1486.02 as 1484.36 rpm",)
+    words = refused(trials_of, tmp_path, runs, speed_tolerance_percent=0.1)
+    assert "a reading of sensor 'NDE' in run 'as found' at 1486.02 rpm" in words
+    twice = runs + "trial P2,1484,DE,3.6,188\n"
+    assert "one speed: run 'trial P2' has 1486.02 as well" in refused(trials_of, tmp_path, twice)
+
+
+@each_of(
+    "command, files, words, lines",
+    [
+        ("modes", ["modes/modes.csv"], "it seems to be a table of modes", 1),
+        ("balance", ["bk_two_plane/weights.csv", "bk_two_plane/runs.csv"], "it seems to be a weights", 2),
+        ("critical", ["bk_two_plane/runs.csv"], "it seems to be a runs table", 1),
+    ],
+)
+def test_the_wrong_kind_of_file_is_one_message(command, files, words, lines, cli):
+    outcome = cli(command, *(sample_data() / file for file in files))
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert len(outcome.err.strip().splitlines()) == lines

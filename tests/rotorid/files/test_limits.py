@@ -1,6 +1,5 @@
 """Files that are too large, or no files: refused in a sentence before they cost time or memory."""
 
-import hashlib
 import io
 import os
 import time
@@ -18,7 +17,6 @@ from rotorid.files import (
     read_ode_model,
     read_rotor,
 )
-from rotorid.files.disk import each_file_once, file_content, sha256
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.problems import Problems
 
@@ -77,18 +75,6 @@ def test_pipes_and_devices_are_refused_at_once(tmp_path):
     for name in ("pipe.csv", "zero.csv"):
         (problem,) = complaints(read_rotor, tmp_path / name)
         assert "no regular file" in problem.expected
-
-
-def test_a_command_reads_a_file_once(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_bytes(b"one")
-    with each_file_once():
-        assert sha256(path) == hashlib.sha256(b"one").hexdigest()
-        assert file_content(path) == b"one"
-        path.write_bytes(b"two")
-        assert file_content(path) == b"one"
-        assert sha256(path) == hashlib.sha256(b"one").hexdigest()
-    assert file_content(path) == b"two"
 
 
 NAMES = [f"k{i}" for i in range(5000)]

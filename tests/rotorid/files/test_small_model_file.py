@@ -62,7 +62,7 @@ def some(seed):
                 2, ((1e7, 2e5), (-2e5, 3e7)), 1e3, "drive", pedestal=fem.Pedestal(5.0, (1e8, 2e8), 10.0)
             ),
             fem.Support(7, -1e5, kind="seal", pedestal=fem.Pedestal(1.0, (1e6, 1e6))),
-            fem.Support(30, 1e6),
+            fem.Support(30, (1e6, 2e6), 5.0, speeds=(0.0, 100.0)),
         ],
         forces=[
             JournalBearing(30, "far", 0.05, 0.11, 1.5e-4, 0.004, "line of centres"),
@@ -81,7 +81,8 @@ def some(seed):
 def test_what_is_written_is_read(tmp_path, seed):
     model = some(seed)
     path = tmp_path / "small.toml"
-    path.write_bytes(small_model_files(path, model, ["a comment"])[path])
+    for file, content in small_model_files(path, model, ["a comment"]).items():
+        file.write_bytes(content)
     back = read_small_model(path)
     assert back.nodes == model.nodes
     for name in ("masses", "weight", "stiffness", "material_damping", "gyroscopic", "damping"):
@@ -103,16 +104,6 @@ def test_units_defaults_and_sums(tmp_path):
     assert model.supports == [fem.Support(1, 1e7)]
     assert model.unbalance == {5: pytest.approx(1e-3j)}
     assert model.bow == {}
-
-
-def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
-    (tmp_path / "far.csv").write_text("speed_rad_s,stiffness_N_per_m\n0,1e7\n100,2e7\n")
-    model = read_small_model(written(tmp_path, PLAIN.replace("stiffness_N_per_m = 1e7", 'table = "far.csv"')))
-    assert model.motion(50.0).K[0, 0] == pytest.approx(1e6 + 1.5e7)
-    for path, content in small_model_files(tmp_path / "again.toml", model).items():
-        path.write_bytes(content)
-    again = read_small_model(tmp_path / "again.toml")
-    assert again.supports == model.supports
 
 
 @each_of(

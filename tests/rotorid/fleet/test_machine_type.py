@@ -1,11 +1,11 @@
-"""Coefficients of a type: what was drawn of many machines, few machines, reasons of odd ones."""
+"""Coefficients of a type: few machines, reasons of odd ones."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from balancing import Labels, ReadingErrors, Trials, UndeterminedError, estimate_influence
+from balancing import ReadingErrors, Trials, UndeterminedError, estimate_influence
 from rotorid.fleet import MachineRecord, fit_type
 
 GRID = np.array([100.0]), ("x", "y"), ("L", "R")
@@ -68,26 +68,9 @@ def test_an_odd_machine_is_found_with_what_would_make_it_fit(what, words):
     assert kind.why_odd(every[0]) == ""  # a turn by 1° is no reason where none is needed
 
 
-def test_scatter_is_what_was_drawn_and_jobs_of_a_machine_narrow_it():
-    every = records(drawn_type(4, machines=400))
-    kind = fit_type(every, *GRID)
-    std = np.sqrt(np.diag(kind.effects.between)).reshape(-1, 2) / np.abs(kind.mean).reshape(-1, 1)
-    assert std == pytest.approx(0.1, rel=0.15)
-    new, own = kind.influence(Labels()), kind.influence(Labels(), "m3")
-    assert np.all(own.channels().trace(axis1=-2, axis2=-1) < new.channels().trace(axis1=-2, axis2=-1))
-    assert np.abs(own.W - every[3].W).max() < 0.5 * np.abs(new.W - every[3].W).max()
-
-
 def test_few_machines_are_refused_and_widen_the_answer():
     every = records(drawn_type(5, machines=8))
     with pytest.raises(UndeterminedError, match=r"2 machines with these speeds.*3 or more"):
         fit_type(every[:2], *GRID)
     assert "nothing tells an odd one" in fit_type(every[:4], *GRID).notes[0]
     assert fit_type(every, *GRID).widening == pytest.approx(2 * 4.7374 / 5.9915, rel=1e-3)  # F(2, 7)
-
-
-def test_jobs_with_assumed_errors_are_counted():
-    every = records(drawn_type(6))
-    assert fit_type(every, *GRID).notes == ()
-    every[:3] = [record._replace(std=0 * record.std) for record in every[:3]]
-    assert fit_type(every, *GRID).notes[0].startswith("3 jobs without errors that are stated or measured")

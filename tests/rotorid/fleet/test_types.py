@@ -116,28 +116,18 @@ def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
     assert "coefficients of the type 'fan', 25 machines" in " ".join(answer.result.notes)
 
 
-def test_a_check_run_refines(fleet, tmp_path):
-    job = Machine(np.random.default_rng(23)).job(tmp_path / "checked", check=True)
-    plain, refined = (
-        balance(job, BalanceOptions(machine_type=address(fleet), refine=refine)) for refine in (False, True)
-    )
-    assert (plain.check is None, refined.check is None) == (False, True)
-    assert np.trace(refined.result.covariance) < np.trace(plain.result.covariance)
-    assert refined.result.mounted[0] == "check 0"
-
-
 def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
     folder, machines = fleet
 
-    def known(job, table=""):
+    def knowledge(job, table=""):
         return type_coefficients(read_job(job), table or address(fleet))
 
     own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
-    assert known(own).earlier == 2
-    assert known(shutil.copytree(own.parent, tmp_path / "elsewhere") / "job.toml").earlier == 0
-    assert len(known(folder / "tree" / "fan" / "F7" / "2026-01-01" / "job.toml").kind.machines) == 24
-    first = known(machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1))
-    other = known(machines[2].job(tmp_path / "X", runs=1))
+    assert knowledge(own).earlier == 2
+    assert knowledge(shutil.copytree(own.parent, tmp_path / "elsewhere") / "job.toml").earlier == 0
+    assert len(knowledge(folder / "tree" / "fan" / "F7" / "2026-01-01" / "job.toml").kind.machines) == 24
+    first = knowledge(machines[2].job(tmp_path / "F2" / "2026-05-05", runs=1))
+    other = knowledge(machines[2].job(tmp_path / "X", runs=1))
     assert (first.earlier, other.earlier) == (3, 0)
     near, far = (
         np.trace(one.influence.channels()[..., 2:, 2:], axis1=2, axis2=3).sum() for one in (first, other)
@@ -148,7 +138,7 @@ def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
     runs = shutil.copytree(folder / "tree", tmp_path / "tree") / "fan" / "F2" / "2026-01-01" / "runs.csv"
     fit(tmp_path / "tree", tmp_path / "fans.parquet")
     runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
-    assert known(runs.parent / "job.toml", f"{tmp_path / 'fans.parquet'}:fan").earlier == 2
+    assert knowledge(runs.parent / "job.toml", f"{tmp_path / 'fans.parquet'}:fan").earlier == 2
 
 
 def test_copies_count_once_and_one_job_a_machine_tells_nothing_within(tmp_path):
@@ -206,21 +196,9 @@ def test_masses_at_other_radii_are_converted(tmp_path):
     new = Machine(rng, 0.02, 2.0)
     new.W = 2 * new.W
     job = read_job(new.job(tmp_path / "new", runs=1, more=at(200)))
-    known = type_coefficients(job, f"{tmp_path / 'f.parquet'}:fan")
-    assert len(known.kind.machines) == 8
-    assert np.abs(known.influence.W[0] * 1e3 / Machine.MEAN - 1).max() < 0.1  # µm pp per g
-
-
-def test_unbalances_at_other_radii_are_the_same(tmp_path):
-    rng = np.random.default_rng(31)
-    for k in range(8):
-        more = f"[planes.L]\nradius_mm = {100 + 50 * (k % 2)}\n"
-        job = Machine(rng, 0.02, 2.0).job(tmp_path / "tree" / "fan" / f"F{k}", more=more)
-        weights = job.parent / "weights.csv"
-        weights.write_text(weights.read_text().replace("mass_g", "unbalance_g_mm"))
-    outcome = fleet_fit(tmp_path / "tree")
-    assert outcome.result.labels.weight_unit == "g_mm"
-    assert outcome.to_frame()["between_percent"].max() < 5
+    knowledge = type_coefficients(job, f"{tmp_path / 'f.parquet'}:fan")
+    assert len(knowledge.kind.machines) == 8
+    assert np.abs(knowledge.influence.W[0] * 1e3 / Machine.MEAN - 1).max() < 0.1  # µm pp per g
 
 
 def test_what_is_wrong_is_refused(fleet, tmp_path):

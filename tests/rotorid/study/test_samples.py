@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from studies.drawn import SCATTER, STUDY, fatal, noted, number, write
 
-from rotorid.base.worker_processes import single_threads
 from rotorid.study import StudyOptions, samples, study
 from rotorid.study.samples import SampleError, draw_all
 
@@ -40,15 +39,15 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, threads)
     distributed = pytest.importorskip("distributed", reason="without the extra rotorid[cluster]")
     file = write(tmp_path, STUDY.replace("samples", "corrections = 2\nsamples") + SCATTER)
     ways = {f"own{n}": StudyOptions(workers=n, results=tmp_path / f"own{n}.parquet") for n in (1, 2)}
-    found = [study(file, options) for options in ways.values()]
-    found.append(study(file, StudyOptions(results=tmp_path / "threads.parquet"), executor=threads))
+    outcome = [study(file, options) for options in ways.values()]
+    outcome.append(study(file, StudyOptions(results=tmp_path / "threads.parquet"), executor=threads))
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
     with distributed.LocalCluster(**options) as cluster:
         address = cluster.scheduler_address
-        found.append(study(file, StudyOptions(scheduler=address, results=tmp_path / "dask.parquet")))
+        outcome.append(study(file, StudyOptions(scheduler=address, results=tmp_path / "dask.parquet")))
     one, *others = (p.read_bytes() for p in sorted(tmp_path.glob("*.parquet")))
     assert others == [one] * 3
-    assert len({str(each.to_dict()) for each in found}) == 1
+    assert len({str(each.to_dict()) for each in outcome}) == 1
     assert len(set(pq.read_table(tmp_path / "own1.parquet")["ratio_0"].to_pylist())) == 60
     assert not list(tmp_path.glob("*.lock"))
 
@@ -166,12 +165,3 @@ def test_progress_is_logged(threads, caplog):
     with caplog.at_level(logging.INFO, "rotorid.progress"):
         drawn(number, None, threads, 6)
     assert [record.getMessage() for record in caplog.records] == [f"{n} of 6 samples" for n in (2, 4, 6)]
-
-
-def test_the_environment_is_restored(monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "5")
-    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    before = dict(os.environ)
-    with single_threads():
-        assert os.environ["OMP_NUM_THREADS"] == os.environ["MKL_NUM_THREADS"] == "1"
-    assert dict(os.environ) == before

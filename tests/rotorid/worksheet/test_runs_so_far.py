@@ -18,12 +18,11 @@ def copy(tmp_path, sample="turbo_job"):
     return tmp_path / sample / "job.toml"
 
 
-@pytest.mark.parametrize("sample", ["turbo_job", "bk_two_plane", "left_in"])
-def test_a_finished_job_has_the_readings_and_regions_of_its_trials(sample):
-    job = sample_data() / sample / "job.toml"
+def as_balanced(job):
+    """Readings and their covariances are those of the whole job."""
     found, trials = runs_so_far(job), read_job(job).trials
     covariance = reading_of(trials).covariance(trials)
-    assert {found.baseline, *found.trials} == {*trials.runs}
+    assert {found.baseline, *found.mounted} == {*trials.runs}
     assert len(found.channels) == trials.mean[0].size
     for one in found.channels:
         s = int(np.argmin(np.abs(trials.speeds - one.trials.speeds[0])))
@@ -32,14 +31,20 @@ def test_a_finished_job_has_the_readings_and_regions_of_its_trials(sample):
         np.testing.assert_allclose(one.covariance[:, 0, 0], covariance[:, s, c], rtol=1e-9)
 
 
+@pytest.mark.parametrize("sample", ["turbo_job", "bk_two_plane", "left_in"])
+def test_a_finished_job_has_the_readings_and_regions_of_its_trials(sample):
+    as_balanced(sample_data() / sample / "job.toml")
+
+
 def test_the_effect_is_the_largest_change_of_the_files_numbers():
-    effect = {one["run"]: one for one in runs_so_far(TURBO).to_dict()["runs"]}["trial 1"]
+    (effect,) = (one for one in runs_so_far(TURBO).effects() if one.run == "trial 1")
     trials = read_job(TURBO).trials
     change = np.abs(trials.mean[1] - trials.mean[0])
     s, c = np.unravel_index(np.argmax(change), change.shape)
-    assert effect["where"] == f"{trials.sensors[c]} at {trials.labels.speed_words(trials.speeds[s])}"
-    assert effect["share_percent"] == pytest.approx(100 * change[s, c] / abs(trials.mean[0, s, c]))
-    assert effect["level"] == "good"
+    where = f"{trials.sensors[c]} at {trials.labels.speed_words(trials.speeds[s])}"
+    assert effect.words.startswith(f"changes {where} by")
+    assert effect.percent == pytest.approx(100 * change[s, c] / abs(trials.mean[0, s, c]))
+    assert effect.level == "good"
 
 
 def changed(job, name, *pairs):
@@ -74,8 +79,8 @@ def test_a_weight_that_does_little_is_said_to(tmp_path):
 
     def level(*numbers):
         (folder / "runs.csv").write_text(rows.format(*numbers))
-        (effect,) = runs_so_far(folder / "job.toml").to_dict()["runs"]
-        return effect["level"]
+        (effect,) = runs_so_far(folder / "job.toml").effects()
+        return effect.level
 
     # assumed errors: 2 % and 2°; a change of 3 % is none, of 20 % is seen, of 40 % or of 35° is enough
     assert level("10.00", "90.0", "10.30", "90.0") == "none"
@@ -90,14 +95,27 @@ def test_before_the_first_trial_run_there_is_a_baseline_alone(tmp_path):
         "run,speed_rpm,sensor,amplitude_um_pp,phase_deg\nbaseline,3000,A,7,20\n"
     )
     found = runs_so_far(tmp_path / "job.toml")
-    assert found.to_dict() == {
-        "baseline": "baseline",
-        "channels": [{"speed": "3000", "sensor": "A"}],
-        "runs": [],
-    }
+    assert (found.baseline, found.effects()) == ("baseline", [])
+    assert [(one.speed, one.sensor) for one in found.channels] == [("3000", "A")]
     assert len(found.figure("3000", "A").axes) == 1
-    with pytest.raises(ValueError, match="nothing is read yet of 'B' at 3000"):
-        found.figure("3000", "B")
     (tmp_path / "runs.csv").write_text("run,speed_rpm,sensor,amplitude_um_pp,phase_deg\n")
     with pytest.raises(InputError):
         runs_so_far(tmp_path / "job.toml")
+
+
+def test_errors_and_slow_roll_of_single_channels_are_those_of_the_balance(tmp_path):
+    header = "run,speed_rpm,sensor,repeat,amplitude_um_pp,phase_deg\n"
+    rows = [
+        f"{run},1000,{sensor},{k},{size + k * scatter},{phase}\n"
+        for run, size, phase in (("first", 10, 0), ("trial", 12, 40))
+        for sensor, scatter in (("A", 0.1), ("B", 1.0))
+        for k in (1, 2, 3)
+    ]
+    (tmp_path / "runs.csv").write_text(header + "".join(rows))
+    (tmp_path / "weights.csv").write_text("run,plane,mass_g,angle_deg\ntrial,left,10,0\n")
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'runs = "runs.csv"\nweights = "weights.csv"\nphase = "lag"\nangles = "with rotation"\n'
+        "[slow_roll.A]\namplitude = 8\nphase_deg = 0\n[slow_roll.B]\namplitude = 2\nphase_deg = 9\n"
+    )
+    as_balanced(job)

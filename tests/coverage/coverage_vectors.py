@@ -1,4 +1,4 @@
-"""How exact the vectors of a run-up are: `python examples/vectors_accuracy.py [SEEDS]`.
+"""How exact the vectors of a run-up are: `python tests/coverage/coverage_vectors.py [SEEDS]`.
 
 A drawn record of 60 s at 5,120 samples a second: 600 → 3,600 rpm, one mode at 1,800 rpm with a damping
 ratio of 0.03, a run-out of 5 µm, 1.5 µm of 2×, noise of 1 µm, a tacho that is high for 5 % of a turn; without
