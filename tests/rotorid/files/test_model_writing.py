@@ -178,7 +178,7 @@ def test_what_has_no_meaning_for_amplitudes_is_refused(tmp_path, old, new, words
         (
             read_ode_model,
             STATES.replace("[estimate]", "[estimates]"),
-            r"key estimate: expected names to estimate",
+            r"key estimates: .*did you mean 'estimate'",
         ),
         (
             read_ode_model,
