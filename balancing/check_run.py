@@ -42,10 +42,9 @@ from balancing.tables import (
     weight_rows,
 )
 from balancing.trials import Trials
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, rows, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, rows, text
 from rotorid.base.text import figures, listing, sentence
 from rotorid.regression import solution, unstretch
 
@@ -144,7 +143,7 @@ class CheckComparison(Answered):
         )
 
     def _as_if(self) -> str:
-        """What other weights would cause the differences; empty: none in the planes."""
+        """Other weights that would cause the differences, in words; empty: none in the planes."""
         if self.change is None:
             return ""
         planes = np.flatnonzero(np.abs(self.change) > 0.1 * np.abs(self.change).max())
@@ -224,12 +223,12 @@ class CheckComparison(Answered):
             vector_columns(labels, name, values, rounding) for name, values in (("before", before), *each)
         )
         places = reading_columns(labels, self.speeds, self.sensors)
-        known = None if self.explained is None else self.covariance
+        covariance = None if self.explained is None else self.covariance
         return (
             Column("run", np.repeat(self.runs, before[0].size), str if R > 1 else None),
             *(replace(column, values=list(column.values) * R) for column in places),
             *chain.from_iterable(vectors),
-            covariance_column(labels, "covariance", known, before.size),
+            covariance_column(labels, "covariance", covariance, before.size),
             Column("distance", self.distance.ravel(), partial(figures, digits=2), "off by std"),
         )
 
@@ -359,7 +358,7 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
 
 
 def last_run(runs: Trials) -> Trials:
-    """The last of several runs.
+    """Trials of the last run alone.
 
     Parameters
     ----------
@@ -377,7 +376,7 @@ def last_run(runs: Trials) -> Trials:
 
 
 def index_of(name: str, names: tuple[str, ...], what: str) -> int:
-    """Where a name of a check run stands among those of the coefficients."""
+    """Index of a name of a check run among those of the coefficients."""
     if name not in names:
         raise ValueError(
             f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "

@@ -39,8 +39,8 @@ from balancing.influence import (
 )
 from balancing.noise import Gaussian
 from rotorid.base.arrays import FloatArray
-from rotorid.base.rpm import rpm_text
-from rotorid.base.words import Quantity as Quantity
+from rotorid.base.text import Quantity as Quantity
+from rotorid.base.text import rpm_text
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike

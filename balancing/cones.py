@@ -62,7 +62,7 @@ class Bounds(NamedTuple):
         return np.array([m > 0 and s != () for m, s in zip(self.max_weight, self.sectors, strict=True)])
 
     def part(self, planes: BoolArray) -> Bounds:
-        """The same for some planes alone."""
+        """The bounds for some of the planes alone."""
         sectors = tuple(s for s, one in zip(self.sectors, planes, strict=True) if one)
         return self._replace(W=self.W[:, planes], max_weight=self.max_weight[planes], sectors=sectors)
 
@@ -299,14 +299,14 @@ def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, toleran
     P, left = len(start), e + E @ start
     index = np.concatenate((np.flatnonzero(shares), np.flatnonzero(np.isfinite(limit))))
     rises = np.arange(len(index)) < np.count_nonzero(shares)
-    # discs |known + rows y| ≤ head, or t where it rises, each divided by its size
+    # discs |centres + rows y| ≤ head, or t where it rises, each divided by its size
     size = np.maximum(limit, np.abs(left))[index]
     size[rises] = 1 / shares[shares > 0]
     size = np.maximum(size, TINY)
-    head, known = np.where(rises, 0.0, limit[index]) / size, left[index] / size
+    head, centres = np.where(rises, 0.0, limit[index]) / size, left[index] / size
     rows = (stretch(E) @ T).reshape(-1, 2, 2 * P)[index] / size[:, None, None]
     sides, right = _sides(chosen, start, T)
-    excess, scale = np.where(rises, 0.0, np.abs(known) - head), 1.0
+    excess, scale = np.where(rises, 0.0, np.abs(centres) - head), 1.0
     if not rises.any():  # the way to go is about as long as the way to the farthest disc or side
         reach = np.linalg.norm(rows, axis=(1, 2))
         steps = excess / np.maximum(reach, 1e-9 * reach.max(initial=0.0))
@@ -315,13 +315,13 @@ def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, toleran
             return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
         rows, sides, T = scale * rows, scale * sides, scale * T
     active = excess > 0
-    active[np.argsort(-np.abs(known[rises]))[: FIRST * P]] = True
+    active[np.argsort(-np.abs(centres[rises]))[: FIRST * P]] = True
     for tighter in TIGHTER:
         inner = head * (1 - tighter * tolerance)
         while True:
-            discs = rows[active], known[active], inner[active], rises[active]
+            discs = rows[active], centres[active], inner[active], rises[active]
             y, t, prices, value = _program(*discs, sides, right, tolerance)
-            out = np.abs(known + unstretch((rows @ y).ravel())) - inner - rises * t * (1 + tolerance)
+            out = np.abs(centres + unstretch((rows @ y).ravel())) - inner - rises * t * (1 + tolerance)
             more = np.flatnonzero(~active & (out > 0))
             if not len(more):
                 break
@@ -363,7 +363,7 @@ def _sides(
 
 def _program(
     rows: FloatArray,
-    known: ComplexArray,
+    centres: ComplexArray,
     head: FloatArray,
     rises: BoolArray,
     sides: FloatArray,
@@ -381,7 +381,7 @@ def _program(
     A[s:].reshape(m, 3, width)[:, 1:, :n] = -rows
     A[s::3, n:], q[n:] = -1.0 * rises[:, None], 1.0
     curvature = csc_matrix(np.eye(n) if width == n else (width, width), dtype=float)
-    b = np.concatenate((right, np.stack((head, known.real, known.imag), axis=1).ravel()))
+    b = np.concatenate((right, np.stack((head, centres.real, centres.imag), axis=1).ravel()))
     cones = [clarabel.NonnegativeConeT(s)] * bool(s) + [clarabel.SecondOrderConeT(3)] * m
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.presolve_enable, settings.max_threads = False, False, 1

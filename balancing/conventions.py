@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import polar as polar
-from rotorid.base.unit_words import SPEEDS, vibration_unit_words, weight_unit_words
-from rotorid.base.words import Angles as Angles
-from rotorid.base.words import Phase as Phase
-from rotorid.base.words import Rotation as Rotation
-from rotorid.base.words import View as View
+from rotorid.base.arrays import polar as polar
+from rotorid.base.text import SPEEDS, vibration_unit_words, weight_unit_words
+from rotorid.base.text import Angles as Angles
+from rotorid.base.text import Phase as Phase
+from rotorid.base.text import Rotation as Rotation
+from rotorid.base.text import View as View
 
 PHASES = ("lead", "lag")
 ANGLES = ("with rotation", "against rotation")
@@ -146,7 +146,7 @@ class Labels:
         return f"{self.speed_number(speed)} {self.speed_in}"
 
     def speed_number(self, speed: float) -> str:
-        """The same without the unit."""
+        """A speed in the job's unit, without the name of the unit."""
         return f"{speed * SPEEDS[self.speed_unit][1]:.6g}"
 
     def amplitude_words(self, size: float) -> str:

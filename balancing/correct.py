@@ -130,7 +130,7 @@ def correct(  # noqa: PLR0913
         remove=tuple(name for name in part.planes if name in remove),
     )
     if not result.told_apart:
-        unclear = unclear or _alike(case, counts, known=False)
+        unclear = unclear or _alike(case, counts, stated=False)
     return replace(result, decision=decide(result, case, unclear, limits))
 
 
@@ -138,7 +138,7 @@ def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
     """Refuse planes that known errors of the coefficients alone tell apart, or say so."""
     part = case.part
     check_planes(case.W[counts], part.planes)
-    words = _alike(case, counts, known=True) if part.trials is not None or part.known_errors else ""
+    words = _alike(case, counts, stated=True) if part.trials is not None or part.known_errors else ""
     if words and refuse:
         first = part.remarks.contradictions
         rest = [f"Warning: {w}" for w in part.remarks.warnings if w not in first]
@@ -147,9 +147,9 @@ def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
     return words
 
 
-def _alike(case: Case, counts: BoolArray, *, known: bool) -> str:
+def _alike(case: Case, counts: BoolArray, *, stated: bool) -> str:
     """Which planes act alike within errors that are known, or any; empty where none do."""
-    covariance = case.part.channels(known=known)[..., 2:, 2:]
+    covariance = case.part.channels(known=stated)[..., 2:, 2:]
     return unresolved(case.W[counts], case.names, covariance[counts.reshape(case.part.baseline.shape)])
 
 

@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import chance
 from balancing.regions import real_parts
 from balancing.trials import ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.regression import gain
 
 Source = Literal[
@@ -94,7 +94,7 @@ class Reading(NamedTuple):
     dof: float = np.inf
 
     def scales(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """How many times larger the errors may be, (count,)."""
+        """Drawn factors by which the errors may be larger than estimated, (count,)."""
         draws = rng.chisquare(min(self.dof, 1e9), count)
         return np.sqrt(self.dof / draws) if np.isfinite(self.dof) else np.ones(count)
 
@@ -119,14 +119,6 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
     return turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
 
 
-def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
-    """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
-    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
-    parts = ((radial, along), (tangential, across))
-    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
-
-
 def mean_variance(covariance: FloatArray) -> FloatArray:
     """Mean variance of both directions, (…), of covariances (…, 2, 2)."""
     return np.asarray(np.trace(covariance, axis1=-2, axis2=-1) / 2)
@@ -143,14 +135,14 @@ def reading_of(trials: Trials) -> Reading:
     stated, scatter = trials.errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
     if stated is None:
-        found = _from_repeats(*scatter)
+        estimate = _from_repeats(*scatter)
         if trials.covariance is None:
-            return found
+            return estimate
         if ratio == 1.0:
             variance = np.nanmean(trials.covariance[[0, 1], [0, 1]])
             return Reading(ReadingErrors(floor=float(np.sqrt(variance))), "measured")
         words = f"repeated readings scatter {ratio:.2g} times as much as the measured standard deviations: "
-        return found._replace(warnings=(words + "their scatter was added", *found.warnings))
+        return estimate._replace(warnings=(words + "their scatter was added", *estimate.warnings))
     sizes = {"amplitude": stated.amplitude * ratio, "phase": stated.phase * ratio}
     warnings: list[str] = []
     if ratio > 1.0:
@@ -260,7 +252,7 @@ def rms(values: ArrayLike) -> float:
 
 
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
-    """What unbalances do, one in each plane, of equal effect and together of mean square size², (S, C, P)."""
+    """Readings by one unbalance in each plane, of equal effect, together of mean square size², (S, C, P)."""
     mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
     return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
 
@@ -293,19 +285,19 @@ class Block(NamedTuple):
 
     `spare`: of spare runs, or of the corrected reading;
     `parts` (5, n, n): by the parts at size 1, the first alike at all sensors and in proportion;
-    `known` (n, n): by all that is known.
+    `fixed` (n, n): by errors whose sizes are known.
     """
 
     spare: bool
     e: ComplexArray
     parts: ComplexArray
-    known: ComplexArray
+    fixed: ComplexArray
 
     def at(self, sizes: FloatArray, evenly: float) -> tuple[FloatArray, FloatArray]:
         """Log det V and eᴴ V⁻¹ e / 2 at sizes (G, 4)."""
-        own, *common = sizes.T**2
-        squares = np.array([evenly * own, (1 - evenly) * own, *common])
-        V = np.tensordot(squares.T, self.parts, axes=1) + self.known
+        alone, *common = sizes.T**2
+        squares = np.array([evenly * alone, (1 - evenly) * alone, *common])
+        V = np.tensordot(squares.T, self.parts, axes=1) + self.fixed
         n = len(self.e)
         least = 1e-9 * np.trace(V, axis1=1, axis2=2).real + 1e-12 * np.trace(self.parts[0]).real
         V += (least / n)[:, None, None] * np.eye(n)
@@ -339,7 +331,7 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     each = (trials.mean, whole, whole - theta[..., 0])
     Y, fitted, effect = (part.reshape(R, N)[:, at] for part in each)
     variances = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
-    even, own, variance = (part.reshape(R, N)[:, at] for part in variances)
+    even, uneven, variance = (part.reshape(R, N)[:, at] for part in variances)
 
     def alike(rows: ComplexArray) -> ComplexArray:
         return np.asarray(rows.T @ rows.conj())
@@ -347,11 +339,11 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
         moved, loads = (alike(m[:, None] * part) for part in (fitted, effect))
-        parts = [np.diag(share @ even), np.diag(share @ own), moved, loads]
+        parts = [np.diag(share @ even), np.diag(share @ uneven), moved, loads]
         parts.append(share.sum() * further.T @ further.conj())
-        known = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
+        fixed = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
-        inside = keep @ np.array([*parts, known]) @ keep.conj().T
+        inside = keep @ np.array([*parts, fixed]) @ keep.conj().T
         return Block(not free.size, keep @ (m @ Y), inside[:5], inside[5])
 
     # combinations whose errors are independent
@@ -413,27 +405,27 @@ def usual_run_errors(trials: Trials) -> RunErrors:
 
 def _estimated(each: Sequence[Block], level: float) -> RunErrors:
     """The grid, drawn closer around what data do not exclude; own parts as they fit best."""
-    own = common = SIZES
+    alone = common = SIZES
     seen, loaded = (sum(np.trace(block.parts[k]).real for block in each) for k in (2, 3))
     # runs without weights tell nothing of what goes with the weights
     splits = SPLITS if loaded > 0.03 * seen else SPLITS[SPLITS[:, 1] == 0]
-    sizes = _grid(own, common, splits)
+    sizes = _grid(alone, common, splits)
     log = [-np.sum([block.at(sizes, evenly) for block in each], axis=(0, 1)) for evenly in EVENLY]
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
     for _ in range(2):  # closer around what data do not exclude
-        chance = _posterior(each, sizes, evenly).reshape(len(own), len(common), -1)
-        own, common = (
+        chance = _posterior(each, sizes, evenly).reshape(len(alone), len(common), -1)
+        alone, common = (
             _finer(values, chance.sum(axis=axes), count)
-            for values, axes, count in ((own, (1, 2), 5), (common, (0, 2), 6))
+            for values, axes, count in ((alone, (1, 2), 5), (common, (0, 2), 6))
         )
-        sizes = _grid(own, common, splits)
+        sizes = _grid(alone, common, splits)
     return RunErrors(sizes, _posterior(each, sizes, evenly), "estimated", level, evenly)
 
 
-def _grid(own: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
-    """All combinations of own sizes, sizes in common and splits, (G, 4)."""
+def _grid(alone: FloatArray, common: FloatArray, splits: FloatArray) -> FloatArray:
+    """All combinations of sizes of one sensor alone, sizes in common and splits, (G, 4)."""
     each = np.sqrt(splits)
-    return np.array([(a, *(b * split)) for a in own for b in common for split in each])
+    return np.array([(a, *(b * split)) for a in alone for b in common for split in each])
 
 
 def _finer(values: FloatArray, probability: FloatArray, count: int) -> FloatArray:

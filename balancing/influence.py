@@ -34,7 +34,7 @@ from balancing.noise import Mounted as Mounted
 from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import RPM, rpm_text
 from rotorid.regression import gain
 
 SPEED_TOLERANCE = 0.005
@@ -110,7 +110,7 @@ class Influence:
 
     @property
     def trials(self) -> Trials | None:
-        """The runs; None: there are none."""
+        """The runs that the coefficients are from; None: they were stored or computed."""
         return self.errors.trials
 
     @property
@@ -120,7 +120,7 @@ class Influence:
 
     @property
     def run_errors(self) -> RunErrors:
-        """What changes from run to run."""
+        """Errors of a run that all its readings share or that repeats do not show."""
         return self.errors.run
 
     @property
@@ -131,7 +131,7 @@ class Influence:
     @property
     def known_errors(self) -> bool:
         """Whether anything is known of the errors."""
-        return bool(self.errors.noise.own.any() or self.errors.noise.columns.any())
+        return bool(self.errors.noise.blocks.any() or self.errors.noise.columns.any())
 
     @property
     def unit(self) -> str:
@@ -182,7 +182,7 @@ class Influence:
         return (error[..., 0] for error in self.noise_draws(self._of_runs(run, np.eye(1)), count, seed))
 
     def difference_noise(self, check: Trials) -> Noise:
-        """How readings of runs err against Y₀ + W T: `own` (2, S, C, 2R, 2R), `columns` (M, S, C, R).
+        """How readings of runs err against Y₀ + W T: `blocks` (2, S, C, 2R, 2R), `columns` (M, S, C, R).
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class Influence:
         return self.errors.noise.covariance(self.errors.sizes * counts)
 
     def columns(self) -> ComplexArray:
-        """What of it readings have in common, (M, S, C, P + 1).
+        """Errors that readings have in common, (M, S, C, P + 1).
 
         (Y₀, W) errs by their sum, each times a real number of variance 1.
         """
@@ -223,7 +223,7 @@ class Influence:
     def part(
         self, speeds: Sequence[int], sensors: Sequence[int] | None = None, planes: Sequence[int] | None = None
     ) -> Influence:
-        """Those of some speeds, sensors and planes, by their indices; None: of all."""
+        """Coefficients of some speeds, sensors and planes, by their indices; None: of all."""
         sensors = range(len(self.sensors)) if sensors is None else sensors
         planes = list(range(len(self.planes)) if planes is None else planes)
         chosen = tuple(self.planes[p] for p in planes)
@@ -344,30 +344,30 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
     )
 
 
-def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
-    """Indices of known speeds equal to the wanted ones within 0.5 %.
+def match_speeds(wanted: ArrayLike, available: FloatArray, what: str = "coefficients") -> list[int]:
+    """Indices of available speeds equal to the wanted ones within 0.5 %.
 
     Parameters
     ----------
-    wanted, known
+    wanted, available
         rad/s, one or many.
     what
-        What the known speeds have, for the complaint.
+        What the available speeds have, for the complaint.
 
     Returns
     -------
-    For each wanted speed the place of the known one, from 0.
+    For each wanted speed the place of the available one, from 0.
 
     Raises
     ------
     ValueError
-        For a speed that is not among the known ones.
+        For a speed that is not among the available ones.
     """
     out = []
     for speed in np.atleast_1d(np.asarray(wanted, dtype=np.float64)):
-        i = int(np.argmin(np.abs(known - speed)))
-        if not abs(known[i] - speed) <= SPEED_TOLERANCE * known[i]:
-            rpm = ", ".join(f"{v * RPM:.6g}" for v in known)
+        i = int(np.argmin(np.abs(available - speed)))
+        if not abs(available[i] - speed) <= SPEED_TOLERANCE * available[i]:
+            rpm = ", ".join(f"{v * RPM:.6g}" for v in available)
             raise ValueError(f"there are no {what} at {rpm_text(speed)}; there are some at {rpm} rpm")
         out.append(i)
     if len(set(out)) < len(out):
@@ -415,9 +415,9 @@ def estimate_influence(trials: Trials) -> Influence:
     variance = mean_variance(covariance)
     theta = np.einsum("scnr,scr->scn", _gain(A, variance), Y)
     run = run_errors(trials, theta, covariance, reading)
-    own, common, loads, further = run.typical**2
+    alone, common, loads, further = run.typical**2
     between = (
-        own * own_variance(trials.mean, run.evenly)
+        alone * own_variance(trials.mean, run.evenly)
         + common * np.abs(trials.mean) ** 2
         + further * np.sum(np.abs(unbalances(theta[..., 1:], run.level)) ** 2, axis=-1)
         + loads * np.abs(trials.mean - theta[..., 0]) ** 2

@@ -43,11 +43,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import FloatArray
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm, rpm_text
-from rotorid.base.text import figures
+from rotorid.base.text import figures, rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,8 +114,8 @@ class Tolerance(Answered):
     @property
     def transfer(self) -> FloatArray | None:
         """T (2, P): unbalance at the bearings per unbalance in the planes; None without distances."""
-        known = len(self.bearings) > 0 and np.isfinite(self.positions).all()
-        return transfer(self.positions, self.bearings) if known else None
+        placed = len(self.bearings) > 0 and np.isfinite(self.positions).all()
+        return transfer(self.positions, self.bearings) if placed else None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""

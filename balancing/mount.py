@@ -33,10 +33,9 @@ from balancing.tables import (
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:
@@ -101,7 +100,7 @@ class Mounted(Answered):
         )
 
     def _left(self, discrete: Discrete, after: ComplexArray) -> dict[str, Any]:
-        """How many pieces leave how much."""
+        """Number of pieces and the vibration that they leave, as JSON types."""
         size = self.correction.labels.vibration(after)[0]
         return {"pieces": discrete.pieces, "rms_after": rms(size), "max_after": size.max()}
 

@@ -36,47 +36,47 @@ READING, OWN, COMMON, LOADS, UNBALANCE, KNOWN = range(6)
 
 
 class Noise(NamedTuple):
-    """How (Y₀, W) err.
+    """Errors of (Y₀, W): blocks by reading, and columns in common.
 
-    `own` (2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1; `columns`
-    (M, S, C, P + 1) of size 1, and `kind` (M,), which size each has.
+    `blocks` (2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1;
+    `columns` (M, S, C, P + 1) of size 1, and `kind` (M,), which size each has.
     """
 
-    own: FloatArray
+    blocks: FloatArray
     columns: ComplexArray
     kind: IntArray
 
     def part(self, speeds: Sequence[int], sensors: Sequence[int], planes: Sequence[int]) -> Noise:
-        """Of some speeds, sensors and planes."""
+        """The noise of some speeds, sensors and planes."""
         chosen = [0, *(1 + p for p in planes)]
         real = [2 * k + part for k in chosen for part in (0, 1)]
         return Noise(
-            self.own[np.ix_((0, 1), speeds, sensors, real, real)],
+            self.blocks[np.ix_((0, 1), speeds, sensors, real, real)],
             self.columns[np.ix_(range(len(self.columns)), speeds, sensors, chosen)],
             self.kind,
         )
 
     def changed(self, change: ComplexArray) -> Noise:
-        """Of other combinations (m, P + 1), or (S, C, m, P + 1), of (Y₀, W)."""
+        """The noise of combinations (m, P + 1), or (S, C, m, P + 1), of (Y₀, W)."""
         real = stretch(change)
-        own = real @ self.own @ np.swapaxes(real, -1, -2)
-        return Noise(own, (change @ self.columns[..., None])[..., 0], self.kind)
+        blocks = real @ self.blocks @ np.swapaxes(real, -1, -2)
+        return Noise(blocks, (change @ self.columns[..., None])[..., 0], self.kind)
 
     def plus(self, other: Noise) -> Noise:
         """Together with an independent one."""
         columns = np.concatenate((self.columns, other.columns))
-        return Noise(self.own + other.own, columns, np.concatenate((self.kind, other.kind)))
+        return Noise(self.blocks + other.blocks, columns, np.concatenate((self.kind, other.kind)))
 
     def at(self, sizes: FloatArray) -> tuple[FloatArray, ComplexArray]:
         """Own covariances (S, C, 2P + 2, 2P + 2) and columns at sizes (6,) of the kinds."""
-        own = np.tensordot(sizes[:2] ** 2, self.own, axes=1)
-        return own, self.columns * sizes[self.kind][:, None, None, None]
+        blocks = np.tensordot(sizes[:2] ** 2, self.blocks, axes=1)
+        return blocks, self.columns * sizes[self.kind][:, None, None, None]
 
     def covariance(self, sizes: FloatArray) -> FloatArray:
-        """Of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
-        own, columns = self.at(sizes)
+        """Covariance of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
+        blocks, columns = self.at(sizes)
         F = real_parts(columns)
-        return np.asarray(own + np.einsum("mscp,mscq->scpq", F, F, optimize=True))
+        return np.asarray(blocks + np.einsum("mscp,mscq->scpq", F, F, optimize=True))
 
 
 def kind_sizes(run: RunErrors) -> FloatArray:
@@ -130,7 +130,7 @@ class Gaussian(Errors):
 
     Parameters
     ----------
-    own
+    blocks
         Covariance of (Re Y₀, Im Y₀, Re W₁, …) of each reading without the columns, (S, C, 2P + 2, 2P + 2);
         zero where nothing is known.
     columns
@@ -148,22 +148,22 @@ class Gaussian(Errors):
 
     def __new__(
         cls,
-        own: FloatArray,
+        blocks: FloatArray,
         columns: ComplexArray,
         reading: Reading,
         run: RunErrors,
         mounted: Mounted | None = None,
     ) -> Gaussian:
         """Normal errors of this covariance."""
-        noise = Noise(np.stack((own, 0 * own)), columns, np.full(len(columns), KNOWN))
+        noise = Noise(np.stack((blocks, 0 * blocks)), columns, np.full(len(columns), KNOWN))
         nothing = Mounted("", (), np.zeros(columns.shape[-1] - 1, dtype=complex))
         return super().__new__(cls, noise, reading, run, mounted or nothing)
 
     @classmethod
     def none(cls, S: int, C: int, P: int) -> Gaussian:
-        """Of coefficients (S, C, P) of which no errors are known."""
-        own = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-        return cls(own, np.zeros((0, S, C, P + 1), dtype=complex), Reading(), NO_RUN_ERRORS)
+        """Errors of coefficients (S, C, P) of which nothing is known."""
+        blocks = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
+        return cls(blocks, np.zeros((0, S, C, P + 1), dtype=complex), Reading(), NO_RUN_ERRORS)
 
 
 def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading, run: RunErrors) -> Noise:
@@ -186,7 +186,7 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
     G = np.broadcast_to(G, (S, C, n, R))
     B = stretch(G).reshape(S, C, 2 * n, R, 2)
     by_size = np.einsum("rsc,ij->rscij", own_variance(Y, run.evenly), np.eye(2))
-    own = [
+    blocks = [
         np.einsum("scark,rsckl,scbrl->scab", B, part, B, optimize=True)
         for part in (reading.covariance(trials), by_size)
     ]
@@ -194,18 +194,18 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
     common, loaded = (np.moveaxis(G, -1, 0) * part[..., None] for part in (Y, loads))
     c = unbalances(W, run.level or rms(Y))
     further = np.einsum("scnr,scp->rpscn", G, c).reshape(-1, S, C, n)
-    known = np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))
-    parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, known]
+    fixed = np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))
+    parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, fixed]
     kinds = (COMMON, COMMON, LOADS, LOADS, UNBALANCE, UNBALANCE, KNOWN)
-    return Noise(np.array(own), np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
+    return Noise(np.array(blocks), np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
 
 
 def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray]:
     """Errors (B, S, C, P + 1), block by block, at sizes (n, 6) of the draws; the same whatever the blocks."""
-    S, C = noise.own.shape[1:3]
+    S, C = noise.blocks.shape[1:3]
     step = max(1, BLOCK // (S * C))
     rngs = [np.random.default_rng([seed, part]) for part in (1, 2, 3)]
-    roots = [covariance_root(part, np.einsum("...ii->...i", part)) for part in noise.own]
+    roots = [covariance_root(part, np.einsum("...ii->...i", part)) for part in noise.blocks]
     for start in range(0, len(factors), step):
         f = factors[start : start + step]
         z = rngs[2].standard_normal((len(f), len(noise.kind))) * f[:, noise.kind]
@@ -220,15 +220,15 @@ def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray
 class Whitening:
     """V⁻¹ of a noise at some sizes: blocks of each sensor and speed, and columns in common.
 
-    V = L (1 + F Fᵀ) Lᵀ, `own` = L Lᵀ and F = U s Vᵀ, has the inverse root (1 + U (1/√(1 + s²) − 1) Uᵀ) L⁻¹.
+    V = L (1 + F Fᵀ) Lᵀ, `blocks` = L Lᵀ, F = U s Vᵀ, has the inverse root (1 + U (1/√(1 + s²) − 1) Uᵀ) L⁻¹.
     """
 
     def __init__(self, noise: Noise, sizes: FloatArray) -> None:
-        own, columns = noise.at(sizes)
-        n = own.shape[-1]
-        least = 1e-12 * (np.trace(own, axis1=-2, axis2=-1).max() or 1.0) / n
-        self.own: FloatArray = own + least * np.eye(n)
-        self._root = np.linalg.cholesky(self.own)
+        blocks, columns = noise.at(sizes)
+        n = blocks.shape[-1]
+        least = 1e-12 * (np.trace(blocks, axis1=-2, axis2=-1).max() or 1.0) / n
+        self.blocks: FloatArray = blocks + least * np.eye(n)
+        self._root = np.linalg.cholesky(self.blocks)
         F = self._alone(np.moveaxis(real_parts(columns), 0, -1))
         self._basis, size, _ = np.linalg.svd(F, full_matrices=False)
         self._less = 1 - 1 / np.hypot(1, size)
@@ -243,5 +243,5 @@ class Whitening:
         return np.asarray(w - self._basis @ (self._less[:, None] * (self._basis.T @ w)))
 
     def chi_square(self, difference: ComplexArray) -> float:
-        """Of differences (S, C, R)."""
+        """χ² of differences (S, C, R)."""
         return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))

@@ -180,7 +180,7 @@ class PlaneVectors:
         """About `count` vectors near z, the nearest first, of so many pieces or (None) of any number."""
         from scipy.spatial import cKDTree
 
-        found = []
+        nearest = []
         most, everything = self.most if number is None else number, 2 * (abs(z) + self.reach)
         apart = 0.0 if number is None else 2 * everything  # another number is far away
         for where, halves in zip(self.parts, self.halves, strict=True):
@@ -209,8 +209,8 @@ class PlaneVectors:
                 asked *= 8  # the limits leave few of many
             put = np.zeros((len(kept), len(self.holes.angles), len(self.sizes)), dtype=np.int64)
             put[:, where] = self.contents[np.column_stack((first.picks[i[kept]], second.picks[j[kept]]))]
-            found.append((d[kept], used[kept], put))
-        d, used, put = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            nearest.append((d[kept], used[kept], put))
+        d, used, put = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
         order = np.lexsort((used @ self.sizes, _number(used), np.rint(np.abs(d - z) / (SAME * self.reach))))[
             :count
         ]
@@ -259,7 +259,7 @@ class PlaneVectors:
 
 
 def _few(half: _Half, most: int) -> _Half:
-    """Of so many pieces at most."""
+    """The sums of a half that take so many pieces at most."""
     kept = _number(half.used) <= most
     return _Half(half.sums[kept], half.used[kept], half.picks[kept])
 
@@ -290,7 +290,7 @@ def _contents(K: int, most: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Discrete:
-    """What is mounted in all planes.
+    """Pieces chosen for all planes together.
 
     Attributes
     ----------
@@ -378,15 +378,15 @@ def solve_discrete(
     fixed = [p for p in np.argsort(np.linalg.norm(W, axis=0)) if not sets[p].any_weight]
     free = [p for p in range(P) if p not in fixed]
     # planes of any weight cancel what they can of what the others leave
-    known = np.column_stack((W[:, fixed], Y))
-    follow = _optimum(guides[-1], W[:, free], known)
-    known = known + W[:, free] @ follow
+    system = np.column_stack((W[:, fixed], Y))
+    follow = _optimum(guides[-1], W[:, free], system)
+    system = system + W[:, free] @ follow
     lists = [(sets[p], sets[p].listed(complex(z[p]))) for p in fixed]
-    leaves = [_leaves(np.sqrt(guide)[:, None] * known, lists) for guide in guides]
+    leaves = [_leaves(np.sqrt(guide)[:, None] * system, lists) for guide in guides]
     rows, D, number = (np.concatenate(parts) for parts in zip(*leaves, strict=True))
     value = np.zeros(len(D))
     for part in np.array_split(np.arange(len(D)), 1 + len(D) * N // _PAIRS):
-        left = np.abs(known[:, -1] + D[part] @ known[:, :-1].T)
+        left = np.abs(system[:, -1] + D[part] @ system[:, :-1].T)
         size = (left * w).max(axis=1) if method == "minmax" else np.linalg.norm(left * w, axis=1)
         value[part] = np.where((left <= limits.residual.ravel() * KEPT).all(axis=1), size, np.inf)
     kept = np.flatnonzero(value < np.inf)
@@ -414,12 +414,12 @@ def solve_discrete(
 
 
 def _leaves(
-    known: ComplexArray, lists: Sequence[tuple[PlaneVectors, Vectors]]
+    system: ComplexArray, lists: Sequence[tuple[PlaneVectors, Vectors]]
 ) -> tuple[IntArray, ComplexArray, FloatArray]:
-    """Choices with the least |A D + b|² for every number, [A b] known: rows of the lists, D, number."""
+    """Choices with the least |A D + b|² for every number, `system` = [A b]: rows of the lists, D, number."""
     P = len(lists)
-    little = 1e-12 * (np.abs(known).max() or 1.0) * np.eye(P, P + 1)  # for full rank
-    R = np.asarray(np.linalg.qr(np.vstack((known, little)), mode="r"))
+    little = 1e-12 * (np.abs(system).max() or 1.0) * np.eye(P, P + 1)  # for full rank
+    R = np.asarray(np.linalg.qr(np.vstack((system, little)), mode="r"))
     rows, D = np.zeros((1, P), dtype=int), np.zeros((1, P), dtype=complex)
     number, cost = np.zeros(1), np.zeros(1)
     for k in range(P - 1, -1, -1):
@@ -454,7 +454,7 @@ def _guides(
 def _planes(
     named: Mapping[Any, Holes | None], limits: Limits, exact: ComplexArray, heavier: float
 ) -> list[PlaneVectors]:
-    """What each plane can take."""
+    """Vectors that each plane can take, with its limits."""
     sets = []
     for (name, holes), arcs, largest, d in zip(
         named.items(), limits.forbidden, limits.max_weight, exact, strict=True

@@ -21,11 +21,10 @@ from balancing.conventions import Labels
 from balancing.influence import Influence, match_speeds
 from balancing.tables import rms, three_figures, weight_rows
 from balancing.trials import Trials
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, rows, text
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.choices import did_you_mean
 from rotorid.base.json import plain
-from rotorid.base.result import Column, rows, text
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.regression import RCOND, gain
 
@@ -292,7 +291,7 @@ def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) ->
 
 
 def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
-    """Where the chosen planes stand.
+    """Indices of the chosen planes.
 
     Raises
     ------

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from balancing.conventions import Labels
 from balancing.errors import Reading, RunErrors
 from balancing.errors import rms as rms
+from rotorid.base.answer import Column, rows
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column, rows
-from rotorid.base.rpm import RPM, rpm
-from rotorid.base.text import figures
+from rotorid.base.text import RPM, figures, rpm
 
 ROUNDING = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
@@ -44,7 +43,7 @@ def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) ->
 
 
 def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
-    """The same as JSON rows."""
+    """Weights of the planes as JSON rows."""
     return rows(weight_columns(labels, planes, weights))
 
 
@@ -135,8 +134,8 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
         parts[f"{100 * e.amplitude:.3g} % of the amplitude"] = e.amplitude
         parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
         parts[labels.amplitude_words(e.floor)] = e.floor
-    known = ", ".join(words for words, size in parts.items() if size) or "not known"
-    out = f"One standard deviation of a reading: {known} ({reading.source})"
+    stated = ", ".join(words for words, size in parts.items() if size) or "not known"
+    out = f"One standard deviation of a reading: {stated} ({reading.source})"
     what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
     sizes = zip(run.typical, what, strict=True)
     between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)
@@ -145,7 +144,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
-    """The same in numbers; amplitudes in the job's unit."""
+    """Errors of a reading and between runs in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
     alone, common, effect, further = run.typical
     whole, level = float(np.linalg.norm(run.typical)), run.level * scale

@@ -35,12 +35,11 @@ import numpy as np
 from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm
-from rotorid.base.words import Quantity as Quantity
+from rotorid.base.text import Quantity as Quantity
+from rotorid.base.text import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

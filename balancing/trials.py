@@ -10,8 +10,8 @@ import numpy as np
 
 from balancing.conventions import Labels
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
-from rotorid.base.complex_numbers import off_axis as off_axis
-from rotorid.base.rpm import RPM
+from rotorid.base.arrays import off_axis as off_axis
+from rotorid.base.text import RPM
 
 Arc = tuple[float, float]
 """First angle and width, rad, with the rotation; 0 < width ≤ 2π."""
@@ -244,7 +244,7 @@ class Limits:
         )
 
     def pick(self, speeds: Sequence[int], planes: Sequence[int]) -> Limits:
-        """Those of some speeds and planes, by index."""
+        """Limits of some speeds and planes, by index."""
         return Limits(
             self.max_weight[list(planes)],
             self.residual[list(speeds)],

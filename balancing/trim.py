@@ -17,10 +17,9 @@ from balancing.influence import match_speeds
 from balancing.mount import Mounted
 from balancing.tables import rms, small, three_figures, weight_rows
 from balancing.trials import Trials
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
 from rotorid.base.text import capital, figures
 
 WORTH = 0.9

@@ -29,11 +29,10 @@ from balancing.influence import Influence
 from balancing.regions import NORMAL_RADIUS, real_parts
 from balancing.tables import weight_columns
 from balancing.trials import Trials, check_names
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.choices import Method, find
 from rotorid.base.json import plain
-from rotorid.base.registry import Method, find
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, figures, listing
 from rotorid.regression import RCOND
 

@@ -32,9 +32,7 @@ from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import rpm
-from rotorid.base.text import capital, counted
-from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
+from rotorid.base.text import capital, counted, rpm, vibration_unit_words, weight_unit_words
 
 Kind = Literal["plane", "bearing", "sensor"]
 Word = Literal["pass", "fail", "not decidable"]
@@ -73,7 +71,7 @@ class Judgement:
 
     @property
     def size(self) -> float:
-        """Of the estimate."""
+        """Size of the estimate."""
         return abs(self.value)
 
     @property

@@ -46,7 +46,7 @@ def main(samples: int = 10_000, runs: int = 0) -> None:
         timed("two workers", 2)
         cluster = LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
         with cluster, Client(cluster) as client:
-            client.run(lambda: __import__("rotorid.study.drawn_machine"))
+            client.run(lambda: __import__("rotorid.study.samples"))
             timed("Dask", 2, executor=client.get_executor())
         print(f"Dask takes {seconds['Dask'] / seconds['two workers']:.2f} times what two own workers do")
 

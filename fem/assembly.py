@@ -314,7 +314,7 @@ class Reduced:
 
     @property
     def size(self) -> int:
-        """R."""
+        """Number of unknowns, R."""
         return len(self.M)
 
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
@@ -359,11 +359,11 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     matrices[:, : p * d, : p * d] = planes.reshape(5, p * d, p * d)
     matrices[:3, feet, feet] = P.feet.reshape(3, -1)
     # What a support feels: motion of its node against the ground or the foot, in each plane.
-    felt = np.zeros((len(P.rows), p, p * (d + f)))
+    relative = np.zeros((len(P.rows), p, p * (d + f)))
     for plane, unknowns in enumerate(feet.reshape(p, f)):
-        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.pedestals, plane, unknowns] = -1.0
-    ties = np.einsum("sia,sjb->sijab", felt, felt)
+        relative[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
+        relative[P.pedestals, plane, unknowns] = -1.0
+    ties = np.einsum("sia,sjb->sijab", relative, relative)
     (M, D0, K0), (D1, K1) = matrices[:3].real, matrices[3:]
     return Reduced(P, basis, M, D0, D1, K0, K1, ties)
 

@@ -40,12 +40,18 @@ from fem.whirl import (
     solve_whirl,
     whirling,
 )
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import checked_speeds, whole
+from rotorid.base.arrays import (
+    AnyArray,
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    IndexArray,
+    checked_speeds,
+    whole,
+)
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, listing
+from rotorid.base.text import RPM, counted, listing, range_text
 
 HEAVY = 1.28
 """Logarithmic decrement at an amplification factor of 2.5: critically damped after API 684, no peak."""
@@ -408,7 +414,7 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
 
 
 def _cut(paths: _Paths) -> str:
-    """What to say where modes that are not listed have critical speeds in the range, or may have."""
+    """A warning where modes that are not listed have critical speeds in the range, or may have."""
     speeds, lam = paths.speeds, paths.others
     f = np.where(decrements_of(lam) <= _SWINGS, off_synchronous(lam, speeds), np.nan)
     computed = np.fmax.reduce(np.abs(np.hstack((paths.values, lam)).imag), axis=1)
@@ -422,7 +428,7 @@ def _cut(paths: _Paths) -> str:
 
 
 def _warnings(paths: _Paths, n: int, gone: BoolArray) -> tuple[str, ...]:
-    """What the modes listed are not; `gone`, shape (S, n): where they do not oscillate."""
+    """Warnings of the modes listed; `gone`, shape (S, n): where they do not oscillate."""
     texts = [
         f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {column.sum()} of "
         f"{column.size} speeds"

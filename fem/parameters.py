@@ -15,10 +15,8 @@ from typing import Any
 import numpy as np
 
 from fem.rotor import KINDS, Pedestal, Rotor, is_reading
-from rotorid.base.arrays import AnyArray, FloatArray
-from rotorid.base.checks import number
-from rotorid.base.registry import names
-from rotorid.base.suggestions import one_of
+from rotorid.base.arrays import AnyArray, FloatArray, number
+from rotorid.base.choices import names, one_of
 
 _TABLED = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
 _STAND = ("pedestal_mass", *(f"pedestal_{name}_{axis}" for name in ("stiffness", "damping") for axis in "xy"))

@@ -30,9 +30,8 @@ from fem.rotor import SensorLike
 from fem.undamped import critical_speeds_below
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import listing
+from rotorid.base.text import RPM, listing, rpm_text
 
 UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
 LARGEST_MARGINS = (16.0, 26.0)  # percent: margins that are enough whatever the amplification, below and above
@@ -147,7 +146,7 @@ class Peaks(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is missing of each peak."""
+        """Why peaks have no amplification factor, a sentence each."""
         return tuple(f"{rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note)
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,7 +164,7 @@ class Peaks(Result):
         return (Table("peaks", peak_columns(self.peaks)),)
 
     def sentence(self) -> str:
-        """Where they are."""
+        """Speeds of the peaks, in one sentence."""
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
         return f"peaks at {where}" if where else "no peak in this range of speeds"
 

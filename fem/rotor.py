@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike
 
 from fem.forces import NodeForce, check_numbers, code_of
 from fem.result import holding_arrays
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, read_only
-from rotorid.base.checks import attachment, number, whole
-from rotorid.base.registry import Method, find
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, attachment, number, read_only, whole
+from rotorid.base.choices import Method, did_you_mean, find
 from rotorid.base.text import counted
 
 STEEL_MODULUS = 2.1e11
@@ -595,7 +593,7 @@ class Rotor:
 
     @property
     def linear(self) -> Rotor:
-        """The same without any of its forces, internal damping included."""
+        """The rotor without any of its forces, internal damping included."""
         return replace(self, forces=()) if self.forces else self
 
     @property
@@ -721,7 +719,7 @@ def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
 
 
 def label(sensor: SensorLike) -> str | int:
-    """How a table names it: as given, or "5 at 45°".
+    """Name of a sensor in tables: as given, or "5 at 45°".
 
     Parameters
     ----------

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, Support
 from fem.undamped import lowest_critical_speeds
-from rotorid.base.arrays import FloatArray
-from rotorid.base.checks import whole
+from rotorid.base.arrays import FloatArray, whole
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM
 
 
 @holding_arrays
@@ -62,7 +61,7 @@ class SpeedMap(Result):
         return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
 
     def sentence(self) -> str:
-        """What the map is of."""
+        """Range of stiffness and number of critical speeds, in one sentence."""
         return (
             f"Map of critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m."
         )

@@ -16,8 +16,7 @@ import numpy as np
 from fem.assembly import Planes, WholeBand, both_planes, free_motions, multiply, rounding_error
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
-from rotorid.base.arrays import FloatArray
-from rotorid.base.checks import number
+from rotorid.base.arrays import FloatArray, number
 from rotorid.base.tables import Column, Table
 
 GRAVITY = 9.80665  # m/s²

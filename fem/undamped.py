@@ -39,12 +39,10 @@ from fem.elements import strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import NORMAL_95, Result, holding_arrays
 from fem.rotor import Pedestal, Rotor, refined
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import whole
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, whole
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, error_figures, listing, percent
+from rotorid.base.text import RPM, counted, error_figures, listing, percent
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
@@ -636,7 +634,7 @@ class Spectrum:
     pencil: Pencil
 
     def only(self, which: slice | IndexArray) -> Spectrum:
-        """Some modes."""
+        """The spectrum of some of the modes."""
         squares, rounding = self.squares[which], self.rounding[which]
         return replace(self, squares=squares, vectors=self.vectors[:, which], rounding=rounding)
 

@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from rotorid.regression import stack as stack
     from rotorid.regression import stretch as stretch
     from rotorid.regression import unstretch as unstretch
+    from rotorid.regression.estimate import Combination as Combination
     from rotorid.regression.estimate import Estimate as Estimate
-    from rotorid.regression.undetermined_combinations import Combination as Combination
 
 __version__ = "0.1.0"
 

@@ -103,7 +103,7 @@ SLOW_FIRST = (
     "rotorid/worksheet/test_worksheet_page.py",
     "rotorid/worksheet/test_worksheet_server.py",
     "rotorid/report/test_rotor.py",
-    "fem/test_response_supports.py",
+    "fem/test_response.py",
     "fuzz/test_mutants.py",
     "fem/test_campbell.py",
 )

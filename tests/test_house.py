@@ -5,6 +5,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import dialect
 import house
 import pytest
 from option_pairs import options_of_commands
@@ -17,6 +18,8 @@ PAIRS, NAMES, SCREEN = 230, 102, 25
 """Commands with options, without --help, and of one command: at most so many."""
 EXEMPT = 16
 """Functions that may be longer or take more than ruff's limits: at most so many."""
+DIALECT = 111
+"""Bindings named `said`, `told`, `found`, `own`, `known` or `felt`: at most so many, 50 in the end."""
 
 
 def modules():
@@ -40,6 +43,25 @@ def test_no_ceiling_in_force_is_exceeded():
 
 def test_every_package_stands_in_a_row():
     assert house.in_no_row() == []
+
+
+def test_names_say_what_they_hold():
+    places = dialect.bindings()
+    assert len(places) <= DIALECT, places
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("found = 1\nself.own = [known for known in b]\nfor told, _ in x: pass", 4),
+        ("def f(said, *, felt=1): found(own=2, known=said)", 2),
+        ("class A:\n    _known: int\n    unknown = found_later = 1", 1),
+    ],
+)
+def test_bindings_of_the_dialect_are_counted(tmp_path, text, count):
+    (tmp_path / "fem").mkdir()
+    (tmp_path / "fem" / "a.py").write_text(text, encoding="utf-8")
+    assert len(dialect.bindings(tmp_path, ("fem",))) == count
 
 
 def test_units_are_what_a_reader_reads():
@@ -123,7 +145,7 @@ def test_every_package_says_what_it_is_for():
     "pattern",
     [
         r"^\s*\w+ = NDArray\[",  # array types: rotorid.base.arrays
-        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.rpm
+        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.text
         r"float\(\w+\) if (np|math)\.isfinite\(\w+\) else None",  # JSON: rotorid.base.json
     ],
 )

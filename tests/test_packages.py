@@ -40,7 +40,7 @@ def test_the_command_line_starts_without_numerics():
 
 
 def test_only_what_moves_loads_the_compiler():
-    code = "import sys, fem, rotorid.commands.critical, rotorid.files.schema; print('numba' in sys.modules)"
+    code = "import sys, fem, rotorid.commands.critical, rotorid.files.rotor; print('numba' in sys.modules)"
     assert run_python(code) == "False\n"
 
 
@@ -53,6 +53,16 @@ def test_every_public_name_exists_and_is_documented(package):
             f"{package.__name__}.{name} has no docstring"
         )
         assert name in dir(package)
+
+
+def test_no_public_name_means_two_things():
+    values = {}
+    for package in (fem, balancing, rotorid):
+        for name in package.__all__:
+            assert name == "__version__" or name not in values, (
+                f"{package.__name__} and {values[name]}: {name}"
+            )
+            values[name] = package.__name__
 
 
 def test_an_unknown_name_is_an_attribute_error():

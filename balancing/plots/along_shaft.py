@@ -96,24 +96,24 @@ def _bars(
     return ax, order
 
 
-def draw_unbalance(found: Unbalance, ax: Axes | None = None) -> Axes:
+def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     """Draw the vector of each station with its 95 % region where it is determined; else grey.
 
     All have the scale of the vertical axis, 0° is to the right, and the rotor is seen from the end from which
     it turns counter-clockwise, or from the one that the job states.
     """
-    labels, Q = found.labels, len(found.stations)
-    sizes, angles = labels.weight(found.unbalance)
-    edges = np.repeat(found.unbalance[:, None], 91, axis=1)
-    for q in np.flatnonzero(found.determined & np.isfinite(found.covariance).all()):
-        block = found.covariance[2 * q : 2 * q + 2, 2 * q : 2 * q + 2]
-        edges[q] = region_edge(found.unbalance[q], block, 91)
-    tips, edges = (on_paper(labels, each * labels.weight_scale) for each in (found.unbalance, edges))
+    labels, Q = estimate.labels, len(estimate.stations)
+    sizes, angles = labels.weight(estimate.unbalance)
+    edges = np.repeat(estimate.unbalance[:, None], 91, axis=1)
+    for q in np.flatnonzero(estimate.determined & np.isfinite(estimate.covariance).all()):
+        block = estimate.covariance[2 * q : 2 * q + 2, 2 * q : 2 * q + 2]
+        edges[q] = region_edge(estimate.unbalance[q], block, 91)
+    tips, edges = (on_paper(labels, each * labels.weight_scale) for each in (estimate.unbalance, edges))
     longest = np.abs(edges).max() or 1.0
     places = np.arange(Q) * 2.6 * longest * min(1.0, 8 / Q)
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
     ax.axhline(0, color="0.8", lw=4, zorder=0)
-    arrows(ax, places, tips, np.where(found.determined, BLUE, "0.6"))
+    arrows(ax, places, tips, np.where(estimate.determined, BLUE, "0.6"))
     ax.plot(places + edges.real.T, edges.imag.T, color="black", lw=1)
     ax.set_title("blue: determined, with 95 % regions; grey: not determined by the readings", fontsize=TEXT)
     plain(ax)
@@ -121,7 +121,7 @@ def draw_unbalance(found: Unbalance, ax: Axes | None = None) -> Axes:
     ax.set(aspect="equal", xlim=ends, ylim=(-1.15 * longest, 1.15 * longest))
     ax.set_ylabel(f"unbalance, {labels.weight_in}")
     ax.set_xlabel(f"stations in their order, {labels.weight_in}; {turning(labels)}", fontsize=TEXT)
-    each = zip(found.stations, sizes, angles, strict=True)
+    each = zip(estimate.stations, sizes, angles, strict=True)
     between = "\n" if Q <= 8 else "  "
     words = [between.join((name, figures(size, 3), f"{angle:.0f}°")) for name, size, angle in each]
     ax.set_xticks(places, words, rotation=90 * (Q > 8))

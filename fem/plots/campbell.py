@@ -30,7 +30,7 @@ from rotorid.base.plot_style import (
     shade_operating,
     shade_unstable,
 )
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

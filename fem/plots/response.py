@@ -35,8 +35,7 @@ from rotorid.base.plot_style import (
     shade_operating,
     shade_unstable,
 )
-from rotorid.base.rpm import RPM
-from rotorid.base.unit_words import Shown
+from rotorid.base.text import RPM, Shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

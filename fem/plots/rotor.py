@@ -21,7 +21,7 @@ from rotorid.base.plot_style import (
     new_axes,
     note,
 )
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

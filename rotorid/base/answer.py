@@ -18,6 +18,20 @@ left 3 g at 20°
 Warning: the weight in plane 'A' is small
 <BLANKLINE>
 Every sensor: --table.
+
+Its tables are tuples of `Column`, of which `rows`, `frame` and `text` make JSON, a DataFrame and text:
+
+>>> columns = (
+...     Column("mode", [1, 2], str),
+...     Column("speed_rpm", [2980.5, float("nan")], "{:.1f}".format, "rpm"),
+...     Column("whirl", ["forward", "mixed"]),
+... )
+>>> rows(columns)[0]
+{'mode': 1, 'speed_rpm': 2980.5, 'whirl': 'forward'}
+>>> print(text(columns))
+  mode         rpm
+  1         2980.5
+  2
 """
 
 from __future__ import annotations
@@ -25,10 +39,16 @@ from __future__ import annotations
 import re
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
 
-from rotorid.base.text import capital, counted, cut
+from rotorid.base.json import cell
+from rotorid.base.text import WIDTH, capital, counted, cut, table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LINES, COLUMNS = 12, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
@@ -45,8 +65,8 @@ class Answer:
     Attributes
     ----------
     judgement
-        What to do, or what was found, in a sentence or two.
-    found
+        What to do, or what the data say, in a sentence or two.
+    numbers
         The answer with its errors, and the few numbers that matter: lines of at most `COLUMNS` columns.
     warnings, notes
         Clauses without "Warning: " and "Note: ", the worst first.
@@ -55,13 +75,13 @@ class Answer:
     more
         What these show, in words.
     short
-        Whether `found` is a short form of the first of these, which the whole text leaves out.
+        Whether `numbers` is a short form of the first of these, which the whole text leaves out.
     to_mount
-        Whether the first block of `found` is what to mount, which is shown whatever the room is.
+        Whether the first block of `numbers` is what to mount, which is shown whatever the room is.
     """
 
     judgement: str
-    found: str = ""
+    numbers: str = ""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     tables: tuple[str, ...] = ()
@@ -74,27 +94,38 @@ class Answer:
 
         Remarks of a kind are the same words with other names or numbers.
         """
-        head = _wrapped(self.judgement.splitlines())
-        remarks = [_remark("Warning", one) for one in kinds(self.warnings)]
-        remarks += [_remark("Note", one) for one in kinds(self.notes)]
+        head, remarks = _wrapped(self.judgement), self._remarks(kinds)
         room = lines - len(head) - 3 - bool(remarks)  # blank lines, and where the rest is
-        remark = max(map(len, remarks[:1]), default=0)
-        most = len(self.found) if self.to_mount else lines - len(head) - remark - 1
-        found, hidden = _first(_wrapped(self.found.splitlines()), room - remark, most)
-        told, untold = _fitting(remarks, room - len(found))
+        first = len(remarks[0]) if remarks else 0
+        most = len(self.numbers) if self.to_mount else lines - len(head) - first - 1
+        numbers, hidden = _shortened(_wrapped(self.numbers), room - first, most)
+        fitting = sum(end <= room - len(numbers) for end in accumulate(map(len, remarks)))
+        shown = remarks[: max(fitting, 1)]
         more = self.more if len(self.more) < COLUMNS // 2 else "the tables"
-        left = [hidden, counted(untold, "more remark") if untold else "", more if self.tables else ""]
-        rest = cut(capital("; ".join(part for part in left if part)), COLUMNS - len(": --table."))
-        return _joined(head, found, told, [f"{rest}: --table."] if rest else [])
+        rest = [
+            counted(hidden, "more line") if hidden else "",
+            counted(others, "more remark") if (others := len(remarks) - len(shown)) else "",
+            more if self.tables else "",
+        ]
+        where = cut(capital("; ".join(filter(None, rest))), COLUMNS - len(": --table."))
+        blocks = (
+            head,
+            numbers,
+            [line for remark in shown for line in remark],
+            [f"{where}: --table."] if where else [],
+        )
+        return "\n\n".join("\n".join(block) for block in blocks if block)
 
     def whole(self) -> str:
         """Everything."""
-        remarks = [_remark("Warning", each) for each in self.warnings]
-        remarks += [_remark("Note", each) for each in self.notes]
-        head = (self.judgement,) if self.short else (self.judgement, self.found)
-        first = (_wrapped(part.splitlines()) for part in head)
-        parts = (*map("\n".join, [*first, *remarks]), *self.tables)
-        return "\n\n".join(part for part in parts if part)
+        head = [self.judgement] if self.short else [self.judgement, self.numbers]
+        lines = [*map(_wrapped, head), *self._remarks(tuple)]
+        return "\n\n".join(filter(None, (*map("\n".join, lines), *self.tables)))
+
+    def _remarks(self, chosen: Callable[[Iterable[str]], Iterable[str]]) -> list[list[str]]:
+        """Lines of the chosen warnings, then of notes."""
+        each = (("Warning", self.warnings), ("Note", self.notes))
+        return [_wrapped(f"{word}: {clause}") for word, clauses in each for clause in chosen(clauses)]
 
 
 class Answered(ABC):
@@ -115,10 +146,10 @@ def together(answers: Iterable[Answer]) -> Answer:
     each = list(answers)
     return Answer(
         "\n".join(one.judgement for one in each if one.judgement),
-        "\n\n".join(one.found for one in each if one.found),
+        "\n\n".join(one.numbers for one in each if one.numbers),
         tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
         tuple(dict.fromkeys(note for one in each for note in one.notes)),
-        tuple(table for one in each for table in one.tables),
+        tuple(block for one in each for block in one.tables),
         "; ".join(dict.fromkeys(one.more for one in each if one.tables)),
         to_mount=any(one.to_mount for one in each),
     )
@@ -132,10 +163,10 @@ def kinds(clauses: Iterable[str]) -> list[str]:
     >>> kinds(["line 3: no mass", "line 5: no mass", "no weight", "line 3: no mass"])
     ['line 3: no mass', 'no weight']
     """
-    found: dict[str, list[str]] = {}
+    alike: dict[str, list[str]] = {}
     for clause in dict.fromkeys(clauses):
-        found.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
-    return [_worst(same).rstrip(".") for same in found.values()]
+        alike.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
+    return [_worst(same).rstrip(".") for same in alike.values()]
 
 
 def _worst(same: list[str]) -> str:
@@ -144,43 +175,72 @@ def _worst(same: list[str]) -> str:
     worst, most = same[0], 1.0
     for column in zip(*each, strict=False):
         sizes = [max(abs(float(number)), 1e-300) ** (-1 if less else 1) for less, number in column]
-        if max(sizes) / min(sizes) > most:
-            worst, most = same[sizes.index(max(sizes))], max(sizes) / min(sizes)
+        if (ratio := max(sizes) / min(sizes)) > most:
+            worst, most = same[sizes.index(max(sizes))], ratio
     return worst
 
 
-def _remark(word: str, clause: str) -> list[str]:
-    return _wrapped([f"{word}: {clause}"])
-
-
-def _wrapped(lines: Iterable[str]) -> list[str]:
+def _wrapped(words: str) -> list[str]:
     """Lines of at most `COLUMNS`; a sign stays beside its number."""
-    kept = (_SIGN.sub(_KEPT, line) for line in lines)
-    parts = [part for line in kept for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+    parts: list[str] = []
+    for line in words.splitlines():
+        parts += textwrap.wrap(_SIGN.sub(_KEPT, line), COLUMNS, subsequent_indent="  ") or [""]
     return [part.replace(_KEPT, " ") for part in parts]
 
 
-def _first(lines: list[str], room: int, most: int) -> tuple[list[str], str]:
-    """As many lines as there is room for, and words for the others.
+def _shortened(lines: list[str], room: int, most: int) -> tuple[list[str], int]:
+    """As many lines as there is room for, and how many others there are.
 
     A block that does not fit is left out whole, of the first at most so many lines are shown.
     """
     if len(lines) <= room:
-        return lines, ""
+        return lines, 0
     ends = [k for k, line in enumerate(lines) if not line] or [len(lines)]
-    shown = lines[: max([min(ends[0], max(room, most)), *(end for end in ends if end <= room)])]
-    return shown, counted(hidden, "more line") if (hidden := sum(map(bool, lines[len(shown) :]))) else ""
+    shown = max([min(ends[0], max(room, most)), *(end for end in ends if end <= room)])
+    return lines[:shown], sum(map(bool, lines[shown:]))
 
 
-def _fitting(remarks: Sequence[list[str]], room: int) -> tuple[list[str], int]:
-    """The first remarks that fit, at least one, and how many are left."""
-    told: list[str] = []
-    for k, remark in enumerate(remarks):
-        if k and len(told) + len(remark) > room:
-            return told, len(remarks) - k
-        told += remark
-    return told, 0
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name
+        With its unit, as files and frames have it.
+    values
+        One cell a row; NaN or None where there is nothing.
+    shown
+        A cell as text; None: the column is not printed.
+    title
+        Over the column in text, where that is not the name.
+    """
+
+    name: str
+    values: Collection[Any]
+    shown: Callable[[Any], str] | None = None
+    title: str | None = None
 
 
-def _joined(*blocks: Sequence[str]) -> str:
-    return "\n\n".join("\n".join(block) for block in blocks if block)
+def rows(columns: Sequence[Column]) -> list[dict[str, Any]]:
+    """One dict a row, of JSON types."""
+    names = [column.name for column in columns]
+    cells = (cell(column.values) for column in columns)
+    return [dict(zip(names, row, strict=True)) for row in zip(*cells, strict=True)]
+
+
+def frame(columns: Sequence[Column]) -> pd.DataFrame:
+    """The same as a DataFrame."""
+    import pandas as pd
+
+    return pd.DataFrame({column.name: column.values for column in columns})
+
+
+def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
+    """The columns that are printed, all but the first `left` aligned to the right; nothing stays blank."""
+    printed = []
+    for each in columns:
+        if (shown := each.shown) is not None:
+            cells = ["" if value is None or value != value else shown(value) for value in each.values]
+            printed.append([each.name if each.title is None else each.title, *cells])
+    return table([list(row) for row in zip(*printed, strict=True)], left, width)

@@ -1,14 +1,19 @@
-"""Values as JSON types: arrays and tuples become lists, what is not finite becomes null."""
+"""Documents: values as JSON types, the version of their keys, and their date."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
+
+SCHEMA_VERSION = 1
+"""Grows when a key or column goes or means something else, not when one is added: see docs/stability.md."""
 
 
 def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """A document of arrays, tuples and numbers, to any depth, as JSON has it.
+    """A document of arrays, tuples and numbers, to any depth, as JSON has it; what is not finite is null.
 
     >>> import numpy as np
     >>> plain({"speed_rpm": (3000.0, float("inf")), "stable": np.array([True]), "plane": {"A": 1}})
@@ -26,3 +31,18 @@ def cell(value: Any) -> Any:  # noqa: ANN401  whatever a result holds
     if isinstance(value, Mapping):
         return plain(value)
     return [cell(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def now() -> datetime:
+    """The date for what is written, in UTC: that of SOURCE_DATE_EPOCH where it is set, so that bytes repeat.
+
+    Raises
+    ------
+    ValueError
+        Where the variable is no number of seconds.
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    try:
+        return datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now(UTC)
+    except (ValueError, OverflowError, OSError):
+        raise ValueError(f"SOURCE_DATE_EPOCH takes whole seconds since 1970, not {epoch!r}") from None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,15 +39,6 @@ def new_axes(size: tuple[float, float] = (WIDTH, 4.2), **options: Any) -> Axes: 
 
     _, ax = plt.subplots(figsize=size, layout="constrained", subplot_kw=options)
     return ax
-
-
-def new_pair(height: float, ratios: tuple[int, int] = (3, 2)) -> tuple[Axes, Axes]:
-    """Make axes above others with the same horizontal axis, of a new figure, height in inches."""
-    from matplotlib import pyplot as plt
-
-    size: dict[str, Any] = {"figsize": (WIDTH, height), "height_ratios": ratios}
-    _, (above, below) = plt.subplots(2, sharex=True, layout="constrained", **size)
-    return above, below
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:

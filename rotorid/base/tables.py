@@ -25,13 +25,11 @@ import re
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.json import cell
+from rotorid.base.json import SCHEMA_VERSION, cell, now
 from rotorid.base.text import WIDTH
 from rotorid.base.text import table as aligned
-from rotorid.base.versions import SCHEMA_VERSION, now
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +43,8 @@ NARROW, LETTERS = 6, 50
 """Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
 LONG, THINNED = 60, 13
 """Rows of a table that a page shows whole, and of a longer one so many."""
+OLDEST = (1980, 1, 1, 0, 0, 0)
+"""Date of a part of an archive."""
 NOTHING = "\N{EN DASH}"
 """In HTML, where nothing is known."""
 
@@ -153,9 +153,9 @@ def terminal(table: Table, width: int = WIDTH) -> str:
     """Aligned text: words and the first column to the left, other numbers to the right."""
     left = max([1, *(k for k, column in enumerate(table.columns, start=1) if column.words)])
     texts = [[column.heading, *column.texts] for column in table.columns]
-    for column, cells in list(zip(table.columns, texts, strict=True))[1:left]:
-        wide = 0 if column.words else max(map(len, cells))
-        cells[:] = [cell.rjust(wide) for cell in cells]
+    for k in range(1, left):
+        if not table.columns[k].words:
+            texts[k] = [text.rjust(max(map(len, texts[k]))) for text in texts[k]]
     return aligned([list(row) for row in zip(*texts, strict=True)], left, width)
 
 
@@ -165,75 +165,56 @@ def csv(table: Table) -> bytes:
 
 
 def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
-    """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there."""
+    """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there.
+
+    Its date and those of its parts are that of `now`.
+    """
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
-    from openpyxl.styles import Font
-    from openpyxl.utils import get_column_letter
+    from openpyxl.writer.excel import ExcelWriter
 
+    date = now().replace(tzinfo=None)
     if book is None:
         book = openpyxl.Workbook()
         book.remove(book.active)
-        book.properties.creator = "rotorid"
-        book.properties.created = now().replace(tzinfo=None)
+        book.properties.creator, book.properties.created = "rotorid", date
         book.custom_doc_props.append(IntProperty(name="schema_version", value=SCHEMA_VERSION))
-    book.properties.modified = now().replace(tzinfo=None)
     for sheet in book.worksheets:
         sheet.sheet_view.tabSelected = False
     first = len(book.sheetnames)
     for table in tables:
-        sheet = book.create_sheet(table.name[:LONGEST_TITLE])
-        above = [(f"# {line}",) for line in table.note.splitlines()]
-        for number, row in enumerate([*above, table.headings, *table.rows], start=1):
-            for place, value in enumerate(row, start=1):
-                written = sheet.cell(number, place)
-                if isinstance(value, str):
-                    written.value = one_line(value)
-                    written.data_type = "s"  # never a formula
-                elif isinstance(value, float):  # of which openpyxl would keep 16 digits
-                    written.value, written.data_type = repr(value), "n"
-                else:
-                    written.value = value
-        for place, heading in enumerate(table.headings, start=1):
-            sheet.cell(len(above) + 1, place).font = Font(bold=True)
-            sheet.column_dimensions[get_column_letter(place)].width = max(12, len(heading) + 2)
-        sheet.freeze_panes = f"A{len(above) + 2}"
+        _fill(book.create_sheet(table.name[:LONGEST_TITLE]), table)
     book.active = first
-    return workbook_bytes(book)
+    book.properties.modified = date
+    saved, dated = io.BytesIO(), io.BytesIO()
+    ExcelWriter(book, zipfile.ZipFile(saved, "w")).save()
+    with zipfile.ZipFile(saved) as parts, zipfile.ZipFile(dated, "w", zipfile.ZIP_DEFLATED) as archive:
+        for part in parts.namelist():
+            info = zipfile.ZipInfo(part, max(date.timetuple()[:6], OLDEST))
+            archive.writestr(info, parts.read(part), zipfile.ZIP_DEFLATED)
+    return dated.getvalue()
 
 
-def workbook_bytes(book: Any) -> bytes:  # noqa: ANN401
-    """A workbook as a file; no temporary files are made, which a full disk would break off."""
-    from openpyxl.drawing.spreadsheet_drawing import SpreadsheetDrawing
-    from openpyxl.worksheet._writer import WorksheetWriter
-    from openpyxl.writer.excel import ExcelWriter
+def _fill(sheet: Any, table: Table) -> None:  # noqa: ANN401
+    """Note, headings and rows of a table in a sheet."""
+    from openpyxl.styles import Font
+    from openpyxl.utils import get_column_letter
 
-    class InMemory(ExcelWriter):  # type: ignore[misc]  # openpyxl has no types
-        def write_worksheet(self, ws: Any) -> None:  # noqa: ANN401
-            ws._drawing, part = SpreadsheetDrawing(), io.BytesIO()
-            ws._drawing.charts, ws._drawing.images = ws._charts, ws._images
-            writer = WorksheetWriter(ws, part)
-            writer.write()
-            ws._rels = writer._rels
-            self._archive.writestr(ws.path[1:], part.getvalue())
-            self.manifest.append(ws)
-
-    stream = io.BytesIO()
-    InMemory(book, _Archive(stream, "w", zipfile.ZIP_DEFLATED)).save()
-    return stream.getvalue()
-
-
-_FIRST = datetime(1980, 1, 1, tzinfo=UTC)
-"""Date of an archive."""
-
-
-class _Archive(zipfile.ZipFile):
-    """Dates its parts as the workbook, not by the clock."""
-
-    def open(self, name: Any, mode: Any = "r", *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
-        if mode == "w":
-            name.date_time = max(now(), _FIRST).timetuple()[:6]
-        return super().open(name, mode, *args, **kwargs)
+    above = [(f"# {line}",) for line in table.note.splitlines()]
+    for number, row in enumerate([*above, table.headings, *table.rows], start=1):
+        for place, value in enumerate(row, start=1):
+            written = sheet.cell(number, place)
+            if isinstance(value, str):
+                written.value = one_line(value)
+                written.data_type = "s"  # never a formula
+            elif isinstance(value, float):  # of which openpyxl would keep 16 digits
+                written.value, written.data_type = repr(value), "n"
+            else:
+                written.value = value
+    for place, heading in enumerate(table.headings, start=1):
+        sheet.cell(len(above) + 1, place).font = Font(bold=True)
+        sheet.column_dimensions[get_column_letter(place)].width = max(12, len(heading) + 2)
+    sheet.freeze_panes = f"A{len(above) + 2}"
 
 
 def html(table: Table, longest: int = LONG) -> Markup:
@@ -245,32 +226,27 @@ def html(table: Table, longest: int = LONG) -> Markup:
 
     count = len(table.columns[0].values)
     rows = evenly(count, count if count <= longest else THINNED)
-    notes = [table.note, f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""]
-    words = " ".join(filter(None, notes))
-    heads, cells = [], []
+    heads, cells, letters = [], [], 0
     for column in table.columns:
-        kind = {} if column.words else {"class": "n"}
+        kind, texts = {} if column.words else {"class": "n"}, column.texts
+        letters += max(map(len, (column.heading, *texts)))
         heads.append(_tag("th", column.heading, kind))
         kind |= {"data-label": column.heading}
-        texts = column.texts
         cells.append([_tag("td", _number(column, row, texts[row] or NOTHING), kind) for row in rows])
-    letters = sum(max(map(len, (column.heading, *column.texts))) for column in table.columns)
-    wide = len(heads) > NARROW or letters > LETTERS
-    return _tag(
-        "table",
-        Markup("\n{}{}\n<tbody>\n{}\n</tbody>\n").format(
-            _tag("caption", table.name, {}) + "\n" if table.name else "",
-            _tag("thead", _tag("tr", Markup("").join(heads), {}), {}),
-            Markup("\n").join(_tag("tr", Markup("").join(row), {}) for row in zip(*cells, strict=True)),
-        ),
-        {"class": "blocks"} if wide else {},
-    ) + ("\n" + _tag("p", words, {"class": "note"}) if words else "")
+    body = Markup("\n").join(_tag("tr", Markup("").join(row)) for row in zip(*cells, strict=True))
+    head = _tag("thead", _tag("tr", Markup("").join(heads)))
+    caption = _tag("caption", table.name) + "\n" if table.name else ""
+    inner = Markup("\n{}{}\n<tbody>\n{}\n</tbody>\n").format(caption, head, body)
+    wide = {"class": "blocks"} if len(heads) > NARROW or letters > LETTERS else {}
+    thinned = f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""
+    words = " ".join(filter(None, (table.note, thinned)))
+    return _tag("table", inner, wide) + ("\n" + _tag("p", words, {"class": "note"}) if words else "")
 
 
-def _tag(name: str, content: str, attributes: Mapping[str, str]) -> Markup:
+def _tag(name: str, content: str, attributes: Mapping[str, str] | None = None) -> Markup:
     from markupsafe import Markup
 
-    each = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in attributes.items())
+    each = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in (attributes or {}).items())
     return Markup("<{0}{1}>{2}</{0}>").format(name, each, content)
 
 
@@ -309,7 +285,7 @@ def _csv_cell(value: Value) -> str:
         return "true" if value else "false"
     if isinstance(value, (int, float)):
         return repr(value)
-    text = "" if value is None else guarded(value)
+    text = guarded(value or "")
     # any sign that could separate columns: a reader looks for one in the header
     return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
 

@@ -1,14 +1,32 @@
-"""Numbers, lists and tables in words: text of 80 columns."""
+"""Numbers, quantities, lists and tables in words: text of 80 columns; units as people write them."""
 
 from __future__ import annotations
 
-import textwrap
+import math
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rotorid.base.arrays import FloatArray
+
+Phase = Literal["lead", "lag"]
+Angles = Literal["with rotation", "against rotation"]
+Rotation = Literal["clockwise", "counter-clockwise"]
+View = Literal["drive end", "free end"]
+Quantity = Literal["displacement", "velocity", "acceleration"]
 
 WIDTH = 80
 MOST_NAMES = 40
 ROUNDING = 1e-12
 """A share that is nothing but rounding."""
+RPM = 60 / math.tau  # of 1 rad/s
+SPEEDS = {"rpm": ("rpm", RPM), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
+"""Words and scales of speeds by the units of files."""
+_BASES = {"m_s": "m/s", "mm_s": "mm/s", "in_s": "in/s", "m_s2": "m/s²", "mm_s2": "mm/s²", "um": "µm"}
+_BASES |= {unit: unit for unit in ("m", "mm", "mil", "in", "g")}
 
 
 def percent(share: float) -> str:
@@ -50,11 +68,6 @@ def sentence(text: str) -> str:
     return capital(text) + ("" if text.endswith(".") else ".")
 
 
-def wrap(text: str, indent: str = "") -> str:
-    """The text in lines of 80 columns, all but the first indented."""
-    return textwrap.fill(text, WIDTH, subsequent_indent=indent)
-
-
 def cut(text: str, width: int) -> str:
     """The text, shortened to so many characters."""
     return text if len(text) <= width else text[: width - 1] + "…"
@@ -92,3 +105,71 @@ def table(rows: list[list[str]], left: int = 1, width: int = WIDTH) -> str:
         cells = [f"{x:<{widths[i]}}" if i < left else f"{x:>{widths[i]}}" for i, x in enumerate(cells)]
         lines.append(("  " + "  ".join(cells)).rstrip())
     return "\n".join(lines)
+
+
+def rpm(speed: float) -> float:
+    """Revolutions per minute to 12 digits: 3000 come back as 3000, not as 3000.0000000000005."""
+    return float(f"{speed * RPM:.12g}")
+
+
+def rpm_text(speed: float) -> str:
+    """A speed in rad/s as `2980.5 rpm`."""
+    return f"{speed * RPM:.6g} rpm"
+
+
+def speed_text(speed: float) -> str:
+    """A speed in both units, `312.114 rad/s = 2980.5 rpm`."""
+    return f"{speed:.6g} rad/s = {speed * RPM:.6g} rpm"
+
+
+def range_text(low: float, high: float) -> str:
+    """A range of speeds in both units, `1000 to 3000 rpm (104.72 to 314.159 rad/s)`."""
+    return f"{low * RPM:.6g} to {rpm_text(high)} ({low:.6g} to {high:.6g} rad/s)"
+
+
+def phase_deg(z: ArrayLike) -> FloatArray:
+    """Phases of complex numbers, 0 ≤ phase < 360 degrees."""
+    import numpy as np
+
+    phase = np.mod(np.degrees(np.angle(np.asarray(z))), 360.0)
+    return np.where(phase >= 360.0, 0.0, phase)  # −1e-20 modulo 360 is rounded to 360
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How people see a quantity: its number in SI times `scale`, and this unit or name of an axis."""
+
+    word: str
+    scale: float = 1.0
+
+
+def vibration_unit_words(unit: str) -> str:
+    """The unit of a reading; one that is only printed stays as it is.
+
+    >>> [vibration_unit_words(unit) for unit in ("um_pp", "mm_s_rms", "mm", "V", "")]
+    ['µm pp', 'mm/s rms', 'mm peak', 'V', '']
+    """
+    for suffix, word in (("_pp", "pp"), ("_rms", "rms"), ("", "peak")):
+        base = unit.removesuffix(suffix)
+        if unit.endswith(suffix) and base in _BASES:
+            return f"{_BASES[base]} {word}"
+    return unit
+
+
+def weight_unit_words(unit: str) -> str:
+    """The unit of a weight.
+
+    >>> weight_unit_words("g_mm"), weight_unit_words("g")
+    ('g·mm', 'g')
+    """
+    return unit.replace("_", "·")
+
+
+def speed_axis(name: str, unit: str) -> Shown:
+    """An axis of speeds or frequencies in rad/s, shown in the unit of a file.
+
+    >>> speed_axis("speed", "rpm").word
+    'speed, rpm'
+    """
+    word, scale = SPEEDS[unit]
+    return Shown(f"{name}, {word}", scale)

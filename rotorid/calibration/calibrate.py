@@ -26,9 +26,8 @@ from rotorid.calibration.readings import ReadingRows, RunReadings
 from rotorid.calibration.result import LEVEL, CalibratedRotor
 from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
 from rotorid.regression import solution
-from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares, search_from
 from rotorid.regression.prior import Prior, effect, prior_rows
-from rotorid.regression.search import search_from
 
 ASIDE = 0.7
 """Relative distance of the two side starts, along what the data see least."""
@@ -218,7 +217,7 @@ def _judged(
         unknowns=tuple(unknowns),
         fit=fit,
         covariance=covariance,
-        prior=effect(prior, K, r, theta, stated=True, at_bounds=fit.at_bounds),
+        prior=effect(prior, K, r, theta, at_bounds=fit.at_bounds),
         jacobian=K,
         chi_square=chi_square,
         dof=dof,

@@ -168,7 +168,7 @@ class RunReadings:
         reading, run = reading_of(trials), usual_run_errors(trials)
         noise = run_noise(trials, W[..., : len(self.nodes)], take.astype(complex), reading, run)
         least = NO_ERROR * float(np.abs(trials.mean).max())
-        noise.own[0] += np.kron(take @ take.T, np.eye(2)) * least**2
+        noise.blocks[0] += np.kron(take @ take.T, np.eye(2)) * least**2
         stated = "assumed" not in (reading.source, run.origin)
         return ReadingRows(self, take, noise, Whitening(noise, kind_sizes(run)), stated)
 
@@ -247,7 +247,7 @@ class ReadingRows:
     @property
     def variance(self) -> FloatArray:
         """Of single rows by errors that no other row shares, (S, x, C), in each direction."""
-        alone = np.einsum("scii->sci", self.whitening.own)
+        alone = np.einsum("scii->sci", self.whitening.blocks)
         return np.asarray(alone.reshape(*alone.shape[:2], -1, 2).mean(axis=3).swapaxes(1, 2))
 
     def spreads(self, W: ComplexArray) -> list[FloatArray]:

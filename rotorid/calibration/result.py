@@ -11,9 +11,9 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing, percent
 from rotorid.calibration.readings import RunReadings
 from rotorid.calibration.unknowns import Unknown
+from rotorid.regression.estimate import combination_words
 from rotorid.regression.nonlinear import NonlinearEstimate
 from rotorid.regression.prior import PriorEffect
-from rotorid.regression.undetermined_combinations import combination_words
 
 LEVEL = 0.01
 """Probability of as large a contradiction by chance, below which the model does not explain the data."""
@@ -105,7 +105,9 @@ class CalibratedRotor:
     @property
     def data_share(self) -> FloatArray:
         """How much of what is known of each number comes from the data, (n,): 1 without a prior."""
-        shares = {} if self.prior is None else dict(zip(self.prior.rows.own, self.prior.share, strict=True))
+        shares = (
+            {} if self.prior is None else dict(zip(self.prior.rows.parameters, self.prior.share, strict=True))
+        )
         return np.array([shares.get(name, 1.0) for name in self.names])
 
     @property

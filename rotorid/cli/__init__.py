@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rotorid.base.answer import COLUMNS
+from rotorid.base.choices import one_of
 from rotorid.cli.choices import Command, Commands, whole_paragraphs
 from rotorid.cli.demo import demo
 from rotorid.commands.app import json_text, run, typer_command, written_help
@@ -24,6 +25,14 @@ _JOBS = {
     "Identify coefficients": "identify fit simulate modes runup calibrate",
 }
 """Commands by what they are for, the chief one first."""
+SCHEMAS = {
+    "job": ("Job file of rotorid", "rotorid.files.job_models:JobSettings"),
+    "rotor": ("Rotor file of rotorid", "rotorid.files.rotor:RotorFile"),
+    "small": ("Small model for motion of rotorid", "rotorid.files.small_model:SmallModelFile"),
+    "study": ("Study file of rotorid", "rotorid.study.study_file:StudyKeys"),
+    "waveforms": ("Waveforms file of rotorid", "rotorid.files.waveforms:WaveformsFile"),
+}
+"""Files that `schema` knows: what each is, and its keys."""
 
 
 def worksheet(
@@ -60,18 +69,15 @@ def schema(
 
     Example: rotorid schema job
     """
-    from rotorid.files.schema import FILES
-    from rotorid.files.schema import schema as schema_of
-    from rotorid.study.study_file import StudyKeys
+    from rotorid.files.settings import settings_schema
 
-    FILES["study"] = ("Study file of rotorid", StudyKeys)
-
-    typer.echo(json_text(schema_of(kind)))
+    title, model = SCHEMAS[one_of(kind, "schema", list(SCHEMAS))]
+    typer.echo(json_text(settings_schema(resolve_name(model), title)))
 
 
 def _work_of(name: str) -> Callable[..., Any]:
     """The function of a command; its module is loaded here."""
-    home = {"study": "rotorid.study.studies", "fleet_fit": "rotorid.fleet.fit"}
+    home = {"study": "rotorid.study", "fleet_fit": "rotorid.fleet.fit"}
     work: Callable[..., Any] = resolve_name(f"{home.get(name, f'rotorid.commands.{name}')}:{name}")
     return work
 

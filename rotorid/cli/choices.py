@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 
 _CHOICE = re.compile(r"(?:Value error, )?('([^']*)' is not one of (.+?))\.?", re.DOTALL)
 
@@ -53,7 +53,7 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
 
     `choices` is a function of the command's module: registries by the names of the options.
     """
-    from rotorid.base.registry import described
+    from rotorid.base.choices import described
 
     hints = get_type_hints(command.callback, include_extras=True)
     for parameter in command.params:

@@ -44,7 +44,7 @@ def demo(
 
 def _copy(folder: Path, pictures: list[Path]) -> None:
     """Write the files of the job; what would be overwritten is refused before anything is written."""
-    from rotorid.files.table_writing import write_files
+    from rotorid.files.disk import write_files
     from rotorid.samples import sample_data
 
     samples, remedy = sample_data(), "choose another folder: rotorid demo DIR"

@@ -91,8 +91,8 @@ class Destination:
         ValueError
             For a file that could not be written, before any work is done, and for one that was read.
         """
+        from rotorid.files.disk import write_files
         from rotorid.files.problems import printable
-        from rotorid.files.table_writing import write_files
 
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
             (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),
@@ -195,7 +195,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
 
     def run_command(**typed: Any) -> None:  # noqa: ANN401 - what typer has read
-        from rotorid.files.input_file import each_file_once
+        from rotorid.files.disk import each_file_once
 
         _check_sizes(typed)
         given = [typed.pop(name) for name in arguments]
@@ -215,7 +215,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
 
 def _check_sizes(typed: Mapping[str, Any]) -> None:
     """Refuse numbers whose squares no computer holds."""
-    from rotorid.files.decimal_numbers import LARGEST_STATED
+    from rotorid.files.cells import LARGEST_STATED
 
     for name, value in typed.items():
         if isinstance(value, float) and not abs(value) <= LARGEST_STATED:

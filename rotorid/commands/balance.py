@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
-    from rotorid.fleet.type_coefficients import TypeKnowledge
+    from rotorid.fleet.posterior import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
@@ -74,7 +74,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
 
     --template job.xlsx writes a form; filled in, it is a job. --output sheet.xlsx is the job with results,
-    --output w.json the coefficients, for --influence.
+    --output w.json the coefficients, for --influence, and influence.csv a table of them.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
     options = options or BalanceOptions()
     _check(options)
-    read, files = job_of(job, options)
+    read, files, again = job_of(job, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -102,7 +102,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         solved = solve(read, options) if options.refine else solved
     influence, runs = solved.known
     # what was proposed before a refinement was proposed by these conventions and no others
-    result = with_other_conventions(solved, read, files if stated or not options.refine else None, options)
+    result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
     mounted, check, left = None, None, None
     if options.split and read.check_pieces is not None and not options.refine:
         mounted = read.check_pieces
@@ -116,16 +116,16 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
     of_type = solved.of_type
-    made = provenance(read.files if of_type is None else of_type.files_beside(read), options)
+    made = provenance(read.files if of_type is None else of_type.files, options)
     beside = {"mounting": mounted, "check": check, "left_to_do": left, "verdict": verdict, "of_type": of_type}
     pieces = mounted if left is None else left.pieces
 
     def workbook(_: Path) -> Written:
         from rotorid.files.job_excel import job_workbook_bytes
 
-        if files is None:
+        if not files:
             raise ValueError("a workbook is made of the files of a job: give these, not what was read")
-        return job_workbook_bytes(files.files, outcome, made)
+        return job_workbook_bytes(files, outcome, made)
 
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
@@ -143,7 +143,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         answer=_answer(result, mounted, check, left, verdict, read, influence),
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
-        files={".xlsx": workbook, ".json": coefficients},
+        files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),
@@ -212,7 +212,7 @@ def _answer(
 
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
-    return replace(answer, found="", tables=(answer.found, *answer.tables))
+    return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
 
 
 def _figure(

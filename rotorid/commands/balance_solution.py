@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
@@ -19,11 +20,10 @@ from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
-    from rotorid.base.registry import Method
+    from rotorid.base.choices import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files import Job
-    from rotorid.files.job import JobSource
-    from rotorid.fleet.type_coefficients import TypeKnowledge
+    from rotorid.fleet.posterior import TypeKnowledge
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -116,8 +116,8 @@ class BalanceOptions:
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
         from rotorid.commands.app import check_targets
+        from rotorid.files.disk import write_files
         from rotorid.files.job_excel import template_bytes
-        from rotorid.files.table_writing import write_bytes
 
         path = self.template
         if job and path is None:
@@ -130,37 +130,35 @@ class BalanceOptions:
         check_targets([(path, (".xlsx",))])
         if path.exists():
             raise ValueError(f"{path}: exists already, and may be filled in; choose another name")
-        write_bytes(path, template_bytes())
+        write_files({path: template_bytes()})
         return f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}"
 
 
-def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, JobSource | None]:
-    """The job with the limits of the options, and what it was read from; None: it had been read already."""
-    from rotorid.files import Job
-    from rotorid.files.job import JobSource, Overrides
+def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, tuple[Path, ...], Callable[..., Job] | None]:
+    """The job with the limits of the options, its files, and what reads it; none where it had been read."""
+    from rotorid.files import Job, job_from_files, read_job
 
     stored = None if options.influence is None else Path(options.influence)
-    errors = (None, None) if options.errors is None else percent_and_degrees(options.errors)
-    stated = (options.phase, options.angles, *errors)
-    if not isinstance(job, Job):
-        files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-        source = JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*stated))
-        return _read(source, options), source
-    if any(value is not None for value in (stored, *stated)):
-        raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
-    return limited(job, options.max_mass, options.limit), None
-
-
-def _read(source: JobSource, options: BalanceOptions) -> Job:
-    """The job of these files, with the limits of the options."""
-    from rotorid.files import job_from_files, read_job
-
-    files, overrides = source.files, asdict(source.overrides)
-    if len(files) == 1 and source.influence is None and files[0].suffix.lower() in (".toml", ".xlsx"):
-        read = read_job(files[0], **overrides)
+    percent, degrees = (None, None) if options.errors is None else percent_and_degrees(options.errors)
+    stated = {
+        "phase": options.phase,
+        "angles": options.angles,
+        "amplitude_error_percent": percent,
+        "phase_error_deg": degrees,
+    }
+    if isinstance(job, Job):
+        if any(value is not None for value in (stored, *stated.values())):
+            raise ValueError(
+                "the conventions of a job, its errors and coefficients are stated where it is read"
+            )
+        return limited(job, options.max_mass, options.limit), (), None
+    several = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
+    files = tuple(file_of(file, "a job") for file in several)
+    if len(files) == 1 and stored is None and files[0].suffix.lower() in (".toml", ".xlsx"):
+        read = partial(read_job, files[0], **stated)
     else:
-        read = job_from_files(files, influence=source.influence, **overrides)
-    return limited(read, options.max_mass, options.limit)
+        read = partial(job_from_files, files, influence=stored, **stated)
+    return limited(read(), options.max_mass, options.limit), files, read
 
 
 class Solved(NamedTuple):
@@ -205,7 +203,7 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     if options.machine_type is None:
         known = choose(job, options.coefficients, refined=options.refine)
     else:
-        from rotorid.fleet.type_coefficients import type_coefficients
+        from rotorid.fleet.posterior import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         known = of_type.influence, None
@@ -236,24 +234,23 @@ def correct_job(
 
 
 def with_other_conventions(
-    solved: Solved, job: Job, source: JobSource | None, options: BalanceOptions
+    solved: Solved, job: Job, read: Callable[..., Job] | None, options: BalanceOptions
 ) -> Correction:
     """The correction with what the runs say about its conventions, and what other ones give.
 
-    `source` is read again under these; None where it cannot be.
+    `read` reads the job again under these; None: it cannot be.
     """
     result, labels, test = solved.result, solved.result.labels, _test(job)
     turned: list[tuple[str, ...]] = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
     turned += [labels.assumed] if len(labels.assumed) == 2 else []
     others: list[tuple[list[str], Correction]] = []
     for assumed in turned:
-        if source is None:
+        if read is None:
             break
         other = labels.otherwise(assumed)
-        overrides = replace(source.overrides, phase=other.phase, angles=other.angles)
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
-                again = _read(replace(source, overrides=overrides), options)
+                again = limited(read(phase=other.phase, angles=other.angles), options.max_mass, options.limit)
                 found = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue

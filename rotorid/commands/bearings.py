@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import figures, sentence
+from rotorid.base.text import RPM, figures, sentence
 from rotorid.commands.moving import moving
 from rotorid.commands.quantities import Speeds, rising_speeds
 from rotorid.report.outcome import USUAL, Outcome, command

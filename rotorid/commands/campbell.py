@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import percent
+from rotorid.base.text import RPM, percent, rpm_text
 from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
 from rotorid.report.options import rotor_of
 from rotorid.report.outcome import USUAL, Outcome, command

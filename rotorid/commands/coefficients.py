@@ -38,10 +38,11 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     from rotorid.commands.one_shot import counted_before
 
     has_trials = bool(job.trials.weights.any())
-    if job.machine_type and kind is None and not has_trials and job.influence is None and job.rotor is None:
+    nothing = not has_trials and job.influence is None and job.rotor is None
+    if nothing and kind is None and job.settings.machine_type:
         raise UndeterminedError(
             "no run has a trial weight: balance it from its type (rotorid balance --type "
-            f"FLEET:{job.machine_type}), or add runs with trial weights"
+            f"FLEET:{job.settings.machine_type}), or add runs with trial weights"
         )
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"

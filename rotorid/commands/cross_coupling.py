@@ -15,8 +15,8 @@ import numpy as np
 import fem
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM, rpm_text
 
 _STEPS, _MODES = 11, 12
 

@@ -16,7 +16,7 @@ from rotorid.report.options import check_choices, file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
-    from rotorid.base.registry import Method
+    from rotorid.base.choices import Method
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
     from rotorid.report.equations import Equations
@@ -215,7 +215,7 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
 
 def sigmas(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
-    from rotorid.files.decimal_numbers import NotANumber, check_size
+    from rotorid.files.cells import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
         check_names((name,), "--sigma", outputs, "output")

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from fem import Sensor
-    from rotorid.base.words import Quantity
+    from rotorid.base.text import Quantity
     from rotorid.files import Job
 
 

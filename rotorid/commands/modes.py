@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, error_figures, listing
-from rotorid.base.unit_words import SPEEDS
+from rotorid.base.text import SPEEDS, counted, error_figures, listing
 from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.commands.quantities import Band, band, one_of
 from rotorid.report.options import file_of

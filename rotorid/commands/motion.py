@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import figures, percent
+from rotorid.base.text import RPM, figures, percent, rpm_text
 from rotorid.commands.moving import SMALL, mounted_nodes, moving, reduction, reduction_notes
 from rotorid.commands.quantities import (
     FASTEST,

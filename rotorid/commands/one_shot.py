@@ -15,7 +15,7 @@ from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings, run_errors
-from rotorid.files.input_file import sha256
+from rotorid.files.disk import sha256
 
 if TYPE_CHECKING:
     from balancing import Influence
@@ -41,7 +41,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
-    errors = Gaussian(none.own[0], none.columns, influence.reading, run_errors(job.trials))
+    errors = Gaussian(none.blocks[0], none.columns, influence.reading, run_errors(job.trials))
     found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
     if not calibration.needs_trial_run:
         return found

@@ -14,9 +14,8 @@ import numpy as np
 
 from fem import CRITICALLY_DAMPED, LARGEST_MARGINS, Peak, Peaks, separation
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import listing
+from rotorid.base.text import RPM, listing, rpm_text
 
 _NARROW = 0.01  # half of the half-power band, relative, of a peak that shows no end of it, beside others
 

@@ -7,21 +7,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, get_args
 
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.words import Angles
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
-from rotorid.files.decimal_numbers import LARGEST_STATED, NotANumber, check_size, parse_number
-from rotorid.files.units import Unit, UnitError, UnitReader
+from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
+from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:
     from balancing import Labels
     from rotorid.files import Job
-    from rotorid.files.units import Quantity
 
 Amount = str | float
 """A number with its unit, or a number in SI."""
@@ -118,13 +117,10 @@ def weight(
         Naming the option, for anything else, and for a mass where the labels have unbalances (or the reverse)
         without a radius, m.
     """
-    from rotorid.files.units import Quantity
-    from rotorid.files.weights_with_units import in_job_units
-
     unit = labels.weight_unit
     amount = _weight(given, what, example) if isinstance(given, str) else (given, _si(unit))
     _above_zero(amount[0], given, what, example)
-    converted = in_job_units(Quantity(what, *amount), unit, radius)
+    converted = units.in_job_units(Quantity(what, *amount), unit, radius)
     if converted is None:
         raise ValueError(
             f"{what}: the weight to be split is in {unit}, to which {amount[1].name} converts only with "
@@ -234,10 +230,29 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
 
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
-    """The job with these limits in place of its own."""
-    from rotorid.files.job import with_limits
+    """The job with these limits in place of its own; holes keep to the largest weight of their plane."""
+    import numpy as np
 
-    return with_limits(job, largest_weights(job, max_mass), largest_amplitudes(job, limits))
+    from balancing import Limits
+
+    weights, amplitudes = largest_weights(job, max_mass), largest_amplitudes(job, limits)
+    if not weights and not amplitudes:
+        return job
+    trials, unit = job.trials, job.trials.labels.weight_unit
+    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
+    most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
+    for plane, weight in weights.items():
+        size = units.in_job_units(weight, unit, job.planes[plane].radius)
+        if size is None:
+            raise ValueError(
+                f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
+                f"only with a radius_mm of plane {plane!r} in the job"
+            )
+        most[plane] = size[0]
+    for sensor, amplitude in amplitudes.items():
+        residual[:, trials.sensors.index(sensor)] = amplitude.si
+    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
+    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)
 
 
 def _limits(
@@ -250,8 +265,6 @@ def _limits(
     every: Sequence[str],
 ) -> dict[str, Quantity]:
     """Limits above 0 of known planes or sensors, or one of every."""
-    from rotorid.files.units import Quantity
-
     texts: dict[str, Amount]
     if isinstance(given, int | float):
         texts = dict.fromkeys(every, given)

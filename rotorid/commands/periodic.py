@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import listing
+from rotorid.base.text import RPM, listing, range_text, rpm_text
 from rotorid.commands.moving import (
     SMALL,
     Moving,

@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar
 
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.suggestions import one_of as one_of
+from rotorid.base.choices import did_you_mean
+from rotorid.base.choices import one_of as one_of
 from rotorid.base.text import listing
 from rotorid.files.units import SPEED, TIME, Unit, spelt
 from rotorid.report.options import option_name as option_name

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.json import SCHEMA_VERSION, now
 from rotorid.base.text import counted
-from rotorid.base.versions import SCHEMA_VERSION, now
 
 if TYPE_CHECKING:
     from rotorid.reduction import Reduction, SmallModel

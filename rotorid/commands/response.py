@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.json import cell
-from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, error_figures, figures, listing
+from rotorid.base.text import RPM, counted, error_figures, figures, listing, range_text, rpm_text
 from rotorid.commands.moving import moving
 from rotorid.commands.quantities import (
     Band,
@@ -31,7 +30,7 @@ from rotorid.report.outcome import Outcome, command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from fem import Peak, Peaks, Response, Rotor, SensorLike, Unbalance
+    from fem import Peak, Peaks, Response, Rotor, SensorLike, UnbalanceLike
     from rotorid.base.arrays import AnyArray, FloatArray
     from rotorid.reduction import SmallModel
 
@@ -182,7 +181,7 @@ class Vibration:
         """One row per speed and sensor."""
         import numpy as np
 
-        from rotorid.base.rpm import phase_deg
+        from rotorid.base.text import phase_deg
 
         Z = self.response.readings(self.sensors)
         S, C = Z.shape
@@ -219,7 +218,7 @@ class Vibration:
 
     def shape(self, at: int | None) -> Table:
         """The orbit of each node at a speed."""
-        from rotorid.base.rpm import phase_deg
+        from rotorid.base.text import phase_deg
 
         shape = self._deflected(at)
         columns = (
@@ -379,7 +378,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
 @command
 def response(
     rotor: Rotor | SmallModel | Path | str,
-    unbalance: Unbalance | Path | str,
+    unbalance: UnbalanceLike | Path | str,
     options: ResponseOptions,
 ) -> Outcome:
     """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
@@ -457,7 +456,7 @@ def response(
 
 def _solved(
     model: Rotor | SmallModel,
-    unbalance: Unbalance,
+    unbalance: UnbalanceLike,
     speeds: Sequence[float],
     places: Sequence[SensorLike],
     operating: tuple[float, float] | None,
@@ -491,7 +490,7 @@ def _solved(
 
 def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    from rotorid.base.rpm import phase_deg
+    from rotorid.base.text import phase_deg
 
     nodes, stations = sorted(unbalance), getattr(rotor, "stations", {})
     names = [" ".join([str(node), *(name for name, at in stations.items() if at == node)]) for node in nodes]

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, error_figures, figures, listing
+from rotorid.base.text import RPM, counted, error_figures, figures, listing
 from rotorid.commands.modes import NO_MODES, bands, frequencies
 from rotorid.commands.quantities import Band, acceleration, one_of
 from rotorid.report.options import file_of

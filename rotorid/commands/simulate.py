@@ -239,7 +239,7 @@ def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float
 
 def _amplitude(name: str, shown: str) -> complex:
     """Read "10" or "10@-90"."""
-    from rotorid.base.complex_numbers import polar
+    from rotorid.base.arrays import polar
 
     size, at, angle = shown.partition("@")
     value = number(size)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, get_args
 
 from rotorid.base.answer import together
-from rotorid.base.words import Angles, Phase
+from rotorid.base.text import Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of

@@ -8,11 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotorid.base.json import plain
-from rotorid.base.result import Column as Told
-from rotorid.base.result import rows
-from rotorid.base.rpm import RPM
-from rotorid.base.tables import Column, Table
-from rotorid.base.text import counted, listing
+from rotorid.base.text import RPM, counted, listing
 from rotorid.commands.quantities import Speeds, speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
@@ -74,7 +70,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     ValueError
         For records without turns, and options that cannot be.
     """
-    from rotorid.files.waveforms import find_each, read_waveforms, vectors_columns
+    from rotorid.files.waveforms import find_each, read_waveforms, vectors_table
     from rotorid.waveforms.plots import figure_tacho
 
     options = options or VectorsOptions()
@@ -87,7 +83,8 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     }
     waveforms = read_waveforms([Path(record) for record in records], given)
     each = find_each(waveforms)
-    columns, labels = vectors_columns(each, waveforms.labels), waveforms.labels
+    labels = waveforms.labels
+    table, printed = vectors_table(each, labels)
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
     many, first = len(each) > 1, waveforms.records[0]
     signal = first.tacho
@@ -99,7 +96,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         words.append("nothing states the unit of the records: amplitudes are their numbers (--unit)")
     document = {
         "conventions": {"phase": labels.phase, "unit": labels.vibration_unit},
-        "rows": rows(columns),
+        "rows": table.records,
         "tacho": {
             "pulses": sum(len(tacho.times) for tacho in tachos),
             "missing": sum(len(tacho.missing) for tacho in tachos),
@@ -126,8 +123,8 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
             f"phases {labels.phase}.",
             *map(_course, each),
         ),
-        tables=(_table(columns, printed=True),),
-        file=_table(columns),
+        tables=(table.only(printed),),
+        file=table,
         keys=dict(plain(document)),
         pictures={"The tacho of the first record.": lambda: figure_tacho(signal, first.rate, tachos[0])},
         warnings=tuple(words),
@@ -144,20 +141,6 @@ def _orders(given: str | Sequence[int] | None) -> list[int] | None:
     if not all(part.isdecimal() and 0 < int(part) <= 20 for part in parts):
         raise ValueError(f"--orders takes whole numbers from 1 to 20 with commas between them, not {given!r}")
     return sorted({1, *map(int, parts)})
-
-
-def _table(columns: Sequence[Told], *, printed: bool = False) -> Table:
-    """The runs table, or those of its columns that people read."""
-    return Table(
-        "vectors",
-        tuple(
-            Column(
-                ((printed and one.title) or one.name).replace("±", "std"), list(one.values), one.shown or str
-            )
-            for one in columns
-            if one.shown is not None or not printed
-        ),
-    )
 
 
 def _course(one: Vectors) -> str:

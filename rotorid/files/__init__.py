@@ -11,64 +11,68 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from rotorid.files.conventions import Conventions as Conventions
-    from rotorid.files.influence import influence_frame as influence_frame
-    from rotorid.files.influence import read_influence as read_influence
-    from rotorid.files.influence import write_influence as write_influence
-    from rotorid.files.job import Job as Job
-    from rotorid.files.job import job_from_files as job_from_files
-    from rotorid.files.job import read_job as read_job
-    from rotorid.files.job_models import Errors as Errors
-    from rotorid.files.measurements import read_measurements as read_measurements
-    from rotorid.files.model import HarmonicFile as HarmonicFile
-    from rotorid.files.model import read_harmonic_model as read_harmonic_model
-    from rotorid.files.model import read_ode_model as read_ode_model
-    from rotorid.files.node_tables import MeasuredModes as MeasuredModes
-    from rotorid.files.node_tables import read_bow as read_bow
-    from rotorid.files.node_tables import read_compliance as read_compliance
-    from rotorid.files.node_tables import read_modes as read_modes
-    from rotorid.files.node_tables import read_unbalance as read_unbalance
-    from rotorid.files.problems import InputError as InputError
-    from rotorid.files.problems import Problem as Problem
-    from rotorid.files.problems import TableWarning as TableWarning
-    from rotorid.files.records import read_record as read_record
-    from rotorid.files.rotor import read_rotor as read_rotor
-    from rotorid.files.rotor import rotor_files as rotor_files
-    from rotorid.files.rotor import write_rotor as write_rotor
-    from rotorid.files.runs import read_trials as read_trials
-    from rotorid.files.small_model import read_small_model as read_small_model
-    from rotorid.files.table_writing import write_table as write_table
+    from rotorid.files.conventions import Conventions
+    from rotorid.files.influence import influence_frame, read_influence, write_influence
+    from rotorid.files.job import Job, job_from_files, read_job
+    from rotorid.files.job_models import Errors
+    from rotorid.files.measurements import read_measurements
+    from rotorid.files.model import HarmonicFile, read_harmonic_model, read_ode_model
+    from rotorid.files.node_tables import (
+        MeasuredModes,
+        read_bow,
+        read_compliance,
+        read_modes,
+        read_unbalance,
+    )
+    from rotorid.files.problems import InputError, Problem, TableWarning
+    from rotorid.files.records import read_record
+    from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
+    from rotorid.files.runs import read_trials
+    from rotorid.files.small_model import read_small_model
 
-_HOME = {
-    "read_measurements": "measurements",
-    "MeasuredModes": "node_tables",
-    "read_compliance": "node_tables",
-    "read_modes": "node_tables",
-    "read_record": "records",
-    "Job": "job",
-    "job_from_files": "job",
-    "read_job": "job",
-    "HarmonicFile": "model",
-    "read_harmonic_model": "model",
-    "read_ode_model": "model",
-    "read_small_model": "small_model",
-    "InputError": "problems",
-    "Problem": "problems",
-    "TableWarning": "problems",
-    "write_table": "table_writing",
-    "read_bow": "node_tables",
-    "read_rotor": "rotor",
-    "rotor_files": "rotor",
-    "write_rotor": "rotor",
-    "read_unbalance": "node_tables",
-    "influence_frame": "influence",
-    "read_influence": "influence",
-    "write_influence": "influence",
-    "Conventions": "conventions",
-    "Errors": "job_models",
-    "read_trials": "runs",
+_NAMES = {
+    "conventions": "Conventions",
+    "influence": "influence_frame read_influence write_influence",
+    "job": "Job job_from_files read_job",
+    "job_models": "Errors",
+    "measurements": "read_measurements",
+    "model": "HarmonicFile read_harmonic_model read_ode_model",
+    "node_tables": "MeasuredModes read_bow read_compliance read_modes read_unbalance",
+    "problems": "InputError Problem TableWarning",
+    "records": "read_record",
+    "rotor": "read_rotor rotor_files write_rotor",
+    "runs": "read_trials",
+    "small_model": "read_small_model",
 }
+__all__ = [
+    "Conventions",
+    "Errors",
+    "HarmonicFile",
+    "InputError",
+    "Job",
+    "MeasuredModes",
+    "Problem",
+    "TableWarning",
+    "influence_frame",
+    "job_from_files",
+    "read_bow",
+    "read_compliance",
+    "read_harmonic_model",
+    "read_influence",
+    "read_job",
+    "read_measurements",
+    "read_modes",
+    "read_ode_model",
+    "read_record",
+    "read_rotor",
+    "read_small_model",
+    "read_trials",
+    "read_unbalance",
+    "rotor_files",
+    "write_influence",
+    "write_rotor",
+]
 
-__all__ = [*_HOME]
-
-__getattr__, __dir__ = lazy_names(__name__, _HOME)
+__getattr__, __dir__ = lazy_names(
+    __name__, {name: module for module, names in _NAMES.items() for name in names.split()}
+)

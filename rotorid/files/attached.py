@@ -14,8 +14,7 @@ from pydantic import PlainValidator, create_model
 from fem import KINDS, NodeForce, Pedestal, Support
 from fem.forces import FORCES, Film, kind_of
 from rotorid.base.arrays import FloatArray
-from rotorid.base.registry import find
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean, find
 from rotorid.base.tables import csv_bytes
 from rotorid.base.text import listing
 from rotorid.files import units

@@ -1,23 +1,21 @@
-"""A file as rows of cells, of text and workbooks alike, before columns get a meaning.
+"""A file as rows of cells, of text and workbooks alike, and the numbers in them; columns have no meaning yet.
 
 Text is read as people and spreadsheets write it: any encoding, separator and decimal sign; a line at a time.
+Numbers are read strictly: what is not plainly a number is refused with the reason.
 """
 
 from __future__ import annotations
 
-import codecs
 import csv
+import math
 import re
 import unicodedata
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import islice
 
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import counted
-from rotorid.files.input_file import file_content
 from rotorid.files.problems import Problems, TableWarning
 
 MOST_ABOVE = 60
@@ -26,25 +24,48 @@ LONGEST_LINE = 10_000
 """Of a header that is not the first line."""
 MOST_CELLS = 5_000_000
 """Of a file."""
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes outside occur in no table of this project, but squares of them overflow."""
+LARGEST_STATED = 1e12
+"""Of an option."""
 SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
-_SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])")
-"""#N/A, #DIV/0!, #ИМЯ?"""
+_SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])\s*(?:[,;\t].*)?", re.DOTALL)
+"""#N/A, #DIV/0!, #ИМЯ?, alone or at the beginning of a line."""
 _AROUND = '#"; ,\t'
 """Around the text of a comment."""
 _VERSION = re.compile(r"schema_version\s*=\s*(\d{1,9})")
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff]")
-EMPTY = "a table with a header row; the file is empty"
-_MARKS = {
-    codecs.BOM_UTF16_LE: "utf-16-le",
-    codecs.BOM_UTF16_BE: "utf-16-be",
-    codecs.BOM_UTF8: "utf-8-sig",
-}
+_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
 _OTHERS = {
     b"PK\x03\x04": "a text file; this is a workbook or an archive: name it .xlsx, or save it as CSV",
     b"\xd0\xcf\x11\xe0": "a text file or .xlsx; this is an old workbook (.xls): save it as .xlsx or CSV",
+    b"": "a text file (CSV) or a workbook (.xlsx); this one is neither",
 }
+_POINT = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_POINT_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\.[0-9]{3})+")
+_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_REASONS = {
+    r"(?i:[+-]?(?:nan|inf|infinity|ind|1\.#(?:qnan|inf|ind)))": "a finite number",
+    r"[+-]?[0-9]{1,3}(?:[ ,.'’][0-9]{3})+(?:[.,][0-9]*)?": "a number without thousands separators",
+    r".*[\u2212\u2013].*": "a number with the minus sign written as -",
+    r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?\s*(?:[^\W\d_]|[°%µμ]).*": (
+        "a number alone; write the unit in the header"
+    ),
+    r"(?s:.*)": "a number",
+}
+"""What is expected instead of a text of this pattern."""
+_NO_COMMA = {
+    ",": (
+        "a number with a decimal point: in a comma-separated file a comma is not a decimal sign "
+        "(separate by ;)"
+    ),
+    "\t": "a number with a decimal point: this comma may separate thousands (or separate columns by ;)",
+    "": "a number; the cell holds text, whose comma may separate thousands",
+}
+"""Why a comma is no decimal sign, by what separates the columns."""
 
 
 @dataclass(frozen=True)
@@ -123,17 +144,9 @@ def show(cell: Cell) -> str:
     return cell.value if isinstance(cell, BadCell) else repr(cell)
 
 
-def is_comment(cells: Sequence[Cell], *, below_header: bool) -> bool:
-    """Whether a row is a comment: it begins with `#`, not with an error of a spreadsheet.
-
-    Below the header a comment stands alone in its row: labels such as "#12 coupling" begin with `#`, too.
-    """
-    first = cells[0] if cells else ""
-    if not isinstance(first, str) or not first.startswith("#"):
-        return False
-    if is_spreadsheet_error(re.split("[,;\t]", first)[0].strip()):
-        return False
-    return not below_header or all(cell == "" for cell in cells[1:])
+def is_comment(line: str) -> bool:
+    """Whether a line, or the first cell of a row, begins as a comment and is no error of a spreadsheet."""
+    return line.startswith("#") and not is_spreadsheet_error(line)
 
 
 def is_spreadsheet_error(cell: str) -> bool:
@@ -141,131 +154,13 @@ def is_spreadsheet_error(cell: str) -> bool:
     return _SPREADSHEET_ERROR.fullmatch(cell) is not None
 
 
-def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
-    """Rows with the header in one row, where that is found; those above it become comments."""
-    texts = {k: [show(cell) for cell in cells] for k, (_, cells) in enumerate(rows[: 2 * MOST_ABOVE])}
-    filled = [k for k, text in texts.items() if any(text) and not text[0].startswith("#")]
-    header = find([texts[k] for k in filled])
-    if header is None:
-        return list(rows)
-    last = filled[header[1]]
-    above = [(rows[k][0], (f"# {' '.join(filter(None, texts[k])).lstrip('# ')}",)) for k in range(last)]
-    return [
-        *above,
-        (rows[last][0], tuple(header[2])) if header[0] != header[1] else rows[last],
-        *rows[last + 1 :],
-    ]
-
-
-def make_grid(
-    source: str,
-    rows: Iterable[Row],
-    separator: str,
-    problems: Problems,
-    *,
-    comments: Iterable[str] = (),
-    complete: bool = True,
-    may_be_empty: bool = False,
-) -> Grid | None:
-    """Find the header, drop comments, blank lines and empty trailing columns; complain about the rest.
-
-    Parameters
-    ----------
-    source, rows, separator, comments, complete
-        As in `Grid`; of a sheet the comments stand among the rows.
-    problems
-        Collects the complaints.
-    may_be_empty
-        Whether a header without rows says something (a weights table: nothing was mounted).
-
-    Returns
-    -------
-    Grid or None
-        None if there is nothing to read; the problems say why.
-    """
-    texts, filled = [*comments], list[Row]()
-    for number, cells in rows:
-        if not separator and is_comment(cells, below_header=bool(filled)):
-            texts.append(" ".join(map(show, cells)).strip(_AROUND))
-        elif not all(cell == "" for cell in cells):
-            filled.append((number, cells))
-    for version in filter(None, map(_VERSION.fullmatch, texts)):
-        problems.refuse_newer(source, int(version[1]))
-    header_row, header = filled[0][0] if filled else None, [*map(show, filled[0][1])] if filled else []
-    while header and not header[-1]:
-        header.pop()
-    if header_row is None or (len(filled) < 2 and not may_be_empty):
-        if complete:
-            expected = "rows below the header; there are none" if filled else EMPTY
-            problems.add(source, header_row, None, None, expected)
-        return None
-    body, width = filled[1:], len(header)
-    if "" in header or any(len(cells) != width for _, cells in body):
-        body = [_fit(source, header_row, header, row, separator, problems) for row in body]
-    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(texts), complete)
-
-
-def _fit(
-    source: str, header_row: int, header: Sequence[str], row: Row, separator: str, problems: Problems
-) -> Row:
-    """Bring a row to the header's width; a spreadsheet may leave blanks out at the end, or add some."""
-    number, cells = row
-    width = len(header)
-    more = [k for k, cell in enumerate(cells[width:], width + 1) if show(cell)]
-    if more:
-        hint = "; numbers with a decimal comma need ; between the columns" if separator == "," else ""
-        if show(cells[0]).startswith("#"):
-            hint = f"; a comment below the header begins with # and has no {separator} in it"
-        expected = f"{counted(width, 'cell')}, as in the header{hint}"
-        problems.add(source, number, None, counted(more[-1], "cell"), expected)
-    if len(cells) != width:
-        cells = (cells + ("",) * width)[:width]
-    for k, cell in enumerate(cells) if "" in header else ():
-        if not header[k] and show(cell):
-            expected = f"a name for column {k + 1} in the header (row {header_row}), or no value"
-            problems.add(source, number, None, show(cell), expected)
-    return number, cells
-
-
-def read_bytes(path: Path, problems: Problems) -> bytes | None:
-    """The content of a file, or None and a problem."""
-    try:
-        return file_content(path)
-    except (OSError, ValueError) as error:
-        problems.add(str(path), None, None, None, readable(path, error))
-    return None
-
-
-def readable(path: Path, error: OSError | ValueError) -> str:
-    """What is expected of a file that could not be read."""
-    if isinstance(error, FileNotFoundError):
-        names = []
-        with suppress(OSError):
-            names = [entry.name for entry in path.parent.iterdir()]
-        return f"a file that exists{did_you_mean(path.name, names)}"
-    if isinstance(error, IsADirectoryError):
-        return "a file, not a folder"
-    return f"a file that can be read ({getattr(error, 'strerror', None) or error})"
-
-
 def decode(source: str, data: bytes, problems: Problems) -> str | None:
     """Text of a file in any encoding that Excel writes, or None and a problem.
 
     An encoding that had to be guessed (cp1251, cp1252) is named in a `TableWarning`.
     """
-    text, encoding = decode_as(source, data, problems) or (None, "")
-    if encoding.startswith("cp"):
-        message = f"{source}: not UTF-8, read as {encoding}; check the names in it"
-        warnings.warn(message, TableWarning, stacklevel=2)
-    return text
-
-
-def decode_as(source: str, data: bytes, problems: Problems) -> tuple[str, str] | None:
-    """Text of a file and the encoding; a file in UTF-16 or utf-8-sig begins with a byte-order mark."""
-    expected = next((words for mark, words in _OTHERS.items() if data.startswith(mark)), "")
-    expected = expected if data.strip() else EMPTY
-    encodings = [name for mark, name in _MARKS.items() if data.startswith(mark)]
-    for encoding in () if expected else encodings or ("utf-8", "cp"):
+    marked = [name for mark, name in _MARKS.items() if data.startswith(mark)]
+    for encoding in marked or ("utf-8", "cp"):
         if encoding == "cp":
             # Cyrillic words consist of letters above 127 only; western ones have them among ASCII letters
             words = _WORD.findall(data)
@@ -274,8 +169,11 @@ def decode_as(source: str, data: bytes, problems: Problems) -> tuple[str, str] |
         with suppress(UnicodeDecodeError):
             text = data.decode(encoding).removeprefix("\ufeff")
             if not _CONTROL.search(text):
-                return text, encoding
-    expected = expected or "a text file (CSV) or a workbook (.xlsx); this one is neither"
+                if encoding.startswith("cp"):
+                    message = f"{source}: not UTF-8, read as {encoding}; check the names in it"
+                    warnings.warn(message, TableWarning, stacklevel=2)
+                return text
+    expected = next(words for mark, words in _OTHERS.items() if data.startswith(mark))
     problems.add(source, None, None, None, expected)
     return None
 
@@ -291,49 +189,43 @@ def parse_text(
     # A spreadsheet takes `sep=;` as an instruction and does not show it: rows count from the next.
     declared = SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
     if declared:
-        lines = lines[1:]
-        if declared.group(1) not in ";,\t":
-            problems.add(source, 1, None, f"sep={declared.group(1)}", "sep=; or sep=, or a tab")
+        del lines[0]
+        if declared[1] not in ";,\t":
+            problems.add(source, 1, None, f"sep={declared[1]}", "sep=; or sep=, or a tab")
             return None
-    plain = ((k, line.strip(';,\t" \xa0\ufeff\r\n')) for k, line in enumerate(lines))
-    top = [k for k, line in plain if line and not line.startswith("#")][:MOST_ABOVE]
-    header = None if find is None else _header(lines, top, find)
-    start, names = header or (top[0] if top else 0, None)
-    header_line = lines[start] if top else "".join(line for line in lines if line[:1] != "#")
-    separator = declared.group(1) if declared else _separator(header_line)
+    start, names = header_place(_first_rows(lines), find)
+    start = start or len(lines)
+    separator = declared[1] if declared else _separator(lines[start - 1])
     if len(lines) + text.count(separator) > MOST_CELLS:
         problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
         return None
-    rows, comments, complete = list[Row](), list[str](), True
-    for k, line in enumerate(lines):
-        stripped = clean(line)
-        comment = k < start or (stripped[:1] == "#" and is_comment((stripped,), below_header=False))
-        if comment and not (k > start and separator in line):
-            comments += filter(None, [stripped.strip(_AROUND)])
-            continue
+    rows, complete = list[Row](), True
+    for number, line in enumerate(lines, start=1):
         try:
-            cells = tuple(names) if names is not None and k == start else _cells(line, separator)
+            if number < start:
+                cells: tuple[str, ...] = (f"# {clean(line)}",)
+            elif number == start and names:
+                cells = names
+            elif separator not in line and is_comment(text := clean(line)):
+                cells = (text,)  # in a comment quotes may stay open
+            else:
+                cells = _cells(line, separator)
+            rows.append((number, cells))
         except csv.Error as error:
             rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
-            problems.add(source, k + 1, None, None, f"{rule}: {error}")
+            problems.add(source, number, None, None, f"{rule}: {error}")
             complete = False
-            continue
-        rows.append((k + 1, cells))
-    return make_grid(
-        source, rows, separator, problems, comments=comments, complete=complete, may_be_empty=may_be_empty
-    )
+    return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
 
 
-def _header(
-    lines: Sequence[str], top: Sequence[int], find: Finder
-) -> tuple[int, Sequence[str] | None] | None:
-    """The line of the header, and its names where it has two rows; None where it is not sure."""
-    cells: dict[int, tuple[str, ...]] = {}
-    for k in top:
+def _first_rows(lines: Iterable[str]) -> Iterator[Row]:
+    """Lines as rows, each by its own separator; one that cannot be a header is one cell."""
+    for number, line in enumerate(lines, start=1):
+        cells: tuple[str, ...] = (clean(line).lstrip('"')[:1],)
         with suppress(csv.Error):
-            cells[k] = _cells(lines[k], _separator(lines[k])) if len(lines[k]) < LONGEST_LINE else ()
-    found = find([*cells.values()])
-    return None if found is None else ([*cells][found[1]], found[2] if found[0] != found[1] else None)
+            if len(line) < LONGEST_LINE:
+                cells = _cells(line, _separator(line))
+        yield number, cells
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:
@@ -346,3 +238,175 @@ def _separator(line: str) -> str:
     """What separates the columns of a header, outside quotes."""
     outside = re.sub(r'"[^"]*"', "", line)
     return next((sign for sign in ("\t", ";", ",") if sign in outside), ",")
+
+
+def header_place(rows: Iterable[Row], find: Finder | None) -> tuple[int, tuple[str, ...]]:
+    """Number of the row with the header, 0 without one, and its names where it has two rows.
+
+    It is the first row that is neither blank nor a comment, unless `find` finds it among the others.
+    """
+    texts = ((number, [*map(show, cells)]) for number, cells in rows)
+    filled = [*islice((row for row in texts if not is_comment(next(filter(None, row[1]), "#"))), MOST_ABOVE)]
+    place = find([cells for _, cells in filled]) if find else None
+    if place is None:
+        return filled[0][0] if filled else 0, ()
+    first, last, names = place
+    return filled[last][0], () if first == last else tuple(names)
+
+
+def below_title(rows: Sequence[Row], find: Finder) -> list[Row]:
+    """Rows of a sheet with the header in one row; those above it become comments."""
+    start, names = header_place(rows, find)
+    above = (
+        (number, ("# " + " ".join(filter(None, map(show, cells))),))
+        for number, cells in rows
+        if number < start
+    )
+    return [*above, *((at, (at == start and names) or cells) for at, cells in rows if at >= start)]
+
+
+def _without_comments(rows: Iterable[Row]) -> tuple[list[str], list[Row]]:
+    """Comments, and the rows that hold something.
+
+    Below the header a comment stands alone in its row: labels such as "#12 coupling" begin with `#`, too.
+    """
+    comments, filled = list[str](), list[Row]()
+    for number, cells in rows:
+        first = str(cells[0]) if cells else ""
+        if is_comment(first) and (not filled or len(cells) == 1):
+            comments += filter(None, [" ".join(map(show, cells)).strip(_AROUND)])
+        elif any(cell != "" for cell in cells):
+            filled.append((number, cells))
+    return comments, filled
+
+
+def make_grid(
+    source: str,
+    rows: Iterable[Row],
+    separator: str,
+    problems: Problems,
+    *,
+    complete: bool = True,
+    may_be_empty: bool = False,
+) -> Grid | None:
+    """Find the header, drop comments, blank lines and empty trailing columns; complain about the rest.
+
+    Parameters
+    ----------
+    source, rows, separator, complete
+        As in `Grid`; comments stand among the rows.
+    problems
+        Collects the complaints.
+    may_be_empty
+        Whether a header without rows says something (a weights table: nothing was mounted).
+
+    Returns
+    -------
+    Grid or None
+        None if there is nothing to read; the problems say why.
+    """
+    comments, filled = _without_comments(rows)
+    for version in filter(None, map(_VERSION.fullmatch, comments)):
+        problems.refuse_newer(source, int(version[1]))
+    if len(filled) < (1 if may_be_empty else 2):
+        if complete:
+            expected = "a table with a header row; the file is empty"
+            expected = "rows below the header; there are none" if filled else expected
+            problems.add(source, filled[0][0] if filled else None, None, None, expected)
+        return None
+    (header_row, names), *body = filled
+    header = [*map(show, names)]
+    while not header[-1]:
+        header.pop()
+    width = len(header)
+    if "" in header or any(len(cells) != width for _, cells in body):
+        for number, cells in body:
+            headings = header + [""] * (len(cells) - width)
+            lost = [k for k, cell in enumerate(cells) if cell != "" and not headings[k]]
+            if lost:
+                expected = f"a name for column {lost[-1] + 1} in the header (row {header_row}), or no value"
+                if lost[-1] >= width and show(cells[0]).startswith("#"):
+                    expected += f"; a comment below the header begins with # and has no {separator} in it"
+                elif lost[-1] >= width and separator == ",":
+                    expected += "; numbers with a decimal comma need ; between the columns"
+                problems.add(source, number, None, show(cells[lost[-1]]), expected)
+        body = [(number, (cells + ("",) * width)[:width]) for number, cells in body]
+    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
+
+
+class NotANumber(ValueError):
+    """The message says what was expected instead."""
+
+
+def decimal_comma(cells: Iterable[str], separator: str) -> bool:
+    """Whether the numbers of a file have decimal commas.
+
+    Between semicolons a comma can be nothing else. Between tabs and in a sheet it may also separate
+    thousands: there at least one number must show that it does not (1,5 or 1500,000).
+    """
+    if separator == ",":
+        return False
+    return any(
+        _COMMA.fullmatch(cell) and (separator == ";" or not _MAYBE_THOUSANDS.fullmatch(cell))
+        for cell in cells
+    )
+
+
+def thousands_or_decimals(cells: Iterable[str], name: str) -> set[str]:
+    """Cells of a column without decimal commas whose points may separate thousands, as in 1.350 beside 720.
+
+    A European spreadsheet writes 1350 so where no number of the column has decimals. The column is doubtful
+    if it has whole numbers without a point too, or holds revolutions per minute, and no other decimals.
+    """
+    filled = {cell for cell in cells if cell}
+    doubtful = {cell for cell in filled if _POINT_THOUSANDS.fullmatch(cell)}
+    others = filled - doubtful
+    whole = any(cell.lstrip("+-").isdecimal() and cell.strip("+-0") for cell in others)
+    decimals = any("." in cell for cell in others)
+    return doubtful if not decimals and (whole or name.casefold().endswith("_rpm")) else set()
+
+
+def check_size(value: float, largest: float = LARGEST) -> None:
+    """Refuse a number that no instrument shows.
+
+    Raises
+    ------
+    NotANumber
+        For one that is not finite, or not zero and outside 1e-30 … `largest`.
+    """
+    if not math.isfinite(value):
+        raise NotANumber("a finite number")
+    if value and not SMALLEST <= abs(value) <= largest:
+        raise NotANumber(f"0 or a number between {SMALLEST:g} and {largest:g} in size")
+
+
+def parse_number(text: str, *, comma: bool = False, separator: str = "") -> float:
+    """The number a cell holds.
+
+    Parameters
+    ----------
+    text
+        Without surrounding blanks.
+    comma
+        Whether the numbers of this file have decimal commas.
+    separator
+        What separates the columns of the file, for the explanation.
+
+    Raises
+    ------
+    NotANumber
+        For everything that is not plainly a finite number; nothing is guessed.
+    """
+    written_with_comma = _COMMA.fullmatch(text) is not None
+    if written_with_comma and not comma:
+        raise NotANumber(_NO_COMMA.get(separator, _NO_COMMA[""]))
+    if not written_with_comma and _POINT.fullmatch(text) is None:
+        raise NotANumber(next(reason for form, reason in _REASONS.items() if re.fullmatch(form, text)))
+    if comma and "." in text:
+        raise NotANumber(
+            "a number with a decimal comma, as elsewhere in this file (a point could separate thousands)"
+        )
+    value = float(text.replace(",", "."))
+    if not math.isfinite(value):
+        raise NotANumber("a finite number")
+    return value

@@ -14,29 +14,27 @@ from typing import SupportsIndex
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.base.text import listing
 from rotorid.files.cells import (
     BadCell,
     Cell,
     Finder,
     Grid,
+    NotANumber,
     Shown,
     below_title,
+    check_size,
+    decimal_comma,
     decode,
     is_spreadsheet_error,
     make_grid,
-    parse_text,
-    read_bytes,
-    show,
-)
-from rotorid.files.decimal_numbers import (
-    NotANumber,
-    check_size,
-    decimal_comma,
     parse_number,
+    parse_text,
+    show,
     thousands_or_decimals,
 )
+from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader
@@ -206,25 +204,13 @@ class Table:
             bad = ~np.fromiter(allowed, dtype=bool, count=len(self))
             self.complain_where(bad & ~np.isnan(self.numbers(stem)), stem, expected)
 
-    def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
-        """The one column that there is of several; else None and a problem, if none is only misspelt.
-
-        Parameters
-        ----------
-        stems
-            Of the columns.
-        usual
-            The full name of one, for the message.
-        missing, several
-            What is expected where there is none, and where there are several (default: the same).
-        """
+    def only(self, stems: Sequence[str], usual: str, expected: str) -> str | None:
+        """The one column that there is of several (`usual`: the name of one); else None and a problem."""
         present = [stem for stem in stems if stem in self]
         if len(present) == 1:
             return present[0]
-        if present:
-            self.in_header(self.fields[present[1]].name, several or missing)
-        elif self.misspelt.isdisjoint(stems):
-            self.in_header(usual, missing)
+        if present or self.misspelt.isdisjoint(stems):
+            self.in_header(self.fields[present[1]].name if present else usual, expected)
         return None
 
     def once(self, stem: str, values: Iterable[Hashable], expected: str) -> None:
@@ -313,37 +299,33 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     }
     meant = {k: column_of(name, columns) for k, name in names.items()}
     near = {k: nearest(names[k], columns) for k, column in meant.items() if column is None}
-    misspelt = frozenset(c.stem for name in near.values() if name and (c := column_of(name, columns)))
-    stems = {column.stem for column in meant.values() if column is not None}
-    missing = [c for c in columns if c.required and c.stem not in stems | misspelt]
+    misspelt = frozenset(one.stem for name in near.values() if name and (one := column_of(name, columns)))
+    stems = misspelt.union(column.stem for column in meant.values() if column is not None)
+    missing = [column for column in columns if column.required and column.stem not in stems]
     unknown = [names[k] for k, name in near.items() if name is None]
-    if not _has_columns(grid, columns, stems | misspelt, missing, unknown, problems):
+    if not _has_columns(grid, columns, stems, missing, unknown, problems):
         return None
-    places: dict[str, tuple[int, Unit | None]] = {}
+    places: dict[str, tuple[int, Unit | None, Column]] = {}
     for k, column in meant.items():
-        wrong, unit = "", None
+        wrong, unit, suffix = "", None, names[k][len(column.stem) + 1 :] if column else ""
         if column is None:
             wrong = f"a known column (did you mean {near[k]!r}?)" if near[k] else ""
         elif column.stem in places:
             wrong = f"the column once, not also {grid.header[places[column.stem][0]]}"
         else:
             try:
-                unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else None
+                unit = column.unit(suffix) if column.unit else None
             except UnitError as error:
                 wrong, unit = str(error), UNCLEAR
-            places[column.stem] = k, unit
+            places[column.stem] = k, unit, column
         if wrong:
             name = grid.named[0][k] if grid.named else names[k]
             problems.add(grid.source, grid.header_row, name, name, wrong)
-    of_numbers = [k for k, unit in places.values() if unit is not None]
+    of_numbers = [k for k, unit, _ in places.values() if unit is not None]
     commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
     comma = decimal_comma(commas, grid.separator)
-    by_stem = {column.stem: column for column in columns}
-    fields = {
-        stem: _field(grid, k, unit, by_stem[stem], problems, comma=comma)
-        for stem, (k, unit) in places.items()
-    }
-    if missing or any(column.required and column.stem not in places for column in columns):
+    fields = {stem: _field(grid, *place, problems, comma=comma) for stem, place in places.items()}
+    if any(column.required and column.stem not in places for column in columns):
         return None
     rows = tuple(number for number, _ in grid.rows)
     return Table(grid.source, grid.header_row, rows, fields, problems, misspelt, grid.comments, grid.complete)
@@ -363,10 +345,9 @@ def nearest(name: str, columns: Sequence[Column]) -> str | None:
     """The name of a column that was probably meant: `amplitude_um` for `Amplitude [um]`."""
     plain = re.sub(r"[^\w/%]+|_+", "_", name).strip("_")
     for column in sorted(columns, key=lambda column: -len(column.stem)):
-        head, tail = plain[: len(column.stem)], plain[len(column.stem) :]
-        if head.casefold() == column.stem and column.unit is not None and tail.startswith("_"):
+        if column.unit is not None and plain.casefold().startswith(f"{column.stem}_"):
             with suppress(UnitError):
-                return f"{column.stem}_{column.unit(tail[1:]).name}"
+                return f"{column.stem}_{column.unit(plain[len(column.stem) + 1 :]).name}"
     return suggest(name, [example for column in columns for example in column.names])
 
 
@@ -380,32 +361,33 @@ def _has_columns(
 ) -> bool:
     """Whether it may be a table of this kind; at most one problem of unknown and missing columns."""
     known = listing([example for column in columns for example in column.names], "and")
-    there = [name for row in grid.named or (grid.header,) for name in row if name]
-    present = listing(dict.fromkeys(there), "and")
+    there = [*dict.fromkeys(name for row in grid.named or (grid.header,) for name in row if name)]
+    present, others, alone = listing(there, "and"), listing(unknown, "and") or None, len(unknown) == 1
     kinds = (
-        kind
+        f": it seems to be {kind}"
         for kind, needed in KINDS.items()
-        if all(any(name == stem or name.startswith(f"{stem}_") for name in there) for stem in needed)
+        if all(any(f"{name}_".startswith(f"{stem}_") for name in there) for stem in needed)
     )
-    seems = next((f": it seems to be {kind}" for kind in kinds), "")
-    fits, column, value, expected = True, unknown[0] if unknown else None, None, ""
+    seems, fits = next(kinds, ""), bool(stems)
     if not stems:
-        fits, column = False, None
+        column, value = None, None
         expected = f"a header row with the names of columns, separated by , or ; or tabs: {known}{seems}"
         problems.drop(grid.source)  # that rows are longer than a title is no news
     elif (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
-        fits, end = False, seems or "; remarks go into 'note'"
+        fits, column, value = False, unknown[0], None
+        end = seems or "; remarks go into 'note'"
         expected = f"a table with the columns {known}; its columns are {present}{end}"
     elif missing:
-        several = f"columns {listing([c.names[0] for c in missing], 'and')}"
+        several = f"columns {listing([one.names[0] for one in missing], 'and')}"
         needed = several if len(missing) > 1 else f"a column {listing(missing[0].names)}"
-        column, value = missing[0].names[0], listing(unknown, "and") or None
-        expected = f"{needed}; the columns are {present}"
+        column, value, expected = missing[0].names[0], others, f"{needed}; the columns are {present}"
     elif unknown:
-        what = "a known column" if len(unknown) == 1 else "known columns"
-        column, value = column if len(unknown) == 1 else None, listing(unknown, "and")
+        column, value = unknown[0] if alone else None, others
+        what = "a known column" if alone else "known columns"
         expected = f"{what}: {known}; remarks go into 'note'"
-    if expected and not (fits and missing and problems.of(grid.source)):
+    else:
+        return True
+    if not (fits and missing and problems.of(grid.source)):
         problems.add(grid.source, grid.header_row, column, value, expected)
     return fits
 
@@ -416,22 +398,23 @@ def _field(
     cells = tuple(row[index] for _, row in grid.rows)
     names = tuple(row[index] for row in grid.named)
     name = names[0] if len(set(names)) == 1 else grid.header[index]
-    # most cells of a long table say what another one has said
-    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
     doubtful: set[str] = set()
     if unit is not None and not comma and grid.separator in (";", "\t"):
         doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), grid.header[index])
+    nothing: str | float = "" if unit is None else math.nan
+    # most cells of a long table say what another one has said
+    read: dict[Cell, str | float] = {"": nothing} if column.blank else {}
     for place, cell in enumerate(cells):
         try:
-            if cell not in known:
-                known[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
+            if cell not in read:
+                read[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
         except NotANumber as error:
             if not column.lenient:
                 where = names[place] if names else name
                 problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
-    values = [known.get(cell, "") for cell in cells]
-    numbers = np.array([math.nan if isinstance(value, str) else value for value in values], dtype=float)
-    texts = tuple(value if isinstance(value, str) else "" for value in values)
+    values = [read.get(cell, nothing) for cell in cells]
+    numbers = np.full(len(cells), math.nan) if unit is None else np.array(values, dtype=float)
+    texts = tuple(map(str, values)) if unit is None else ("",) * len(cells)
     return Field(name, unit, cells, numbers, texts, names)
 
 
@@ -440,7 +423,15 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
     if isinstance(cell, BadCell):
         raise NotANumber(cell.expected)
     if unit is None:
-        return _named(show(cell))
+        text = show(cell)
+        if not text:
+            raise NotANumber("a name")
+        if text[0] in "=@" or not text.isprintable():
+            words = "a name without control characters, which does not begin as a formula, with = or @"
+            raise NotANumber(words)
+        if is_spreadsheet_error(text) or not text.strip("#"):
+            raise NotANumber("a name, not an error of the spreadsheet")
+        return text
     if cell in doubtful:
         raise NotANumber(
             "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
@@ -452,16 +443,6 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
     if math.isinf(value):
         raise NotANumber("a finite number")
     return value
-
-
-def _named(text: str) -> str:
-    if not text:
-        raise NotANumber("a name")
-    if text[0] in "=@" or not text.isprintable():
-        raise NotANumber("a name without control characters, which does not begin as a formula, with = or @")
-    if is_spreadsheet_error(text) or not text.strip("#"):
-        raise NotANumber("a name, not an error of the spreadsheet")
-    return text
 
 
 def written_steps(cells: Sequence[Cell]) -> FloatArray:
@@ -488,8 +469,7 @@ def written_steps(cells: Sequence[Cell]) -> FloatArray:
     """
     texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
     digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
-    found = np.array([digits[text] for text in texts], dtype=np.int64).reshape(-1, 3)
-    decimals, significant, first = found.T
+    decimals, significant, first = np.array([digits[text] for text in texts], dtype=int).reshape(-1, 3).T
     most = decimals.max(initial=-99)
     fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
     return np.asarray(10.0 ** -np.where(significant > 0, np.maximum(decimals, fixed), most))
@@ -500,10 +480,8 @@ def _digits(text: str) -> tuple[int, int, int]:
     if float(text) == 0:  # also 1e-999
         return max(0, -int(Decimal(re.sub("[eE].*", "", text)).as_tuple().exponent)), 0, 0
     number = Decimal(text)
-    _, digits, exponent = number.as_tuple()
-    if len(digits) > _SURE:
+    if len(number.as_tuple().digits) > _SURE:
         number = Decimal(f"{float(text):.12g}")
-        _, digits, exponent = number.as_tuple()
-    if int(exponent) >= 0:
-        digits = number.normalize().as_tuple().digits
-    return -int(exponent), len(digits), number.adjusted()
+    exponent = int(number.as_tuple().exponent)
+    significant = (number.normalize() if exponent >= 0 else number).as_tuple().digits
+    return -exponent, len(significant), number.adjusted()

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, cast, get_args
+from typing import cast, get_args
 
 import numpy as np
 
 from balancing import Labels
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Angles as Angles
+from rotorid.base.text import Phase as Phase
+from rotorid.base.text import Rotation as Rotation
+from rotorid.base.text import View as View
 from rotorid.base.text import listing
-from rotorid.base.words import Angles as Angles
-from rotorid.base.words import Phase as Phase
-from rotorid.base.words import Rotation as Rotation
-from rotorid.base.words import View as View
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 ANGLES: tuple[Angles, ...] = get_args(Angles)
@@ -38,8 +38,8 @@ class Conventions:
         Speeds of different runs that differ by less count as one.
     unstated
         Which of "phase" and "angles" neither the job nor the caller states.
-    columns
-        `job_models.Columns`: names that the columns of the runs tables have in the files; None: their own.
+    exchanged
+        Whether amplitudes and phases stand in each other's columns of the runs tables; None: unstated.
     speed
         Unit and number of the only speed, for runs tables without a column of speeds.
     holes
@@ -58,7 +58,7 @@ class Conventions:
     labels: Labels = field(default_factory=Labels)
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
-    columns: Any = None  # Columns of a job, which know where they stand
+    exchanged: bool | None = None
     speed: tuple[str, float] | None = None
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()
@@ -73,21 +73,8 @@ class Conventions:
 
     def on(self, labels: Labels) -> Labels:
         """Labels that also say how the rotor turns and from which end that is seen."""
-        own = self.labels
-        return replace(labels, rotation=own.rotation, view=own.view, clock=own.clock)
-
-
-def check_angles(word: str) -> None:
-    """Refuse a word that says nothing about angles.
-
-    Raises
-    ------
-    ValueError
-        Naming the allowed words.
-    """
-    if word not in STATED_ANGLES:
-        hint = did_you_mean(word, STATED_ANGLES)
-        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {word!r}{hint}")
+        stated = self.labels
+        return replace(labels, rotation=stated.rotation, view=stated.view, clock=stated.clock)
 
 
 def resolve_angles(stated: str, rotation: str | None) -> Angles:
@@ -98,7 +85,9 @@ def resolve_angles(stated: str, rotation: str | None) -> Angles:
     ValueError
         For another word, and for clockwise or counter-clockwise without a rotation.
     """
-    check_angles(stated)
+    if stated not in STATED_ANGLES:
+        hint = did_you_mean(stated, STATED_ANGLES)
+        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {stated!r}{hint}")
     if stated in ANGLES:
         return stated
     if rotation is None:

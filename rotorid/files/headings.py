@@ -1,96 +1,100 @@
 """Headings as instruments and people write them: the quantity of a column, its unit, its sensor.
 
 `Speed (rpm)`, `1X Ampl [µm pp]`, `Phase lag (°)`, `A_phase_deg`, `Bearing 1 mils`, `DE deg`; in a weights
-table `Weight [g]`, `Angle`, `Hole`, `Clock`. A table may have two rows of headings, the upper one with
-names over several columns.
+table `Weight [g]`, `Angle`, `Hole`, `Clock`. Some words of a heading say what the column holds, those at its
+end are a unit, and what is left names the sensor. A table may have two rows of headings, the upper one
+with names over several columns, and a row of units.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
-from rotorid.base.suggestions import suggest
+from rotorid.base.choices import suggest
 from rotorid.files import units
 from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
-from rotorid.files.units import UnitError, UnitReader, one_of
+from rotorid.files.units import UnitError, one_of
 
-READING = ("amplitude", "phase")
+READING, WEIGHT = ("amplitude", "phase"), ("mass", "angle")
 LONGEST = 100
 """Of a heading, or a cell, that is read here: searching longer ones would take the square of their length."""
-_RUN = "run|test|trial|state|condition|step|measurement"
-_NEEDED = {"run", "speed", "sensor", *READING}
-_AMPLITUDE, _PHASE = r"amplitude|ampl|amp|magnitude|mag", r"phase angle|phase|phs|ph|phi|φ"
-
-
-def _words(**words: str) -> dict[str, re.Pattern[str]]:
-    """Patterns of whole words, in the order in which they are looked for."""
-    return {
-        stem.rstrip("_"): re.compile(rf"(?<![^\W\d_])(?:{of})(?![^\W\d_])", re.IGNORECASE)
-        for stem, of in words.items()
-    }
-
-
-_READINGS = _words(
-    vector=rf"(?:{_AMPLITUDE})\W+(?:{_PHASE})|vector",
-    amplitude=_AMPLITUDE,
-    phase=rf"{_PHASE}|lag|lead|angle",
+_RUN = "run test trial state condition step measurement"
+_OF_RUNS = {
+    "mounted": "weight weights wt mass correction",
+    "amplitude": "amplitude ampl amp magnitude mag",
+    "phase": "phase phs ph phi φ lag lead lagging leading angle",
+    "vector": "vector",
+    "speed": "speed rpm cpm frequency freq",
+    "sensor": "sensor probe channel point transducer bearing",
+    "run": _RUN,
+    "repeat": "repeat",
+    "vibration": "vibration vib velocity displacement severity",
+}
+_OF_WEIGHTS = {
+    "clock": "clock o",
+    "angle": "angle angular location direction phase",
+    "hole": "hole blade vane position pos",
+    "plane": "plane",
+    "action": "action",
+    "unit": "unit",
+    "pieces": "pieces",
+    "mass": "unbalance imbalance weight mass wt amount",
+    "run": _RUN,
+}
+"""Words for what a column holds; the first kind of which a heading has one counts."""
+_ROLES = {
+    weights: {stem: frozenset(words.split()) for stem, words in of.items()}
+    for weights, of in ((False, _OF_RUNS), (True, _OF_WEIGHTS))
+}
+_LETTERS = re.compile(r"([^\W\d_]+)")
+_FILLERS = frozenset(
+    _LETTERS.findall(
+        "name no nr number id shaft rotor machine running rotational nominal measurement measuring run "
+        "measured position vibration vib balance balancing trial correction of"
+    )
 )
-_OTHERS = _words(
-    speed="speed|rpm|cpm|frequency|freq",
-    sensor="sensor|probe|channel|point|transducer|bearing",
-    run=_RUN,
-    repeat="repeat",
-)
-_QUANTITY = _words(amplitude="vibration|vib|velocity|displacement|severity")
-"""Says the quantity where nothing else does."""
-_WEIGHTS = _words(
-    clock="o['’]?clock|clock",
-    angle="angle|angular position|location|direction|phase",
-    hole="hole|blade|vane|position|pos",
-    plane="plane",
-    action="action",
-    unit="unit",
-    pieces="pieces",
-    mass="unbalance|imbalance|weight|mass|wt|amount",
-    run=_RUN,
-)
+_NO_NAMES = {
+    False: frozenset[str]().union(*(_ROLES[False][stem] for stem in (*READING, "vector", "vibration"))),
+    True: _FILLERS.union(*_ROLES[True].values()),
+}
+"""Words of which no sensor's or plane's name consists."""
 _TIDY = {
     False: re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)"),
     True: re.compile(
         r"(?:(mass|unbalance|angle)(?:_(?!clock)(.*))?|run|plane|hole|clock|action|unit|pieces)"
     ),
 }
-DEVIATION = re.compile(r"(?:amplitude|phase)_std(?:_|$)")
-_BESIDE = re.compile(
-    r"order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff|.*\boverall\b|date|time(?:\b|stamp)|remark|operator|temp",
-    re.IGNORECASE,
-)
+_BESIDE = {
+    False: re.compile(
+        r"(?:amplitude|phase)_std(?:_|$)|order|time_s|turns|overall|gap(?:_|$)|.*\bcoeff|.*\boverall\b|date"
+        r"|time(?:\b|stamp)|remark|operator|temp",
+        re.IGNORECASE,
+    ),
+    True: re.compile("date|time|remark|operator", re.IGNORECASE),
+}
 """What `rotorid vectors` and instruments write beside the readings."""
-_BESIDE_WEIGHTS = re.compile("date|time|remark|operator", re.IGNORECASE)
-_FILLERS = re.compile(
-    "(?:|name|no|nr|number|id|shaft|rotor|machine|running|rotational|nominal|measurement|measuring|run|measured"
-    "|position|vibration|vib|balance|balancing|trial|correction|of)",
-    re.IGNORECASE,
-)
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
+_SIGNS = " _-.:,;/|&'’"
+"""They join the parts of a name."""
 _ORDER = re.compile(r"(?<![^\W_])(?<!\.)([0-9]+(?:\.[0-9]+)?)[xX×](?![^\W_])")
 _PROBE_Y = re.compile(r"(?<![^\W_])[0-9]+[yY](?![^\W_])")
 _DIRECTION = re.compile(r"(?<![^\W\d_])(lag|lead)(?:ging|ing)?(?![^\W\d_])", re.IGNORECASE)
 _SWINGS = r"(?P<pp>pp|p-p|pk[-_]?pk|peak[ -](?:to[ -])?peak)|(?P<rms>rms)|(?P<peak>pk|0-pk|0-p|peak)"
 _SWING = re.compile(rf"[\s_.,-]*(?:{_SWINGS})$", re.IGNORECASE)
-_AT_END = re.compile(
-    rf"(?<![^\W_])(?:(?P<angle>°|deg|degrees?)|(?:mils?|[uµμ]m|microns?|(?:mm|in)[/_]s(?:ec)?|ips)"
-    rf"(?:[\s_.,-]*(?:{_SWINGS}))?)$",
-    re.IGNORECASE,
+_BEHIND = re.compile(
+    rf"[\s_]*(?<![^\W_])({re.sub('[?]P<[a-z]+>', '?:', _SWINGS)}|lag|lead)(?![^\W_])", re.IGNORECASE
 )
-"""A unit that says what it measures: of a phase, or of a vibration."""
-_BOTH_AT_END = re.compile(
-    r"(?<![^\W_])((?:mils?|[uµμ]m|(?:mm|in)/s(?:ec)?|ips)[^/@<∠]*?\s*[/@<∠]\s*(?:°|deg|degrees?))$",
-    re.IGNORECASE,
-)
+"""Words of a unit that may stand elsewhere in a heading."""
+_STARTS = re.compile(r"(?:^|(?<=[\s_.,;:]))(?=[^\s_])")
+"""Of a word."""
+_DIGITS = frozenset("0123456789.,+-")
+BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
+_SURE = re.compile(r"(?:mil|um|mm_s|in_s)(?:_pp|_rms)?(?:@deg)?|deg")
+"""Units that say what they measure without a word for it."""
 _SPELLINGS = {
     other: unit
     for unit, others in {
@@ -108,6 +112,8 @@ _SPELLINGS = {
     }.items()
     for other in others.split()
 }
+MEASURED = ("speed", *READING, "mass")
+"""Quantities whose cells are numbers, maybe with a unit; an angle of a weight may have other forms."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,8 @@ class Heading:
         Its place, and its name in the file.
     stem
         Of the column of a runs or weights table; `vector` for amplitude and phase in one cell, the order of
-        another harmonic (`2X`), `note` of what stays as it is; empty: unknown.
+        another harmonic (`2X`), `mounted` for weights in a runs table, `note` of what stays as it is; empty:
+        unknown.
     unit
         As it is written.
     sensor
@@ -140,6 +147,8 @@ class Heading:
 def read_unit(stem: str, text: str) -> tuple[str, str]:
     """The name in this project of a unit as people write it, `um_pp` of `µm pk-pk`; and `lag` or `lead`.
 
+    Of a `vector` it is that of its amplitude, `um_pp@`, or of both, `um_pp@deg`.
+
     Raises
     ------
     UnitError
@@ -148,6 +157,11 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     direction, plain = "", text.strip()
     if len(plain) > LONGEST:
         raise UnitError(f"a unit, not {len(plain)} characters")
+    if stem == "vector":
+        both = BOTH_UNITS.fullmatch(plain)
+        size, angle = both.groups() if both else (plain, "")
+        angle, direction = read_unit("phase", angle)
+        return f"{read_unit('amplitude', size)[0]}@{angle}", direction
     if stem == "phase":
         direction = " and ".join(sorted({word.casefold() for word in _DIRECTION.findall(plain)}))
         plain = _DIRECTION.sub("", plain).strip(" ,;/")
@@ -156,13 +170,12 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     swing = _SWING.search(plain) if stem == "amplitude" else None
     base = units.spelt(plain[: swing.start()] if swing else plain).replace(" ", "_").removesuffix("ec")
     folded = base.casefold()
-    if stem in ("mass", "unbalance"):
+    if stem == "mass":
         parts = re.split("[_-]", re.sub(r"^(g|oz)\.?(mm|in)$", r"\1_\2", folded))
         return units.weight("_".join(_SPELLINGS.get(part, part) for part in parts if part)).name, ""
     base = _SPELLINGS.get(folded, base if stem == "amplitude" and not base.isupper() else folded)
     if stem != "amplitude":
-        reader: UnitReader = one_of(units.SPEED if stem == "speed" else units.ANGLE)
-        return reader(base).name, direction
+        return one_of(units.SPEED if stem == "speed" else units.ANGLE)(base).name, direction
     if f"{base}_pp" not in units.VIBRATION:
         units.vibration(units.spelt(plain))
         raise UnitError(
@@ -171,9 +184,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     return (f"{base}_{swing.lastgroup}" if swing and swing.lastgroup != "peak" else base), ""
 
 
-MEASURED = ("speed", *READING)
-
-
+@lru_cache
 def readable(stem: str, text: str) -> bool:
     """Whether a text is a unit of the quantity, or nothing."""
     try:
@@ -183,165 +194,148 @@ def readable(stem: str, text: str) -> bool:
     return True
 
 
-def read_headings(
-    header: Sequence[str], named: Mapping[str, str] | None = None, *, weights: bool = False
-) -> list[Heading]:
-    """What the headings of a runs table, or of a weights table, say.
-
-    `named` are names of a runs table by names that the file has.
-    """
-    probes = any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is a probe, else an order
-    headings = [
-        _heading(Heading(i, name), (named or {}).get(name, name), probes=probes, weights=weights)
-        for i, name in enumerate(header)
-    ]
+def read_headings(header: Sequence[str], *, weights: bool = False) -> list[Heading]:
+    """What the headings of a runs table, or of a weights table, say."""
+    probes = weights or any(_PROBE_Y.search(name) for name in header)  # 1X beside 1Y is no order
+    headings = [_heading(Heading(i, name), probes=probes, weights=weights) for i, name in enumerate(header)]
     plain = [h for h in headings if h.stem == "run" and re.search("run", h.name, re.IGNORECASE)]
     if len(plain) == 1:  # beside it a column such as Condition says something else
         headings = [replace(h, stem="note") if h.stem == "run" and h is not plain[0] else h for h in headings]
     return headings
 
 
-def looks_like_header(cells: Sequence[str], named: Mapping[str, str] | None, *, weights: bool) -> bool:
-    """Whether cells are surely the header of a table: most of its columns; of runs, run and speed."""
-    stems = {heading.stem for heading in read_headings(cells, named, weights=weights)}
-    if weights:
-        return {"plane", "mass"} <= stems
-    stems |= set(READING) if "vector" in stems else set()
-    return len(stems & _NEEDED) > len(_NEEDED) / 2 or {"run", "speed"} <= stems
-
-
 def find_header(
-    rows: Sequence[Sequence[str]], named: Mapping[str, str] | None = None, *, weights: bool = False
+    rows: Sequence[Sequence[str]], *, weights: bool = False
 ) -> tuple[int, int, Sequence[str]] | None:
     """Where the header of a runs or weights table surely stands: its first and last row, and its names.
 
-    Rows make one header where a name in the upper one stands over several columns, `Bearing 1` over `mils`
-    and `deg`, and where the lower one has units.
+    That is the row with most of its columns, or several that make one: names over the columns of each
+    sensor, `Bearing 1` over `mils` and `deg`, and a row of units.
     """
     for at, cells in enumerate(rows[:MOST_ABOVE]):
-        last, names, below = at, cells, rows[at + 1 :]
-        both = None if weights or not below else _joined(cells, below[0])
-        if both is not None and looks_like_header(both, named, weights=False):
-            last, names = at + 1, both
-        elif not looks_like_header(cells, named, weights=weights):
-            continue
-        units_below = None if last + 1 >= len(rows) else _with_units(names, rows[last + 1], weights=weights)
-        return (at, last, names) if units_below is None else (at, last + 1, units_below)
+        names, last = cells, at
+        for below in rows[at + 1 : at + 3]:
+            if (both := _as_one(names, below, weights=weights)) is None:
+                break
+            names, last = both, last + 1
+        stems = {heading.stem for heading in read_headings(names, weights=weights)}
+        stems |= set(READING) if "vector" in stems else set()
+        runs = {"run", "speed"} <= stems or len(stems & {"run", "speed", "sensor", *READING}) > 2
+        if {"plane", "mass"} <= stems if weights else runs:
+            return at, last, names
     return None
 
 
-def _with_units(names: Sequence[str], below: Sequence[str], *, weights: bool) -> list[str] | None:
-    """Names with the units of the row below them; None where that row holds something else."""
-    joined, sure = [*names], False
-    for heading, cell in zip(read_headings(names, weights=weights), below, strict=False):
-        text, stem = cell.strip("()[] "), heading.stem
-        if text in ("", "-") or stem == "note":
+def _as_one(upper: Sequence[str], lower: Sequence[str], *, weights: bool) -> list[str] | None:
+    """The names of two rows of headings, or of headings and units; None where the lower row is neither."""
+    names, group, sure = list[str](), "", False
+    width = max(len(upper), len(lower))
+    above, below = (
+        read_headings([*row, *[""] * (width - len(row))], weights=weights) for row in (upper, lower)
+    )
+    for head, heading in zip(above, below, strict=True):
+        text = heading.name.strip("()[] -")
+        quantity = {"": "amplitude", "angle": "phase"}.get(head.stem, head.stem)
+        fits = bool(text) and quantity in (*MEASURED, "vector") and readable(quantity, text)
+        if re.fullmatch("[0-9.,+][0-9.,+-]*", text):
+            return None
+        if heading.stem in (WEIGHT if weights else READING) and not heading.sensor and not head.stem:
+            sure = sure or bool(head.name if fits else group and head.name in ("", group))
+            group = head.name or group
+            names.append(f"{group} {heading.name.strip('-')}".strip())
             continue
-        quantity = "amplitude" if stem in ("", "vector") else "phase" if stem == "angle" else stem
-        known = quantity in (*MEASURED, "mass") and readable(quantity, text)
-        if not known and (stem not in (*MEASURED, "mass") or re.match("[0-9.,+-]", text)):
+        group = ""
+        sure = sure or (fits and bool(head.name))
+        if not text or head.stem in ("note", "mounted"):
+            names.append(head.name)
+        elif not head.name:
+            names.append(heading.name)
+        elif not fits and (head.stem not in MEASURED or text[0] in _DIGITS):
             return None
-        sure = sure or known
-        if not heading.unit:
-            joined[heading.index] = f"{heading.name} ({text})"
-        elif not (known and read_unit(quantity, heading.unit) == read_unit(quantity, text)):
-            joined[heading.index] = f"{quantity} ({heading.unit}, {text})"  # explained as no unit
-    return joined if sure else None
-
-
-def _joined(upper: Sequence[str], lower: Sequence[str]) -> list[str] | None:
-    """The names of two rows of headings; None where no upper name stands over several lower ones."""
-    names, group, several = list[str](), "", False
-    for above, heading in zip([*upper, *[""] * len(lower)], read_headings(lower), strict=False):
-        if re.fullmatch(r"-*[0-9.,+][0-9.,+-]*", heading.name):
-            return None
-        reading = heading.stem in READING and not heading.sensor
-        several = several or (reading and bool(group) and above in ("", group))
-        group = (above or group) if reading else ""
-        names.append(f"{group if reading else above} {heading.name.strip('-')}".strip())
+        elif not head.unit or not readable(quantity, head.unit):
+            names.append(f"{head.name} ({text})")
+        elif fits and read_unit(quantity, head.unit) == read_unit(quantity, text):
+            names.append(head.name)
+        else:
+            names.append(f"{quantity} ({head.unit}, {text})")  # explained as no unit
     filled = [*filter(None, names)]
-    return names if several and len(set(filled)) == len(filled) else None
+    return names if sure and len({*filled}) == len(filled) else None
 
 
-def _heading(unknown: Heading, name: str, *, probes: bool, weights: bool) -> Heading:
+def _heading(heading: Heading, *, probes: bool, weights: bool) -> Heading:
+    name = heading.name
     if len(name) > LONGEST or name.startswith("//"):  # a line that was taken out
-        return unknown
-    beside = not weights and (DEVIATION.match(name) or _BESIDE.match(name))
-    if beside or name.casefold().startswith(REMARKS):
-        return replace(unknown, stem="note")
+        return heading
+    if name.casefold().startswith(REMARKS) or (not weights and _BESIDE[False].match(name)):
+        return replace(heading, stem="note")
     if (tidy := _TIDY[weights].fullmatch(name)) is not None:
         stem = (tidy[1] or tidy[0]).replace("unbalance", "mass")
-        return replace(unknown, stem=stem, unit=tidy[2] or "", tidy=True)
-    order = None if probes or weights else _ORDER.search(name)
+        return replace(heading, stem=stem, unit=tidy[2] or "", tidy=True)
+    order = None if probes else _ORDER.search(name)
     if order is not None and order[1] != "1":
-        return replace(unknown, stem=f"{order[1]}X")
-    name = name if order is None else name.replace(order[0], " ")
-    inside, outside = " ".join(_BRACKETS.findall(name)).strip(), _BRACKETS.sub(" ", name).strip()
+        return replace(heading, stem=f"{order[1]}X")
+    plain = _BRACKETS.sub(" ", name if order is None else name.replace(order[0], " "))
+    inside = " ".join([*_BRACKETS.findall(name), *_BEHIND.findall(plain)]).strip()
+    words = {word.casefold() for word in _LETTERS.findall(plain)}
+    heading = _by_words(heading, words, _BEHIND.sub(" ", plain), inside, weights=weights)
+    if heading.stem or heading.sensor:
+        return heading
     if weights:
-        return _of_weights(unknown, outside, inside)
-    whole = f"{outside} {inside}".strip()
-    if both := _BOTH_AT_END.search(whole):
-        return replace(unknown, stem="vector", unit=both[1], sensor=_bare(whole[: both.start()]))
-    unit = _AT_END.search(whole)
-    for words in (_READINGS, {} if unit else _OTHERS, _QUANTITY):
-        for stem, role in words.items():
-            if match := role.search(outside):
-                heading = _with_rest(replace(unknown, stem=stem), outside, match, inside)
-                if heading.stem and not (words is _QUANTITY and unit and unit["angle"]):
-                    return heading
-    return _by_unit(unknown, outside, inside, unit)
-
-
-def _by_unit(unknown: Heading, outside: str, inside: str, unit: re.Match[str] | None) -> Heading:
-    """A heading without a word for what it is: its unit says it, at its end or in brackets."""
-    whole = f"{outside} {inside}".strip()
-    sensor = _bare(whole[: unit.start()]) if unit else ""
-    if unit and suggest(sensor, READING) is None:  # else a word for the quantity, misspelt
-        return replace(unknown, stem="phase" if unit["angle"] else "amplitude", unit=unit[0], sensor=sensor)
+        return replace(heading, stem="note") if _BESIDE[True].match(name) else heading
     if inside and readable("speed", inside):
-        return replace(unknown, stem="speed", unit=inside)
+        return replace(heading, stem="speed", unit=inside)
     if inside and readable("amplitude", inside):
-        return replace(unknown, unit=inside, sensor=_bare(outside))
-    return replace(unknown, sensor=unknown.name)
+        return replace(heading, unit=inside, sensor=_BEHIND.sub(" ", plain).strip(_SIGNS))
+    return replace(heading, sensor=name)
 
 
-def _with_rest(heading: Heading, outside: str, match: re.Match[str], inside: str) -> Heading:
-    """A heading with the unit that stands after its word or in brackets; the rest is the sensor."""
-    kept = match[0] if match[0].casefold() in ("rpm", "cpm", "lag", "lead") else ""
-    before, after = _bare(outside[: match.start()]), f"{kept} {_bare(outside[match.end() :])}".strip()
-    quantity = "amplitude" if heading.stem == "vector" else heading.stem
-    if quantity not in MEASURED:
-        after, inside = f"{after} {inside}", ""
-    for unit in (f"{after} {inside}", f"{inside} {after}"):  # um (pp), pp (um)
-        if after.strip() and quantity in MEASURED and readable(quantity, unit):
-            after, inside = "", unit.strip()
-    if quantity in READING and not inside and (at_end := _AT_END.search(after)):  # velocity DE mm/s
-        after, inside = after[: at_end.start()], at_end[0]
-    words = [word for word in f"{before} {after}".split() if word.casefold() not in ("vibration", "vib")]
-    if quantity not in READING and any(not _FILLERS.fullmatch(word.strip(".#")) for word in words):
-        return Heading(heading.index, heading.name, sensor=heading.name)
-    return replace(heading, unit=inside, sensor=" ".join(words) if quantity in READING else "")
+def _by_words(heading: Heading, words: set[str], outside: str, inside: str, *, weights: bool) -> Heading:
+    """What the words of a heading say that it is, or else its unit; as it is where neither says it."""
+    roles, pair = _ROLES[weights], {*WEIGHT} if weights else {*READING, "vector"}
+    stems = [stem for stem, of in roles.items() if words & of]
+    if "mounted" in stems:
+        return replace(heading, stem="mounted")
+    if {*READING} <= {*stems}:
+        stems.insert(0, "vector")
+    by_unit, clear = _by_unit(outside, inside, weights=weights)
+    if not stems and suggest(_without_unit(by_unit, outside, inside)[0].strip(_SIGNS), READING):
+        return heading  # a word for the quantity, misspelt
+    if by_unit in stems or not pair & {*stems}:
+        stems = [*filter(None, [by_unit]), *stems]
+    for stem in stems:
+        quantity = "amplitude" if stem == "vibration" else stem
+        rest, unit = _without_unit(quantity, outside, inside)
+        if quantity in pair:
+            no_names = _NO_NAMES[weights]
+            cut = ("\0" if part.casefold() in no_names else part for part in _LETTERS.split(rest))
+            parts = [part.strip(_SIGNS) for part in "".join(cut).split("\0")]
+            if weights and not unit:  # what stands behind the word can be nothing else
+                unit = parts.pop()
+            sensor = " ".join(filter(None, parts))
+            return replace(heading, stem=quantity, unit=unit or clear, sensor=sensor)
+        left = {word.strip(f"#{_SIGNS}").casefold() for word in re.split(r"[\s_]+", rest)}
+        if left <= roles[stem] | _FILLERS | {"", "angle" if weights else ""}:
+            return replace(heading, stem=stem, unit=unit)
+    return replace(heading, stem=stems[0]) if weights and stems else heading
 
 
-def _of_weights(unknown: Heading, outside: str, inside: str) -> Heading:
-    """A heading of a weights table; a number of degrees is an angle, whatever it is called."""
-    for stem, role in _WEIGHTS.items():
-        if match := role.search(outside):
-            after = _bare(outside[match.end() :])
-            unit = inside or ("" if _FILLERS.fullmatch(after) else after)
-            if stem == "hole" and unit and readable("phase", unit):
-                stem = "angle"
-            unit = unit if stem in ("mass", "angle") else ""
-            return replace(unknown, stem=stem, unit=unit, sensor=_bare(outside[: match.start()]))
-    whole = f"{outside} {inside}".strip()
-    at_end = _AT_END.search(whole)
-    if at_end and at_end["angle"]:
-        return replace(unknown, stem="angle", unit="deg", sensor=_bare(whole[: at_end.start()]))
-    if readable("mass", whole) and _SPELLINGS.get(whole.casefold(), whole) != whole:  # Grams
-        return replace(unknown, stem="mass", unit=whole)
-    return replace(unknown, stem="note") if _BESIDE_WEIGHTS.match(unknown.name) else unknown
+def _by_unit(outside: str, inside: str, *, weights: bool) -> tuple[str, str]:
+    """What a column holds as the unit at the end says, and that unit; empty where it may be another."""
+    for stem in WEIGHT if weights else ("vector", *READING):
+        unit = _without_unit(stem, outside, inside)[1]
+        long = stem == "mass" and len(unit) > 1  # grams, not g
+        if readable(stem, unit) and (long or _SURE.fullmatch(read_unit(stem, unit)[0])):
+            return stem, unit
+    return "", ""
 
 
-def _bare(text: str) -> str:
-    """Part of a name without the signs that join it to the rest."""
-    return text.strip(" _-.:,;/|&")
+def _without_unit(stem: str, outside: str, inside: str) -> tuple[str, str]:
+    """A heading without the unit at its end, and that unit: what stands in brackets, or more."""
+    whole = " ".join(f"{outside} {inside}".split())
+    if stem in (*MEASURED, "angle", "vector"):
+        for start in (match.start() for match in _STARTS.finditer(whole)):
+            unit = whole[start:]
+            if len(unit) >= len(inside) and readable(stem, unit):
+                return whole[:start], unit
+        return outside, inside
+    return whole, ""

@@ -11,25 +11,24 @@ import re
 from dataclasses import asdict, fields, replace
 from itertools import islice, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunErrors, Trials
+from rotorid.base import tables
 from rotorid.base.arrays import ComplexArray
-from rotorid.base.json import plain
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.versions import SCHEMA_VERSION
+from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.files import units
-from rotorid.files.cells import Grid, read_bytes
+from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
+from rotorid.files.disk import read_bytes, write_files
+from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
-from rotorid.files.problems import MOST_LINES, Problems
-from rotorid.files.runs import SPEED, nearest_speed, show_speed, show_speeds
-from rotorid.files.table_writing import table_bytes, write_bytes
+from rotorid.files.problems import MOST_LINES, Problems, refusal
+from rotorid.files.runs import SPEED, nearest_speed, show_speed
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
@@ -37,46 +36,32 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
+_STATED = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
+"""What the heading of the phases, or a comment of older versions, says about conventions."""
 
 
-class Stored(NamedTuple):
-    """Stored coefficients, and what their file itself says about its conventions (`phase`, `angles`)."""
-
-    influence: Influence
-    said: Mapping[str, str]
-
-
-class _Halves(NamedTuple):
-    """Units of a coefficient: of the vibration and of the weight, and whether it is weight per vibration."""
-
-    vibration: Unit
-    weight: Unit
-    reciprocal: bool = False
-
-
-def _halves(name: str) -> _Halves:
-    """From `um_pp_per_g`, or `g_per_in_s`, or what stands in a heading such as `Sensitivity (oz/mil)`."""
+def _units(name: str) -> tuple[Unit, Unit, bool]:
+    """Of vibration and weight, from `um_pp_per_g`; true: weight per vibration, `g_per_in_s` or `oz/mil`."""
     text = re.sub("[ _]per[ _]", "/", name)
     for sign in re.finditer("/", text):
         above, below = text[: sign.start()], text[sign.end() :].strip("()")
         if above and below and readable("mass", above) and readable("amplitude", below):
             weight, vibration = read_unit("mass", above)[0], read_unit("amplitude", below)[0]
             if vibration not in units.WEIGHT:
-                return _Halves(units.VIBRATION[vibration], units.WEIGHT[weight], reciprocal=True)
+                return units.VIBRATION[vibration], units.WEIGHT[weight], True
     above, separator, below = name.rpartition("per_")
     if not separator or (above and not above.endswith("_")):
         raise UnitError(f"a name like {_PATTERN}")
-    return _Halves(units.vibration(above.rstrip("_")), units.weight(below))
+    return units.vibration(above.rstrip("_")), units.weight(below), False
 
 
 def _influence_unit(name: str) -> Unit:
-    halves = _halves(name)
-    one, other = halves[1::-1] if halves.reciprocal else halves[:2]
+    vibration, weight, reciprocal = _units(name)
+    one, other = (weight, vibration) if reciprocal else (vibration, weight)
     kind = f"{one.kind} per {other.kind}"
     return Unit(name, kind, one.multiply * other.divide, one.divide * other.multiply)
 
@@ -124,65 +109,36 @@ def read_influence(
         With all problems of the file.
     """
     problems = Problems()
-    stored = problems.need(load_influence(Path(path), phase, angles, problems))
+    influence, _ = problems.need(load_influence(Path(path), phase, angles, problems))
     problems.stop()
-    return stored.influence
+    return influence
 
 
 def load_influence(
     source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
-) -> Stored | None:
-    """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
+) -> tuple[Influence, dict[str, str]] | None:
+    """As `read_influence`, from a file or from the cells of a sheet, and the conventions that it states."""
     if isinstance(source, Path) and source.suffix.lower() == ".json":
-        influence = _from_json(source, problems)
-        if influence is None:
+        influence, stated = _from_json(source, problems), dict[str, str]()
+        if influence is not None:
+            stated = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
+    else:
+        before, grid = len(problems), read_grid(source, "influence", problems)
+        table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
+        if table is None or table.unit("influence") == UNCLEAR:
             return None
-        own = influence.labels
-        labels = replace(own, phase=phase or own.phase, angles=angles or own.angles)
-        return Stored(replace(influence, labels=labels), {"phase": own.phase, "angles": own.angles})
-    before = len(problems)
-    grid = read_grid(source, "influence", problems)
-    table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
-    if table is None or table.unit("influence") == UNCLEAR or not _is_sound(table):
+        text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
+        stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
+        written = Labels(
+            phase=as_phase(stated.get("phase") or phase or "lead"),
+            angles=as_angles(stated.get("angles") or angles or "with rotation"),
+        )
+        influence = _from_table(table, written, before)
+    if influence is None:
         return None
-    said = _stated(table)
-    written = Labels(
-        phase=as_phase(said.get("phase") or phase or "lead"),
-        angles=as_angles(said.get("angles") or angles or "with rotation"),
-    )
-    size, angle, name = table.numbers("influence"), table.numbers("phase"), table.unit("influence").name
-    vibration, weight, reciprocal = _halves(name)
-    values = written.vibration_from(size, angle)
-    if reciprocal:
-        values = 1.0 / written.weight_from(size, angle)
-    rows = _keys(table)
-    speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*rows, strict=True))
-    speeds.sort()
-    place = {row: i for i, row in enumerate(rows)}
-    missing = (key for key in product(speeds, sensors, planes) if key not in place)
-    for v, c, p in islice(missing, MOST_LINES):
-        shown = show_speed(v, table.unit("speed"))
-        table.as_whole("plane", f"a coefficient of sensor {c!r} and plane {p!r} at {shown}")
-    if len(problems) > before:
-        return None
-    S, C, P = len(speeds), len(sensors), len(planes)
-    at = np.array([place[key] for key in product(speeds, sensors, planes)], dtype=int).reshape(S, C, P)
-    errors = Gaussian.none(S, C, P)
-    if "std" in table:
-        variance = np.zeros((S, C, 2 * P + 2))
-        variance[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
-        covariance = variance[..., None] * np.eye(2 * P + 2)
-        errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
-    labels = Labels(
-        vibration.name,
-        vibration.scale,
-        weight.name,
-        weight.scale,
-        phase=phase or written.phase,
-        angles=angles or written.angles,
-    )
-    names, nothing = (tuple(sensors), tuple(planes)), np.full((S, C), np.nan)
-    return Stored(Influence(np.array(speeds), *names, values[at], nothing, errors, labels), said)
+    its = influence.labels
+    labels = replace(its, phase=phase or its.phase, angles=angles or its.angles)
+    return replace(influence, labels=labels), stated
 
 
 def _tidied(grid: Grid) -> Grid:
@@ -191,53 +147,74 @@ def _tidied(grid: Grid) -> Grid:
     for at, name in enumerate(grid.header):
         match = _NAMED.fullmatch(name)
         try:
-            vibration, weight, reciprocal = _halves(match[1] if match else "")
+            vibration, weight, reciprocal = _units(match[1] if match else "")
+            headings = read_headings(header)
+            units_of = [read_unit("phase", h.unit)[0] or "deg" if h.stem == "phase" else "" for h in headings]
         except UnitError:
             continue
-        if reciprocal:
-            header = [("phase_deg" if h.stem == "phase" else h.name) for h in read_headings(header)]
-            header[at] = f"influence_{weight.name}_per_{vibration.name}"
-            vectors = [vector_in(cells[at]) or ("", "") for _, cells in rows]
-            if "phase_deg" not in header and ("", "") not in vectors:
-                header.append("phase_deg")
-                rows = tuple(
-                    (number, (*cells[:at], size, *cells[at + 1 :], angle.rstrip("° ")))
-                    for (number, cells), (size, angle) in zip(rows, vectors, strict=True)
-                )
+        if not reciprocal:
+            continue
+        header = [f"phase_{unit}" if unit else h.name for unit, h in zip(units_of, headings, strict=True)]
+        header[at] = f"influence_{weight.name}_per_{vibration.name}"
+        vectors = [vector_in(cells[at]) for _, cells in rows]
+        if not any(units_of) and None not in vectors:
+            header.append("phase_deg")
+            rows = tuple(
+                (number, (*cells[:at], vector[0], *cells[at + 1 :], vector[1].rstrip("° ")))
+                for (number, cells), vector in zip(rows, vectors, strict=True)
+                if vector
+            )
     return replace(grid, header=tuple(header), rows=rows)
 
 
-def _is_sound(table: Table) -> bool:
-    """Whether the cells can be coefficients; else problems."""
-    before, size = len(table.problems), table.numbers("influence")
+def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
+    """The coefficients with these conventions, or None and more problems than `before`."""
+    size, angle, unit, std = (
+        *map(table.numbers, ("influence", "phase")),
+        table.unit("influence"),
+        "std" in table,
+    )
+    vibration, weight, reciprocal = _units(unit.name)
+    keys = [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
+    least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
+    table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
+    table.must_be("phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
-    if _halves(table.unit("influence").name).reciprocal:
-        table.must_be("influence", size > 0, "a weight above 0")
-        if len({*table.texts("sensor")}) > 1 or len({*table.texts("plane")}) > 1 or "std" in table:
-            expected = "one sensor, one plane and no errors: a weight per vibration is of one alone"
-            table.in_header(table.fields["influence"].name, expected)
-    else:
-        table.must_be("influence", size >= 0, "a coefficient of 0 or more")
-        if "std" in table and table.unit("std") != table.unit("influence"):
-            unit = table.unit("influence").name
-            table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit}")
-    table.once("plane", _keys(table), "one coefficient per speed, sensor and plane (row {} has the same)")
-    return len(table) > 0 and not table.problems.of(table.source) and len(table.problems) == before
-
-
-def _keys(table: Table) -> list[tuple[float, str, str]]:
-    """Speed, sensor and plane of each row."""
-    return [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
-
-
-def _stated(table: Table) -> dict[str, str]:
-    """What the heading of the phases, or comment lines of older versions, say about conventions."""
-    patterns = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
-    text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
-    matches = {key: re.search(pattern, text) for key, pattern in patterns.items()}
-    return {key: match[1] for key, match in matches.items() if match}
+    if reciprocal and (std or len({key[1:] for key in keys}) > 1):
+        alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
+        table.in_header(table.fields["influence"].name, alone)
+    elif std and table.unit("std") != unit:
+        table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
+    table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
+    if not keys or len(table.problems) > before:
+        return None
+    speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*keys, strict=True))
+    speeds.sort()
+    row = {key: k for k, key in enumerate(keys)}
+    for place in islice((key for key in product(speeds, sensors, planes) if key not in row), MOST_LINES):
+        words = f"sensor {place[1]!r} and plane {place[2]!r} at {show_speed(place[0], table.unit('speed'))}"
+        table.as_whole("plane", f"a coefficient of {words}")
+    if len(table.problems) > before:
+        return None
+    S, C, P = len(speeds), len(sensors), len(planes)
+    at = np.reshape([row[key] for key in product(speeds, sensors, planes)], (S, C, P))
+    values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
+    errors = Gaussian.none(S, C, P)
+    if std:
+        variance = np.zeros((S, C, 2 * P + 2))
+        variance[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
+        covariance = variance[..., None] * np.eye(2 * P + 2)
+        errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
+    labels = replace(
+        labels,
+        vibration_unit=vibration.name,
+        vibration_scale=vibration.scale,
+        weight_unit=weight.name,
+        weight_scale=weight.scale,
+    )
+    nothing = np.full((S, C), np.nan)
+    return Influence(np.array(speeds), tuple(sensors), tuple(planes), values[at], nothing, errors, labels)
 
 
 def _from_json(path: Path, problems: Problems) -> Influence | None:
@@ -248,33 +225,36 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
     try:
         whole = json.loads(data)
         problems.refuse_newer(str(path), whole["schema_version"])
-        stored = whole["influence"]
-        reading, run = stored["reading"], stored["run_errors"]
-        sizes, chances = (np.array(run[key], dtype=float) for key in ("sizes", "probability"))
-        if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
-            raise ValueError("sizes of errors and probabilities must be 0 or more")
-        run = RunErrors(**{**run, "sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()})
-        errors = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
-        reading = Reading(errors, reading["source"], dof=reading["dof"] or np.inf)
-        own = np.array(stored["covariance"], dtype=float)
-        common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
-        influence = Influence(
-            speeds=np.array(stored["speeds_rad_s"], dtype=float),
-            sensors=tuple(stored["sensors"]),
-            planes=tuple(stored["planes"]),
-            W=_complex(stored["W"]),
-            baseline=_complex(stored["baseline"]),
-            errors=Gaussian(own, common, reading, run),
-            labels=Labels(**{**stored["labels"], "assumed": tuple(stored["labels"]["assumed"])}),
-        )
-        covariance = influence.channels() if own.shape[:2] == influence.W.shape[:2] else own[:0]
-        if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
-            raise ValueError("a covariance is none")
-        return influence
+        return _of_document(whole["influence"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         problems.add(str(path), None, None, None, f"coefficients as rotorid balance writes them ({reason})")
     return None
+
+
+def _of_document(stored: Mapping[str, Any]) -> Influence:
+    """The coefficients of `_document`, as they were."""
+    reading, run, labels = stored["reading"], stored["run_errors"], stored["labels"]
+    sizes, chances, covariance = (
+        np.array(part, dtype=float) for part in (run["sizes"], run["probability"], stored["covariance"])
+    )
+    if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
+        raise ValueError("sizes of errors and probabilities must be 0 or more")
+    if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
+        raise ValueError("a covariance is none")
+    stated = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
+    run = run | {"sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()}
+    common = _complex(stored["common"]).reshape(-1, *covariance.shape[:2], covariance.shape[2] // 2)
+    reading = Reading(stated, reading["source"], dof=reading["dof"] or np.inf)
+    return Influence(
+        speeds=np.array(stored["speeds_rad_s"], dtype=float),
+        sensors=tuple(stored["sensors"]),
+        planes=tuple(stored["planes"]),
+        W=_complex(stored["W"]),
+        baseline=_complex(stored["baseline"]),
+        errors=Gaussian(covariance, common, reading, RunErrors(**run)),
+        labels=Labels(**labels | {"assumed": tuple(labels["assumed"])}),
+    )
 
 
 def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON document
@@ -285,7 +265,7 @@ def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON docu
 
 def _document(influence: Influence) -> dict[str, Any]:
     """All that is known of coefficients and their errors, SI and phase lead: (2, …) real, imaginary parts."""
-    own, common = influence.errors.noise.at(influence.errors.sizes)
+    covariance, common = influence.errors.noise.at(influence.errors.sizes)
     run, reading = influence.run_errors, influence.reading
     stored = {
         "speeds_rad_s": influence.speeds,
@@ -293,7 +273,7 @@ def _document(influence: Influence) -> dict[str, Any]:
         "planes": influence.planes,
         "W": (influence.W.real, influence.W.imag),
         "baseline": (influence.baseline.real, influence.baseline.imag),
-        "covariance": own,
+        "covariance": covariance,
         "common": (common.real, common.imag),
         "reading": {
             "errors": None if reading.errors is None else asdict(reading.errors),
@@ -359,14 +339,20 @@ def write_influence(path: str | Path, influence: Influence) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_files({Path(path): influence_bytes(path, influence)})
 
 
 def influence_bytes(path: str | Path, influence: Influence) -> bytes:
     """What `write_influence` writes."""
-    if Path(path).suffix.lower() == ".json":
+    kind = Path(path).suffix.lower()
+    if kind == ".json":
         return json.dumps(_document(influence), ensure_ascii=False).encode()
-    return table_bytes(path, influence_frame(influence), sheet="influence")
+    if kind not in (".csv", ".xlsx"):
+        raise refusal(path, "a name that ends in .csv, .xlsx or .json")
+    frame = influence_frame(influence)
+    columns = (tables.Column(str(name), values.tolist()) for name, values in frame.items())
+    table = tables.Table("influence", tuple(columns))
+    return tables.csv(table) if kind == ".csv" else tables.excel(table)
 
 
 def fit_to_readings(
@@ -376,33 +362,17 @@ def fit_to_readings(
 
     Every speed and sensor of the readings must be there; further ones are left out.
     """
-    ours, theirs, rpm = trials.labels, influence.labels, units.SPEED["rpm"]
-    pairs = [(units.vibration, ours.vibration_unit, theirs.vibration_unit, "runs")]
-    if trials.planes:
-        pairs.append((units.weight, ours.weight_unit, theirs.weight_unit, "weights"))
-    for unit_of, our, their, table in pairs:
-        if unit_of(our).kind != unit_of(their).kind:
-            expected = f"coefficients in {our or 'no unit'} or a unit that converts, as the {table} table has"
-            problems.add(source, None, "influence", their or "no unit", expected)
-    rows = [nearest_speed(influence.speeds, v, tolerance_percent) for v in trials.speeds.tolist()]
-    for speed in trials.speeds[[row is None for row in rows]]:
-        known = show_speeds(influence.speeds, rpm)
-        expected = f"coefficients at {show_speed(speed, rpm)}, as the runs table has; there are {known}"
-        problems.add(source, None, "speed", None, expected)
-    pairs_of_names = (trials.sensors, influence.sensors), (trials.planes, influence.planes)
-    for what, table, (names, there) in zip(
-        ("sensor", "plane"), ("runs", "weights"), pairs_of_names, strict=True
-    ):
-        for name in names:
-            if name not in there:
-                hint = f"there are {listing(there, 'and')}{did_you_mean(name, there)}"
-                expected = f"coefficients of {what} {name!r}, as the {table} table has; {hint}"
-                problems.add(source, None, what, None, expected)
-    if len(problems):
+    before = len(problems)
+    for column, shown, there in outside(trials, influence, influence.planes, tolerance_percent):
+        expected = f"coefficients for {column} {shown!r}, which the readings have; there are {there}"
+        column = "influence" if column in ("amplitude", "weight") else column
+        problems.add(source, None, column, None, expected)
+    if len(problems) > before:
         return None
+    rows = [nearest_speed(influence.speeds, v, tolerance_percent) or 0 for v in trials.speeds.tolist()]
     columns = [influence.sensors.index(name) for name in trials.sensors]
-    unit = units.weight(ours.weight_unit if trials.planes else theirs.weight_unit)
+    unit = units.weight((trials if trials.planes else influence).labels.weight_unit)
     if not trials.planes and unit.name == "kg_m":
         unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
-    labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
-    return replace(influence.part([row or 0 for row in rows], columns), speeds=trials.speeds, labels=labels)
+    labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
+    return replace(influence.part(rows, columns), speeds=trials.speeds, labels=labels)

@@ -15,17 +15,15 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.files.cells import decode, read_bytes
-from rotorid.files.cells import readable as why_not_readable
-from rotorid.files.input_file import file_content, first_bytes
-from rotorid.files.problems import InputError, Problem, Problems, printable
+from rotorid.files.cells import decode
+from rotorid.files.disk import file_content, first_bytes, read_bytes, why_unreadable
+from rotorid.files.problems import InputError, Problems, printable, refusal
 from rotorid.files.units import FORCE, TIME, VIBRATION, Unit, spelt
 
 DERIVATIVE = {"length": 0, "velocity": 1, "acceleration": 2}
@@ -67,13 +65,6 @@ class Sampled:
     first_row: int = 1
 
 
-def refusal(
-    path: Path, expected: str, row: int | None = None, column: str | None = None, value: str | None = None
-) -> InputError:
-    """To be raised: one problem of a file."""
-    return InputError([Problem(str(path), row, column, value, expected)])
-
-
 def read_samples(path: Path) -> Sampled:
     """Channels of a file of one of the `READERS`, without that of the times, which gives the rate.
 
@@ -110,7 +101,7 @@ def _reading(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except OSError as error:
-        raise refusal(path, why_not_readable(path, error)) from error
+        raise refusal(path, why_unreadable(path, error)) from error
     except ImportError as error:
         raise refusal(path, f"what reads it to be installed: pip install {error.name}") from error
     except Exception as error:
@@ -130,13 +121,12 @@ def _rate(path: Path, clock: str, times: AnyArray, first_row: int) -> float:
     unit = time_unit(clock) or TIME["s"]
     number = np.arange(len(times)) - (len(times) - 1) / 2
     step = float(number @ times / (number @ number))
-    in_place = np.abs(times - np.mean(times) - step * number) <= LARGEST_SHIFT * step
-    if step > 0 and in_place.all():
+    off = np.abs(times - np.mean(times) - step * number)
+    if step > 0 and (off <= LARGEST_SHIFT * step).all():
         return 1.0 / unit.to_si(step)
-    jumps = np.diff(times)
-    usual = float(np.nanmedian(jumps))
-    even = np.abs(jumps - usual) <= LARGEST_SHIFT * abs(usual)
-    at = 1 + int(np.argmin(in_place[1:] if even.all() else even))
+    usual = float(np.nanmedian(np.diff(times)))
+    even = np.abs(times - times[0] - usual * np.arange(len(times))) <= LARGEST_SHIFT * abs(usual)
+    at = int(np.argmin(even))
     expected = f"times in even steps, {usual:.6g} {unit.name} here, or no such column and a stated rate"
     value = "" if np.isnan(times[at]) else f"{times[at]:.9g}"
     raise refusal(path, expected, at + first_row, clock, value)
@@ -147,28 +137,26 @@ def _read_text(path: Path) -> Sampled:
     import pandas as pd
 
     problems = Problems()
-    text = problems.need(decode(str(path), problems.need(read_bytes(path, problems)), problems))
-    lines = [*islice(io.StringIO(text, newline=None), HEAD)]
+    data = problems.need(read_bytes(path, problems))
+    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), data, problems)))
+    lines = text.split("\n", HEAD)[:HEAD]
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in lines[len(lines) // 2 :]))
-    rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator)))] for line in lines]
+    rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator), ()))] for line in lines]
     numbers = [[k for k, cell in enumerate(row) if _NUMBER.fullmatch(cell)] for row in rows]
-    places = max(filter(None, numbers), key=numbers.count, default=None)
-    if places is None:
-        raise refusal(path, "a table: a column a channel, a row a sample, and names above the numbers")
-    above = numbers.index(places)
-    names = _names(path, rows[:above], places)
-    stream = io.StringIO(text if separator == "," else text.replace(",", "."), newline=None)
-    for _ in range(above):
-        stream.readline()
+    places = max(filter(None, numbers), key=numbers.count, default=[-1])
+    above = numbers.index(places) if places in numbers else 0
+    headers = [[row[k] for k in places] for row in rows[:above] if len(row) > places[-1] and any(row)]
+    names = [name.strip("#_ ") for name in (headers or [[""]])[-1]]
+    unit = [spelt(name.strip("[]() ")) for name in names]
+    if len(headers) > 1 and unit[0] in TIME:
+        names = ["_".join(pair).strip("#_ ") for pair in zip(headers[-2], unit, strict=True)]
+    if bad := [name for name in names if not name or names.count(name) > 1]:
+        expected = "a column a channel, a row a sample, and above them a name for each column, each once"
+        raise refusal(path, expected, above or 1, None, bad[0])
+    body = text.split("\n", above)[-1]
+    stream = io.StringIO(body if separator == "," else body.replace(",", "."))
     try:
-        frame = pd.read_csv(
-            stream,
-            sep=separator,
-            header=None,
-            skip_blank_lines=False,
-            skipinitialspace=True,
-            low_memory=False,
-        )
+        frame = pd.read_csv(stream, sep=separator, header=None, skip_blank_lines=False, skipinitialspace=True)
     except ValueError as error:  # a ParserError too
         raise refusal(path, f"rows of numbers; counted below row {above}: {str(error).strip()}") from error
     cells = frame[places]
@@ -177,21 +165,6 @@ def _read_text(path: Path) -> Sampled:
         raise refusal(path, "a number alone", at + above + 1, names[k], str(cells.iat[at, k]))
     samples = table.loc[: table.last_valid_index()].to_numpy(dtype=float).T
     return Sampled(dict(zip(names, np.ascontiguousarray(samples), strict=True)), first_row=above + 1)
-
-
-def _names(path: Path, preamble: list[list[str]], places: list[int]) -> list[str]:
-    """Names of columns in the last row that has one for each, or in that above a row of units."""
-    headers = [[row[k] for k in places] for row in preamble if len(row) > places[-1] and any(row)]
-    if not headers:
-        raise refusal(path, "a row with a name for each column above the numbers", len(preamble) + 1)
-    names = headers[-1]
-    unit = [spelt(cell.strip("[]() ")) for cell in names]
-    if len(headers) > 1 and unit[0] in TIME:
-        names = [*map("_".join, zip(headers[-2], unit, strict=True))]
-    names = [name.strip("#_ ") for name in names]
-    if bad := [name for name in names if not name or names.count(name) > 1]:
-        raise refusal(path, "a name for each column of numbers, each once", len(preamble), None, bad[0])
-    return names
 
 
 def _read_wav(path: Path) -> Sampled:
@@ -236,16 +209,12 @@ def _of_arrays(path: Path, stored: Mapping[str, object]) -> Sampled:
     arrays = {name: np.squeeze(np.asarray(values)) for name, values in stored.items() if name[:2] != "__"}
     numbers = {name: array * 1 for name, array in arrays.items() if array.dtype.kind in "biuf" and array.size}
     channels = {name: array for name, array in numbers.items() if array.ndim == 1}
-    matrices = [array for array in numbers.values() if array.ndim > 1]
-    count, fit = len(channels), True
-    for matrix in matrices:
-        columns = matrix.shape[1]
-        listed = arrays.get("channels", arrays.get("names", np.arange(1, columns + 1)))
-        names = [str(name).strip() for name in np.atleast_1d(listed)]
-        fit &= matrix.ndim == 2 and len(matrix) >= columns == len(names)
-        count += columns
-        channels |= zip(names, matrix.T, strict=False)
-    if not fit or not 0 < count == len(channels):
+    count = sum(array[0].size for array in numbers.values() if array.ndim)
+    for matrix in (array for array in numbers.values() if array.ndim == 2):
+        listed = np.atleast_1d(arrays.get("channels", np.arange(1, matrix.shape[1] + 1)))
+        if len(matrix) >= matrix.shape[1] == len(listed):
+            channels |= zip((str(name).strip() for name in listed), matrix.T, strict=True)
+    if not 0 < count == len(channels):
         shapes = listing((f"{name} {array.shape}" for name, array in arrays.items()), "and") or "nothing"
         expected = (
             "a vector for each channel, or one matrix with a row a sample, a column a channel, their names"
@@ -284,8 +253,8 @@ def read_responses(path: Path) -> tuple[FloatArray, dict[str, ComplexArray]]:
 
         whole = file_content(path).rstrip().endswith(b"    -1")
         file = pyuff.UFF(str(path))
-        places = np.flatnonzero(np.asarray(file.get_set_types()) == 58) if whole else ()
-        sets = [one for place in places if (one := file.read_sets(int(place)))["func_type"] == 4]
+        places = [k for k, kind in enumerate(file.get_set_types()) if kind == 58] if whole else []
+        sets = [one for place in places if (one := file.read_sets(place))["func_type"] == 4]
         lines = [one["id1"].strip() for one in sets]
         nodes = [f"{one['rsp_node']}{_DIRECTIONS.get(one['rsp_dir'], '')}" for one in sets]
         names = lines if len({*lines} - {"", "NONE"}) == len(sets) else nodes
@@ -304,14 +273,10 @@ def read_responses(path: Path) -> tuple[FloatArray, dict[str, ComplexArray]]:
             labels = (one[f"{part}_axis_units_lab"] or "" for part in ("ordinate", "orddenom"))
             motion, force = (spelt(label.strip().replace("^", "").removeprefix("NONE")) for label in labels)
             unit = VIBRATION.get(motion or _SI.get(one["ordinate_spec_data_type"], ""))
-            if unit is None or force not in ("", *FORCE):
-                expected = (
-                    "responses of a displacement, velocity or acceleration by a force, such as m/s^2 by N"
-                )
+            response = np.asarray(one["data"], dtype=complex)[used]
+            if unit is None or force not in ("", *FORCE) or not np.isfinite(response).all():
+                expected = "finite displacements, velocities or accelerations by a force, such as m/s^2 by N"
                 raise refusal(path, expected, value=f"{motion or 'no unit'} by {force or 'no unit'}")
             size = unit.to_si(1.0) / FORCE[force or "N"].to_si(1.0)
-            turned = (1j * omega) ** DERIVATIVE[unit.kind]
-            signals[name] = np.asarray(one["data"], dtype=complex)[used] * size / turned
-            if not np.isfinite(signals[name]).all():
-                raise refusal(path, "finite numbers")
+            signals[name] = response * size / (1j * omega) ** DERIVATIVE[unit.kind]
     return omega, signals

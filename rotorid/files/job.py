@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,13 +11,10 @@ import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import off_axis
-from rotorid.base.text import counted
+from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
+from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
 from rotorid.files.conventions import ROTATIONS, Conventions, as_angles, as_phase, resolve_angles
-from rotorid.files.influence import fit_to_readings, load_influence
-from rotorid.files.job_excel import WrittenJob, open_job
 from rotorid.files.job_models import (
     READINGS,
     TABLES,
@@ -27,57 +23,18 @@ from rotorid.files.job_models import (
     JobSettings,
     Plane,
     Sensor,
+    WrittenJob,
     named_tables,
 )
-from rotorid.files.job_planes import (
-    Readings,
-    check_runs,
-    in_model,
-    make_holes,
-    make_limits,
-    planes_of,
-    row_weights,
-    with_taken,
-)
+from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
-from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
-from rotorid.files.units import Quantity
-from rotorid.files.weights_with_units import in_job_units
+from rotorid.files.settings import read_toml
 
 if TYPE_CHECKING:
     from balancing import Mounted
     from fem import Rotor
-
-
-@dataclass(frozen=True)
-class Overrides:
-    """What the caller says instead of a job, or where none says it."""
-
-    phase: str | None = None
-    angles: str | None = None
-    amplitude_error_percent: float | None = None
-    phase_error_deg: float | None = None
-
-    def on(self, settings: JobSettings) -> JobSettings:
-        """The settings of a job with what the caller says."""
-        errors = _given(amplitude_percent=self.amplitude_error_percent, phase_deg=self.phase_error_deg)
-        stated = (settings.errors or Errors.model_construct()).model_copy(update=errors) if errors else None
-        return settings.model_copy(update=_given(phase=self.phase, angles=self.angles, errors=stated))
-
-
-def _given(**values: Any) -> dict[str, Any]:  # noqa: ANN401
-    return {key: value for key, value in values.items() if value is not None}
-
-
-@dataclass(frozen=True)
-class JobSource:
-    """What a job is read from: a job (`.toml`, `.xlsx`), or runs and, perhaps, weights; influence table."""
-
-    files: tuple[Path, ...]
-    influence: Path | None = None
-    overrides: Overrides = field(default_factory=Overrides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +64,6 @@ class Job:
         Check runs, in the units and at the speeds of the job, or None.
     check_mounted
         Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
-    check_of_weights
-        Whether these were the weights, although there are holes for pieces.
     check_pieces
         The pieces that `check.weights` are then, by `rotorid.commands.after_check`; None: others.
     rotor
@@ -121,10 +76,8 @@ class Job:
         and `check` already; None: none.
     key_phasor
         Its direction, degrees with the rotation from the model's x.
-    machine, machine_type, date
-        What was balanced, of which type, and when; empty and None where the job does not say.
-    sheet
-        What it says for the balancing sheet: `[sheet]`.
+    settings
+        Further keys of the job as it is written: `machine`, `machine_type`, `date`, `sheet` and so on.
     """
 
     trials: Trials
@@ -137,16 +90,17 @@ class Job:
     row_weights: FloatArray | None = None
     check: Trials | None = None
     check_mounted: bool = False
-    check_of_weights: bool = False
     check_pieces: Mounted | None = None
     rotor: Rotor | None = None
     holes: Mapping[str, Holes] = field(default_factory=dict)
     slow_roll: ComplexArray | None = None
     key_phasor: float = 0.0
-    machine: str = ""
-    machine_type: str = ""
-    date: datetime.date | None = None
-    sheet: Mapping[str, Any] = field(default_factory=dict)
+    settings: JobSettings = field(default_factory=JobSettings)
+
+    @property
+    def check_of_weights(self) -> bool:
+        """Whether the weights were mounted for the check, although there are holes for pieces."""
+        return self.settings.check_weights == WEIGHTS and not self.check_mounted
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -183,14 +137,14 @@ class Job:
         return self.limits.pick(range(len(self.trials.speeds)), [order.index(p) for p in planes])
 
 
-def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
+def read_job(path: str | Path, **stated: Any) -> Job:  # noqa: ANN401
     """Read a job file (`.toml`) or a workbook (`.xlsx`, sheets runs, weights, planes, sensors, settings).
 
     Parameters
     ----------
     path
         The job; files that it names are found relative to it.
-    overrides
+    stated
         phase, angles, amplitude_error_percent, phase_error_deg: replace what the job says.
 
     Returns
@@ -204,16 +158,18 @@ def read_job(path: str | Path, **overrides: Any) -> Job:  # noqa: ANN401
         With all problems of the job, else with all problems of the files that it names.
     ValueError
         If an argument is none of the allowed values.
+    TypeError
+        For another argument.
     """
-    given, problems = Overrides(**overrides), Problems()
-    return job_of(open_job(Path(path), problems), given, problems)
+    problems = Problems()
+    return job_of(open_job(Path(path), problems), problems, **stated)
 
 
 def job_from_files(
     files: Sequence[str | Path],
     *,
     influence: str | Path | None = None,
-    **overrides: Any,  # noqa: ANN401
+    **stated: Any,  # noqa: ANN401
 ) -> Job:
     """A job without a job file: a runs table with a weights table, or with stored coefficients.
 
@@ -223,9 +179,9 @@ def job_from_files(
         Runs and weights; with `influence` the weights (mounted during the runs) may be left out.
     influence
         Influence table.
-    overrides
-        Conventions and stated errors as of `read_job`; default: lead and with rotation, which the
-        labels then call assumed; none stated.
+    stated
+        Conventions and errors as of `read_job`; default: lead and with rotation, which the labels then call
+        assumed; no errors.
 
     Returns
     -------
@@ -238,6 +194,8 @@ def job_from_files(
         With all problems of all files.
     ValueError
         If the files are too few or too many, or an argument is none of the allowed values.
+    TypeError
+        For another argument.
     """
     if not 1 <= len(files) <= 2 or (len(files) == 1 and influence is None):
         raise ValueError(
@@ -247,12 +205,27 @@ def job_from_files(
     tables: dict[str, Source] = dict(zip(("runs", "weights"), map(Path, files), strict=False))
     if influence is not None:
         tables["influence"] = Path(influence)
-    return job_of(WrittenJob(None, tables=tables), Overrides(**overrides), Problems())
+    return job_of(WrittenJob(None, tables=tables), Problems(), **stated)
 
 
-def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job:
-    """The job of these settings and tables; raises `InputError` with all problems."""
-    settings = overrides.on(written.read(problems))
+def open_job(path: Path, problems: Problems) -> WrittenJob:
+    """A job file (`.toml`) or a workbook (`.xlsx`) as it is written.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of a job in it.
+    """
+    if path.suffix.lower() == ".toml":
+        return WrittenJob(path, problems.need(read_toml(path, problems)))
+    from rotorid.files.job_excel import job_in_sheets
+
+    return job_in_sheets(path, problems)
+
+
+def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # noqa: ANN401
+    """The job of these settings and tables, or an `InputError`; `stated` as of `read_job`."""
+    settings = _stating(written.read(problems), stated)
     problems.stop()
     tables, records = tables_of(written, settings)
     for key in READINGS:
@@ -266,15 +239,19 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
             settings = settings.model_copy(update={"phase": phase})
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
-    readings = problems.need(readings)
-    trials, planes = planes_of(settings, readings.trials, readings.influence, rotor, problems)
+    trials, influence, conventions, slow_roll = problems.need(readings)
+    trials, planes = planes_of(settings, trials, influence, rotor, problems)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)
     holes = make_holes(planes, trials.labels, limits, problems)
-    check = check_runs(tables, readings, trials, tuple(planes), problems) if "check" in tables else None
-    mounted = tables.get("check_weights")
-    if check is not None and mounted is not None:
-        holes = with_taken(holes, mounted, check, readings.conventions)
+    check, mounted = None, tables.get("check_weights")
+    if "check" in tables:
+        from rotorid.files.further_runs import check_runs
+
+        sources = tables["check"], mounted
+        check = check_runs(sources, trials, [*planes], conventions, settings.errors, slow_roll, problems)
+        if check is not None and mounted is not None:
+            holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
     files = (written.path, *map(tables.get, TABLES), *model_files, *records)
     sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
@@ -285,12 +262,11 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
     vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
     matters = {"phase": True, "angles": any(map(off_axis, vectors))}
-    assumed = tuple(name for name in readings.conventions.unstated if matters[name])
-    labels = replace(trials.labels, assumed=assumed)
+    labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
         trials=replace(trials, labels=labels),
-        influence=None if readings.influence is None else replace(readings.influence, labels=labels),
-        conventions=readings.conventions,
+        influence=None if influence is None else replace(influence, labels=labels),
+        conventions=conventions,
         files=tuple(file for file in files if isinstance(file, Path)),
         planes=planes,
         sensors=sensors,
@@ -298,30 +274,45 @@ def job_of(written: WrittenJob, overrides: Overrides, problems: Problems) -> Job
         row_weights=weights,
         check=None if check is None else replace(check, labels=labels),
         check_mounted=mounted is not None,
-        check_of_weights=settings.check_weights == WEIGHTS and mounted is None,
         rotor=rotor,
         holes=holes,
-        slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
+        slow_roll=slow_roll,
         key_phasor=key_phasor,
-        machine=settings.machine,
-        machine_type=settings.machine_type,
-        date=settings.date,
-        sheet=settings.sheet.model_dump(),
+        settings=settings,
     )
+
+
+_ARGUMENTS = ("phase", "angles", "amplitude_error_percent", "phase_error_deg")
+
+
+def _stating(settings: JobSettings, stated: Mapping[str, Any]) -> JobSettings:
+    """The settings of a job with what the caller states in their place."""
+    if unknown := [name for name in stated if name not in _ARGUMENTS]:
+        raise TypeError(
+            f"a job is read with {listing(_ARGUMENTS, 'and')}, not {listing(unknown, 'and')}: other errors "
+            "are stated in the job, [errors]"
+        )
+    given = {name: value for name, value in stated.items() if value is not None}
+    percent, degrees = (given.pop(name, None) for name in _ARGUMENTS[2:])
+    errors = {"amplitude_percent": percent, "phase_deg": degrees}
+    if errors := {key: value for key, value in errors.items() if value is not None}:
+        given["errors"] = (settings.errors or Errors.model_construct()).model_copy(update=errors)
+    return settings.model_copy(update=given)
 
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
     """What tables there are, by `TABLES`, and the files with one run each."""
     runs = tuple(written.folder / name for name in settings.runs or ())
-    tables: dict[str, Source] = {"runs": runs[0]} if runs else {}
-    tables |= {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
-    tables |= written.tables
-    files = runs if len(runs) > 1 else files_of_runs(tables.get("runs"))
-    return tables | ({"runs": files} if files else {}), files
+    named = {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
+    table = runs[0] if runs else written.tables["runs"]
+    files = runs if len(runs) > 1 else files_of_runs(table)
+    return {**named, **written.tables, "runs": files or table}, files
 
 
-def _readings(settings: JobSettings, tables: Mapping[str, Source], problems: Problems) -> Readings | None:
-    """Trial runs and stored coefficients, or None and problems."""
+def _readings(
+    settings: JobSettings, tables: Mapping[str, Source], problems: Problems
+) -> tuple[Trials, Influence | None, Conventions, ComplexArray | None] | None:
+    """Runs, stored coefficients, what their numbers mean and slow-roll vectors, or None and problems."""
     if "check" not in tables and ("check_weights" in tables or settings.check_weights):
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
@@ -331,48 +322,56 @@ def _readings(settings: JobSettings, tables: Mapping[str, Source], problems: Pro
             "whose coefficients come with balance --type"
         )
         settings.complain(problems, "weights", expected)
-    before, runs, stored, name = len(problems), tables["runs"], None, ""
-    phase, angles = settings.phase or stated_phase(runs, settings.columns), settings.angles
+    before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
+    phase, angles = settings.phase or stated_phase(runs), settings.angles
+    stated = dict[str, str]()
     settings = settings.model_copy(update={"phase": phase})
-    if "influence" in tables:
-        name = source_name(tables["influence"])
+    if source is not None:
+        from rotorid.files.influence import fit_to_readings, load_influence
+
         resolved = None if angles is None else resolve_angles(angles, settings.rotation)
-        stored = load_influence(tables["influence"], phase, resolved, problems)
-    conventions = conventions_of(settings, {} if stored is None else stored.said)
+        influence, stated = load_influence(source, phase, resolved, problems) or (None, stated)
+    conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
-    influence = None
-    if stored is not None and trials is not None:
+    if source is not None and influence is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
-        influence = fit_to_readings(stored.influence, trials, tolerance, name, problems)
+        influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:
         return None
     labels = conventions.on(trials.labels if influence is None else influence.labels)
-    usual, read, notes = Labels(), {} if stored is None else stored.said, list[str]()
-    adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
-    if adopted:
-        words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
-        notes = [
-            f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
-        ]
-    if read.get("phase", labels.phase) != labels.phase:
-        notes.append(
-            f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
-            f"phase = {read['phase']}, as {name} says"
-        )
+    usual, notes = Labels(), list[str]()
+    if source is not None:
+        name = source_name(source)
+        adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
+        if adopted:
+            words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+            notes.append(
+                "nothing states the conventions of the readings: those of "
+                f"{name} are used for them too, {words}"
+            )
+        if stated.get("phase", labels.phase) != labels.phase:
+            notes.append(
+                f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
+                f"phase = {stated['phase']}, as {name} says"
+            )
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
-    vectors = tables.get("slow_roll", settings.slow_roll)
-    roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
-    trials = trials if roll is None else subtract_slow_roll(trials, roll)
-    return Readings(trials, influence, conventions, settings.errors, roll)
+    vectors, slow_roll = tables.get("slow_roll", settings.slow_roll), None
+    if vectors is not None:
+        from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
+
+        if (made := make_slow_roll(vectors, trials, conventions, problems)) is not None:
+            slow_roll, further = made
+            trials = subtract_slow_roll(replace(trials, warnings=(*trials.warnings, *further)), slow_roll)
+    return trials, influence, conventions, slow_roll
 
 
 def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = None) -> Conventions:
     """What the numbers of the tables mean: as the job says, or the stored coefficients."""
-    said = {"phase": "lead", "angles": "with rotation"} | dict(stored or {})
+    usual = {"phase": "lead", "angles": "with rotation"} | dict(stored or {})
     angles, rotation, planes = settings.angles, settings.rotation, settings.planes.items()
     labels = Labels(
-        phase=as_phase(settings.phase or said["phase"]),
-        angles=as_angles(said["angles"]) if angles is None else resolve_angles(angles, rotation),
+        phase=as_phase(settings.phase or usual["phase"]),
+        angles=as_angles(usual["angles"]) if angles is None else resolve_angles(angles, rotation),
         rotation=rotation,
         view=settings.view if rotation else None,
         clock=angles in ROTATIONS,
@@ -382,51 +381,9 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = Non
         labels,
         settings.speed_tolerance_percent,
         tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
-        settings.columns,
+        settings.exchanged,
         None if speed is None else (speed.unit.name, speed.value),
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
         any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),
     )
-
-
-def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:
-    """The job with other limits, each in place of what the job itself says there.
-
-    Parameters
-    ----------
-    job
-        As read.
-    weights
-        Largest weights by plane; a mass where the job's weights are unbalances (or the reverse) needs the
-        plane's `radius_mm`. The key is what complaints begin with.
-    amplitudes
-        Largest amplitudes by sensor, at all speeds.
-
-    Returns
-    -------
-    Job
-        With new `limits`; holes keep to the largest weight of their plane.
-
-    Raises
-    ------
-    ValueError
-        For a weight that does not convert to those of the job.
-    """
-    if not weights and not amplitudes:
-        return job
-    trials, unit = job.trials, job.trials.labels.weight_unit
-    old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
-    most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
-    for plane, weight in weights.items():
-        size = in_job_units(weight, unit, job.planes[plane].radius)
-        if size is None:
-            raise ValueError(
-                f"{weight.key}: the weights of the job are in {unit}, to which {weight.unit.name} converts "
-                f"only with a radius_mm of plane {plane!r} in the job"
-            )
-        most[plane] = size[0]
-    for sensor, amplitude in amplitudes.items():
-        residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
-    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)

@@ -1,4 +1,4 @@
-"""Jobs as they are written: a job file, or the sheets of a workbook; workbooks with results."""
+"""Jobs as workbooks: those that people fill in, and those with results."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ import io
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.choices import did_you_mean
 from rotorid.base.json import cell as as_json
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
-from rotorid.files.cells import BadCell, Cell, Grid, Row, make_grid, read_bytes, show
-from rotorid.files.columns import REMARKS, Source, sheet_source
+from rotorid.files.cells import BadCell, Cell, Grid, make_grid, show
+from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
-from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, JobSettings
+from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
 from rotorid.files.layout import rows_from_header
-from rotorid.files.problems import Problems
-from rotorid.files.settings import Place, read_settings
-from rotorid.files.toml_file import read_toml
+from rotorid.files.problems import Problems, refusal
+from rotorid.files.settings import Place
 
 NAMED = {"planes": "plane", "sensors": "sensor"}
 """Sheets with a row for each plane or sensor, keys being columns: the column of its name."""
@@ -32,64 +31,12 @@ TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
 
 
-@dataclass(frozen=True, eq=False)
-class WrittenJob:
-    """A job as it is written: settings nested as in a job file, and the tables of a workbook.
-
-    Attributes
-    ----------
-    path
-        The job file or workbook, None without one.
-    settings
-        As a job file holds them.
-    tables
-        Tables that are there already, by `TABLES`: cells of sheets, or files.
-    where
-        Sheet, row and column of each setting, by its dotted key.
-    """
-
-    path: Path | None
-    settings: dict[str, Any] = field(default_factory=dict)
-    tables: dict[str, Source] = field(default_factory=dict)
-    where: dict[str, Place] = field(default_factory=dict)
-
-    @property
-    def folder(self) -> Path:
-        """From which files are named."""
-        return (self.path or Path()).parent
-
-    def read(self, problems: Problems) -> JobSettings:
-        """All settings; a file that is named in place of a sheet is a problem."""
-        source = "" if self.path is None else str(self.path)
-        if not self.tables and "runs" not in self.settings:
-            problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
-            problems.stop()
-        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
-        for key in (key for key in self.tables if settings.has(key)):
-            expected = f"the table in the sheet {key!r} of this workbook, not a file"
-            settings.complain(problems, key, expected)
-        return settings
-
-
-def open_job(path: Path, problems: Problems) -> WrittenJob:
-    """A job file (`.toml`) or a workbook (`.xlsx`) as it is written.
-
-    Raises
-    ------
-    InputError
-        If there is nothing of a job in it.
-    """
-    if is_workbook(path):
-        return _job_in_sheets(path, problems.need(read_workbook(path, problems)), problems)
-    if path.suffix.lower() != ".toml":
+def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
+    """The job in the sheets of a workbook (`.xlsx`); raises `InputError` where there are no runs."""
+    if not is_workbook(path):
         expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
-        problems.add(str(path), None, None, None, expected)
-        problems.stop()
-    return WrittenJob(path, problems.need(read_toml(path, problems)))
-
-
-def _job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Problems) -> WrittenJob:
-    """The job in the sheets of a workbook; raises `InputError` where there are no runs."""
+        raise refusal(path, expected)
+    sheets = problems.need(read_workbook(path, problems))
     job = WrittenJob(path)
     titles = {title.strip().casefold(): title for title in reversed([*sheets]) if sheets[title]}
     for name, title in titles.items() if titles.keys() & {*SHEETS} else ():
@@ -102,7 +49,7 @@ def _job_in_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], problems: Pr
     for name in (name for name in SHEETS[:-1] if name in titles):
         rows = sheets[titles[name]]
         if name in (*READINGS, *WEIGHT_TABLES):
-            rows = rows_from_header(rows, {}, weights=name in WEIGHT_TABLES)
+            rows = rows_from_header(rows, weights=name in WEIGHT_TABLES)
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
         source = sheet_source(path, titles[name])
         grid = make_grid(source, rows, "", problems, may_be_empty=may_be_empty)

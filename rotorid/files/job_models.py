@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import radians
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from balancing import Placement, ReadingErrors, RunScatter, Trials
-from rotorid.base.text import listing
-from rotorid.base.words import Angles, Phase, Rotation, View
+from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
+from rotorid.files.columns import Source
 from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
+from rotorid.files.problems import Problems, refusal
 from rotorid.files.settings import (
     Date,
     Label,
     NotNegative,
     Number,
+    Place,
     Positive,
     Settings,
     Text,
@@ -30,6 +33,7 @@ from rotorid.files.settings import (
     listed,
     of,
     optional,
+    read_settings,
 )
 from rotorid.files.units import Quantity
 
@@ -235,8 +239,8 @@ class Sensor(_Placed):
     limit: Annotated[Quantity, of(Limits)] | None = optional(
         "largest amplitude above 0, in the unit of the readings or with its own, `limit_mm_s_rms`, or a "
         "table by speed",
-        "limit",
-        units=units.vibration,
+        "limit limit_um limit_mm_s limit_m_s2",
+        units=units.VIBRATION,
         example='{ "3000" = 20, "4500" = 30 }',
     )
     weight: NotNegative = key(
@@ -304,32 +308,13 @@ class Vector(Settings):
 
     amplitude: Annotated[Quantity, of(NotNegative)] = key(
         "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
-        "amplitude",
-        units=units.vibration,
+        "amplitude amplitude_um amplitude_mm_s amplitude_m_s2",
+        units=units.VIBRATION,
     )
     phase: Turn = key(
         "the phase at slow speed, counted as the readings count it",
         "phase_deg",
     )
-
-
-class Columns(Settings):
-    """`[columns]`."""
-
-    run: Text | None = optional("name in the file of the column `run`, and so on")
-    speed: Annotated[Quantity, of(Text)] | None = optional(
-        "or another unit of a speed", "speed_rpm", units=units.SPEED
-    )
-    sensor: Text | None = optional("not where each sensor has columns of its own")
-    amplitude: Annotated[Quantity, of(Text)] | None = optional(
-        "or, with its unit, `amplitude_um_pp` and the like", "amplitude", units=units.vibration
-    )
-    phase: Annotated[Quantity, of(Text)] | None = optional("or `phase_rad`", "phase_deg", units=units.ANGLE)
-    repeat: Text | None = optional("of repeated readings")
-
-    def in_file(self) -> dict[str, str]:
-        """Fields by the names that the columns have in the file."""
-        return {str(getattr(v, "value", v)): name for name, v in self if v is not None}
 
 
 class Sheet(Settings):
@@ -398,7 +383,11 @@ class JobSettings(Settings):
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
     )
-    columns: Columns | None = optional("other names of the columns of runs tables, see below")
+    exchanged: bool | None = optional(
+        "whether the columns of amplitudes and phases of the runs tables hold each other's numbers; answers "
+        "the question whether they do",
+        example="true",
+    )
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
@@ -410,3 +399,40 @@ class JobSettings(Settings):
         """A direction without the rotation that is seen against it."""
         if self.rotation is None and (self.view or self.angles in ROTATIONS):
             yield "rotation", f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end"
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenJob:
+    """A job as it is written: settings nested as in a job file, and the tables of a workbook.
+
+    Attributes
+    ----------
+    path
+        The job file or workbook, None without one.
+    settings
+        As a job file holds them.
+    tables
+        Tables that are there already, by `TABLES`: cells of sheets, or files.
+    where
+        Sheet, row and column of each setting, by its dotted key.
+    """
+
+    path: Path | None
+    settings: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, Source] = field(default_factory=dict)
+    where: dict[str, Place] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """From which files are named."""
+        return (self.path or Path()).parent
+
+    def read(self, problems: Problems) -> JobSettings:
+        """All settings; a file that is named in place of a sheet is a problem."""
+        source = "" if self.path is None else str(self.path)
+        if not self.tables and "runs" not in self.settings:
+            raise refusal(source, 'a job, which names the runs table, runs = "runs.csv"', column="runs")
+        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
+        for name in filter(settings.has, self.tables):
+            settings.complain(problems, name, f"the table in the sheet {name!r} of this workbook, not a file")
+        return settings

@@ -1,4 +1,4 @@
-"""Planes of a job in its tables and its model, their limits and holes, and its check runs.
+"""Planes of a job in its tables and its model, their limits and holes.
 
 Where material is removed, a hole drilled at the angle φ acts like a weight added at φ + 180°. Holes and
 forbidden arcs then have the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is
@@ -12,42 +12,30 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials, from_list
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Source, source_name
+from rotorid.files.cells import NotANumber, parse_number
+from rotorid.files.columns import Source
 from rotorid.files.conventions import Conventions
-from rotorid.files.decimal_numbers import NotANumber, parse_number
-from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
+from rotorid.files.job_models import JobSettings, Plane, Sensor
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
+from rotorid.files.runs import nearest_speed, show_speeds
 from rotorid.files.settings import Settings
-from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
-from rotorid.files.units import Quantity
+from rotorid.files.units import Quantity, in_job_units
 from rotorid.files.weights import read_weights
-from rotorid.files.weights_with_units import in_job_units
 
 if TYPE_CHECKING:
     from fem import Rotor
 
 IN_HOLE = 1e-3
 """Relative distance of a weight from the hole that it is in."""
-
-
-class Readings(NamedTuple):
-    """What the tables of a job say, with its conventions settled and slow roll subtracted."""
-
-    trials: Trials
-    influence: Influence | None
-    conventions: Conventions
-    errors: Errors | None
-    slow_roll: SlowRoll | None
 
 
 def in_model(
@@ -80,9 +68,9 @@ def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Pl
     if rotor is None:
         part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
     elif station is not None and station not in rotor.stations:
-        known = listing(map(repr, rotor.stations), "and") or "none"
+        stations = listing(map(repr, rotor.stations), "and") or "none"
         hint = did_you_mean(station, rotor.stations)
-        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
+        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {stations}")
     elif (node := node or rotor.stations[str(station)]) > rotor.n_nodes:
         part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
     return part.model_copy(update={"node": node})
@@ -108,15 +96,13 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    missing = "; there is no trial weight in plane {!r}: is its row missing in the weights?"
-    for noun, parts, known, more_words in (
-        ("plane", stated, (*planes,), missing),
-        ("sensor", settings.sensors, trials.sensors, ""),
-    ):
-        for name in (name for name in parts if known and name not in known):
-            expected = f"one of the job's {noun}s, {listing(known, 'and')}{did_you_mean(name, known)}"
-            problem = parts[name].problem("", expected + more_words.format(name))
-            problems.extend([replace(problem, value=name)])
+    for kind, names in (("planes", [*planes]), ("sensors", trials.sensors)):
+        for name, part in getattr(settings, kind).items() if names else ():
+            if name not in names:
+                expected = f"one of the job's {kind}, {listing(names, 'and')}{did_you_mean(name, names)}"
+                if kind == "planes":
+                    expected += f"; there is no trial weight in plane {name!r}: is its row missing?"
+                problems.append(replace(part.problem("", expected), value=name))
     if not trials.labels.unbalances:
         trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
     return trials, planes
@@ -186,18 +172,17 @@ def _at_speeds(
     problems: Problems,
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    unit, near = units.SPEED[trials.labels.speed_unit], dict[int, float]()
+    unit, near = units.SPEED[trials.labels.speed_unit], dict[int | None, float]()
     for word in filter(None, numbers):
         k = None
         with suppress(NotANumber):
             speed = unit.to_si(parse_number(word, comma="," in word))
             k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
         if k is None or k in near:
-            known = show_speeds(trials.speeds, unit)
-            expected = f"speeds of the runs table, each once, not {word}: there are {known}"
+            there = show_speeds(trials.speeds, unit)
+            expected = f"speeds of the runs table, each once, not {word}: there are {there}"
             part.complain(problems, field, expected)
-        else:
-            near[k] = numbers[word]
+        near[k] = numbers[word]
     return np.array([near.get(k, numbers.get("", default)) for k in range(len(trials.speeds))])
 
 
@@ -237,63 +222,13 @@ def with_taken(
     A plane whose weights are not all in its holes, or fill all of them, stays as it is.
     """
     read, out = read_weights(weights, check.runs, conventions, Problems()), dict(holes)
+    rows = () if read is None else read.rows
     for plane, free in holes.items():
-        rows = () if read is None else read.rows
         mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
-        if not len(mounted) or free.taken.any():
-            continue
-        off = np.abs(mounted[:, None] - np.abs(mounted)[:, None] * np.exp(1j * free.angles))
-        taken = np.zeros(len(free.angles))
-        np.add.at(taken, off.argmin(axis=1), np.abs(mounted))
-        if (off.min(axis=1) <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
+        size, holes_at = np.abs(mounted), np.exp(1j * free.angles)
+        off = np.abs(mounted[:, None] - size[:, None] * holes_at)
+        taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
+        in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
+        if in_holes and taken.any() and not taken.all() and not free.taken.any():
             out[plane] = replace(free, taken=taken)
     return out
-
-
-def check_runs(
-    tables: Mapping[str, Source],
-    readings: Readings,
-    trials: Trials,
-    planes: tuple[str, ...],
-    problems: Problems,
-) -> Trials | None:
-    """Check runs, fitted to the speeds, units and names of the job, or None and problems."""
-    runs, weights, labels = tables["check"], tables.get("check_weights"), trials.labels
-    check = make_trials(runs, weights, readings.conventions, readings.errors, problems)
-    if check is None:
-        return None
-    before, files = len(problems), [source_name(runs), source_name(runs if weights is None else weights)]
-    has, must = (
-        (units.vibration(x.vibration_unit), units.weight(x.weight_unit)) for x in (check.labels, labels)
-    )
-    for k, column in enumerate(("amplitude", "weight")[: 1 if weights is None else 2]):
-        if has[k].kind != must[k].kind:
-            expected = (
-                f"{column}s in {must[k].name or 'no unit'}, as the job has, or in one that converts to it"
-            )
-            problems.add(files[k], None, column, has[k].name or "no unit", expected)
-    names = ("sensor", check.sensors, trials.sensors), ("plane", check.planes, planes)
-    for file, (noun, there, known) in zip(files, names, strict=True):
-        for name in (name for name in there if name not in known):
-            expected = f"a {noun} of the job{did_you_mean(name, known)}; there are {listing(known, 'and')}"
-            problems.add(file, None, noun, name, expected)
-    unit, tolerance = units.SPEED[check.labels.speed_unit], readings.conventions.speed_tolerance_percent
-    near = [nearest_speed(trials.speeds, speed, tolerance) for speed in check.speeds.tolist()]
-    for k, at in enumerate(near):
-        if at is None or at in near[:k]:
-            expected = f"each speed of the job once; there are {show_speeds(trials.speeds, unit)}"
-            problems.add(files[0], None, "speed", show_speed(float(check.speeds[k]), unit), expected)
-    if len(problems) > before:
-        return None
-    shown, mounted = check.planes, check.weights
-    if weights is not None:
-        # all planes of the job: a weights table without rows says that nothing was mounted
-        shown, mounted = planes, np.zeros((len(check.runs), len(planes)), dtype=complex)
-        mounted[:, [planes.index(name) for name in check.planes]] = check.weights
-    check = replace(
-        check, speeds=trials.speeds[[at or 0 for at in near]], labels=labels, planes=shown, weights=mounted
-    )
-    if readings.slow_roll is None:
-        return check
-    check = subtract_slow_roll(check, readings.slow_roll)
-    return replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))

@@ -10,21 +10,22 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.cells import Cell, Grid, Row, below_title, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.conventions import PHASES, Conventions, Phase, as_phase
 from rotorid.files.headings import (
-    DEVIATION,
+    BOTH_UNITS,
     LONGEST,
+    MEASURED,
     READING,
     Heading,
     find_header,
@@ -32,11 +33,8 @@ from rotorid.files.headings import (
     read_unit,
     readable,
 )
-from rotorid.files.problems import Problems
+from rotorid.files.problems import InputError, Problem, Problems
 from rotorid.files.units import UnitError, spelt
-
-if TYPE_CHECKING:
-    from rotorid.files.job_models import Columns
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
@@ -46,20 +44,10 @@ _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
-_WEIGHT = re.compile("weight|mass|correct", re.IGNORECASE)
-_BOTH_UNITS = re.compile(r"(.*?)\s*[/@<∠,;&]?\s*((?:°|deg|rad).*)", re.IGNORECASE)
-WEIGHT = ("mass", "angle")
-NUMBERS = ("speed", *READING, "mass")
-"""Quantities whose cells are numbers, maybe with a unit; an angle of a weight may have other forms."""
-
-
-class Unclear(ValueError):
-    """What has no reading, or several: the message says what is expected."""
-
-    def __init__(self, expected: str, heading: Heading, row: int | None = None, cell: Cell = "") -> None:
-        super().__init__(expected)
-        self.column, self.row = heading.name, row
-        self.value = heading.name if row is None else show(cell)
+MOUNTED = "note of weights: "
+"""Begins the name of a column of weights, which belong into a weights table."""
+_NO_DATA = ("", "note", "mounted")
+_NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
 class _Column(NamedTuple):
@@ -70,10 +58,29 @@ class _Column(NamedTuple):
     unit: str
     cells: Sequence[Cell]
 
+    def name(self, place: int) -> str:
+        """The name that it has in such a table; that of a remark is of no other column."""
+        name, stem = self.heading.name, self.stem
+        if stem == "mounted":
+            return f"{MOUNTED}{name}"
+        if stem == "note" and name != "time_s" and not name.casefold().startswith(_NOTES):
+            return f"note {place} {name}"
+        if stem in ("", "note"):
+            return name
+        return f"{stem}_{self.unit}" if self.unit else stem
 
-def rows_from_header(rows: Sequence[Row], named: Mapping[str, str], *, weights: bool = False) -> list[Row]:
+
+def _unclear(grid: Grid, column: _Column, expected: str, cell: Cell | None = None) -> InputError:
+    """What has no reading or several: of a heading, or the first cell of a column that is such."""
+    row, value = grid.header_row, column.heading.name
+    if cell is not None:
+        row, value = grid.rows[column.cells.index(cell)][0], show(cell)
+    return InputError([Problem(grid.source, row, column.heading.name, value, expected)])
+
+
+def rows_from_header(rows: Sequence[Row], *, weights: bool = False) -> list[Row]:
     """Rows of a sheet with the header of the table in one row; those above it become comments."""
-    return below_title(rows, partial(find_header, named=named, weights=weights))
+    return below_title(rows, partial(find_header, weights=weights))
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
@@ -84,75 +91,54 @@ def files_of_runs(source: object) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda file: (len(file.stem), file.stem)))
 
 
-def read_runs_grid(
-    source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
-) -> Grid | None:
-    """The cells of a runs table, whatever its form in the file; None and problems.
-
-    Parameters
-    ----------
-    source
-        A file, a folder or a tuple with one file a run, or the cells of a sheet.
-    conventions
-        What phases mean, how the job says that columns are named, and the speed where no column has it.
-    problems
-        Collects the complaints.
-    first
-        Whether the first sheet of a workbook will do where none is called runs.
-    """
-    grids = read_runs_grids(source, conventions, problems, first=first)
-    return None if grids is None else joined(grids, problems)
-
-
-def read_runs_grids(
-    source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
-) -> list[Grid] | None:
-    """The same of each file; a file of several without a column of runs is one run, named as the file."""
-    files = source if isinstance(source, tuple) else files_of_runs(source)
-    named, grids = _names_of(conventions.columns), list[Grid]()
-    for file in files or (source,):
-        grid = read_grid(file, "runs", problems, first=first, find=partial(find_header, named=named))
-        stated = conventions.columns
-        if grid is None or (stated is not None and not _are_there(stated, grid, problems)):
-            continue
-        with explained(grid, problems):
-            grid = _runs_form(grid, named, conventions)
-            if isinstance(file, Path) and files and "run" not in grid.header:
-                rows = tuple((number, (file.stem, *cells)) for number, cells in grid.rows)
-                names = tuple(("run", *row) for row in grid.named)
-                grid = replace(grid, header=("run", *grid.header), rows=rows, named=names)
-            grids.append(grid)
-    return grids if len(grids) == len(files or (source,)) else None
-
-
-@contextmanager
-def explained(grid: Grid, problems: Problems) -> Iterator[None]:
-    """What is unclear in a table becomes a problem of it."""
-    try:
-        yield
-    except Unclear as reason:
-        problems.add(grid.source, reason.row or grid.header_row, reason.column, reason.value, str(reason))
-
-
-def stated_phase(source: Source, columns: Columns | None = None) -> Phase | None:
+def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
-    named, words = _names_of(columns), set[str]()
+    words = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file that is read once more
-            find = partial(find_header, named=named)
-            grid = read_grid(file, "runs", Problems(), first=True, find=find, top=True)
-        for heading in read_headings(grid.header, named) if grid else ():
+            grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
+        for heading in read_headings(grid.header) if grid else ():
             if heading.stem == "phase" and readable("phase", heading.unit):
                 words |= {*PHASES} & {read_unit("phase", heading.unit)[1]}
     return as_phase(words.pop()) if len(words) == 1 else None
 
 
-def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
+def read_runs_grids(
+    source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
+) -> list[Grid] | None:
+    """The cells of a runs table, whatever its form in the file, of one file a run each; None and problems.
+
+    Parameters
+    ----------
+    source
+        A file, a folder or a tuple with one file a run, which is named as the file where no column names it,
+        or the cells of a sheet.
+    conventions
+        What phases mean, whether columns are exchanged, and the speed where no column has it.
+    problems
+        Collects the complaints.
+    first
+        Whether the first sheet of a workbook will do where none is called runs.
+    """
+    files = source if isinstance(source, tuple) else files_of_runs(source)
+    grids = list[Grid]()
+    for file in files or (source,):
+        grid = read_grid(file, "runs", problems, first=first, find=find_header)
+        run = file.stem if isinstance(file, Path) and files else ""
+        try:
+            if grid is not None:
+                grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
+        except InputError as error:
+            problems.extend(error.problems)
+    return grids if len(grids) == len(files or (source,)) else None
+
+
+def joined(grids: Sequence[Grid] | None, problems: Problems) -> Grid | None:
     """One runs table of several, with the columns of the first, or None and problems."""
+    if not grids or len(grids) == 1:
+        return grids[0] if grids else None
     first, rows = grids[0], list[Row]()
-    if len(grids) == 1:
-        return first
     for grid in grids:
         if sorted(grid.header) != sorted(first.header):
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
@@ -164,34 +150,13 @@ def joined(grids: Sequence[Grid], problems: Problems) -> Grid | None:
     return replace(first, source=source, rows=tuple(rows), named=())
 
 
-def _names_of(columns: Columns | None) -> dict[str, str]:
-    """Names of a runs table by the names that the job says its file has."""
-    return (
-        {} if columns is None else {name: columns.written(field) for name, field in columns.in_file().items()}
-    )
-
-
-def _are_there(columns: Columns, grid: Grid, problems: Problems) -> bool:
-    """Whether the file has the columns that the job names; else a problem of the job."""
-    there, before = [*filter(None, grid.header)], len(problems)
-    for name, field in columns.in_file().items():
-        if name not in there and columns.written(field) not in there:
-            hint = f"{did_you_mean(name, there)}; its columns are {listing(there, 'and')}"
-            columns.complain(problems, field, f"a column of {grid.source}{hint}")
-    return len(problems) == before
-
-
-def _runs_form(grid: Grid, named: Mapping[str, str], conventions: Conventions) -> Grid:
-    headings = read_headings(grid.header, named)
-    for heading in headings:
-        if heading.stem.endswith("X"):
-            other = "delete the column, or begin its name with note (if it is a probe: with P)"
-            raise Unclear(f"readings at the running speed (1X) alone: {other}", heading)
-    return long_rows(grid, headings, READING, "sensor", conventions)
-
-
 def long_rows(
-    grid: Grid, headings: Sequence[Heading], pair: tuple[str, str], key: str, conventions: Conventions
+    grid: Grid,
+    headings: Sequence[Heading],
+    pair: tuple[str, str],
+    key: str,
+    conventions: Conventions,
+    run: str = "",
 ) -> Grid:
     """A table with one row for each row of the file and each sensor or plane that has columns of its own.
 
@@ -203,75 +168,72 @@ def long_rows(
         `READING` of a `sensor`, or `WEIGHT` of a `plane`.
     conventions
         What phases mean, and the speed where no column has it.
+    run
+        The only run, where no column has its name.
 
     Raises
     ------
-    Unclear
+    InputError
         Where something has no reading, or several.
     """
-    phase = conventions.labels.phase if key == "sensor" else ""
-    rows, columns = grid.rows, list[_Column]()
-    for h in headings:
-        cells = [cells[h.index] for _, cells in rows]
-        for column in _halves(_Column(h, h.stem, h.unit, cells), headings, rows, pair):
-            if column.stem in (*NUMBERS, *pair):
-                column = _with_unit(column, rows, phase, rms=conventions.rms)
-            columns.append(column)
-    sensors = _by_name(columns, pair, key)
+    columns = [column for h in headings for column in _columns(grid, h, headings, pair, conventions)]
+    sensors = _by_name(grid, columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
-    stems = {column.stem for column in common}
+    stems, n = {column.stem for column in common}, len(grid.rows)
+    if run and "run" not in stems:
+        common.insert(0, _Column(Heading(0, "run"), "run", "", [run] * n))
     if key == "sensor" and "speed" not in stems and conventions.speed is not None:
         unit, speed = conventions.speed
-        common.append(_Column(Heading(0, grid.header[0], tidy=True), "speed", unit, [speed] * len(rows)))
-    if [*sensors] == [""] and key == "sensor" not in stems and len(sensors[""]) == 2 and _once(common):
-        sensors = {"1": sensors[""]}
-    wide, groups = "" not in sensors, [[own[s] for s in pair if s in own] for own in sensors.values()]
-    names = [*map(_name, groups[0])]
-    for column, name in ((c, name) for own in groups for c, name in zip(own, names, strict=True)):
-        if _name(column) != name:
-            raise Unclear(f"the unit of all {key}s, {name}", column.heading)
-    header = [_name(column, k) for k, column in enumerate(common)]
-    long: list[Row] = []
-    taken = [tuple(c.heading.name for c in (*common, *own[:wide], *own)) for own in groups]
-    for k, (number, _) in enumerate(rows):
-        start = tuple(c.cells[k] for c in common)
-        for name, own in zip(sensors, groups, strict=True):
-            long.append((number, (*start, *((name,) if wide else ()), *(c.cells[k] for c in own))))
-    return replace(
-        grid,
-        header=(*header, *((key,) if wide else ()), *names),
-        rows=tuple(long),
-        named=tuple(taken) * len(rows),
-    )
+        common.append(_Column(Heading(0, grid.header[0]), "speed", unit, [speed] * n))
+    if key == "sensor" and "sensor" not in stems and len(sensors.get("", ())) == 2:
+        readings = [*zip(*(map(show, c.cells) for c in common if c.stem in _OF_READING), strict=True)]
+        if len({*readings}) == len(readings):  # no run has two readings of one speed
+            sensors = {"1": sensors[""]}
+    groups = []
+    for name, by_stem in sensors.items():
+        own = [by_stem[stem] for stem in pair if stem in by_stem]
+        named = [_Column(own[0].heading, key, "", [name] * n)] if name else []
+        if conventions.exchanged and key == "sensor":
+            own = [c._replace(heading=o.heading, cells=o.cells) for c, o in zip(own, own[::-1], strict=True)]
+        groups.append([*common, *named, *own])
+    header = [column.name(k) for k, column in enumerate(groups[0])]
+    for column, k in ((column, k) for group in groups for k, column in enumerate(group)):
+        if column.name(k) != header[k]:
+            raise _unclear(grid, column, f"the unit of all {key}s, {header[k]}")
+    rows = zip(*(zip(*(column.cells for column in group), strict=True) for group in groups), strict=True)
+    long = [(number, cells) for (number, _), each in zip(grid.rows, rows, strict=True) for cells in each]
+    taken = [tuple(column.heading.name for column in group) for group in groups]
+    return replace(grid, header=tuple(header), rows=tuple(long), named=tuple(taken) * n)
 
 
-def _halves(
-    column: _Column, headings: Sequence[Heading], rows: Sequence[Row], pair: tuple[str, str]
+_OF_READING = ("run", "speed", "repeat")
+
+
+def _columns(
+    grid: Grid, heading: Heading, headings: Sequence[Heading], pair: tuple[str, str], conventions: Conventions
 ) -> list[_Column]:
-    """A column of vectors as one of amplitudes and one of phases; any other as it is."""
-    heading, stem, unit, cells = column
-    vectors = {cell: vector_in(cell) for cell in dict.fromkeys(cells) if cell != ""}
+    """A column of the file, as one of amplitudes and one of phases where its cells hold both."""
+    stem, cells = heading.stem, [cells[heading.index] for _, cells in grid.rows]
+    column = _Column(heading, stem, heading.unit, cells)
+    if stem.endswith("X"):
+        other = "delete the column, or begin its name with note (if it is a probe: with P)"
+        raise _unclear(grid, column, f"readings at the running speed (1X) alone: {other}")
+    maybe = stem in ("vector", pair[0]) or (pair == READING and stem in ("", "sensor"))
+    vectors = {cell: vector_in(cell) for cell in dict.fromkeys(cells) if cell != ""} if maybe else {}
     some, every = any(vectors.values()), bool(vectors) and all(vectors.values())
-    if stem == "" and some and all(re.fullmatch("[0-9.,/ ]+", str(cell)) for cell in vectors):
-        return [column]  # fractions or dates: no word and no sign says what they are
-    if stem == "" and _WEIGHT.search(heading.name) and pair == READING:
-        words = not some and not any(_PLAIN.fullmatch(show(cell)) for cell in vectors)
-        return [column._replace(stem="note") if words else column]  # what was mounted
+    dates = stem == "" and all(re.fullmatch("[0-9.,/ ]+", str(cell)) for cell in vectors)  # or fractions
     if stem == "sensor" and every:
         heading, stem = replace(heading, stem="", sensor=heading.name), ""
     paired = any(h.stem == pair[1] and h.sensor == heading.sensor for h in headings)
-    if not (
-        stem == "vector" or (some and (stem == pair[0] or (pair == READING and not stem)) and not paired)
-    ):
-        return [column]
-    for cell, vector in vectors.items():
-        if vector is None:
-            row = rows[cells.index(cell)][0]
-            raise Unclear("amplitude and phase, unmistakable as 6.93 @ 98°", heading, row, cell)
-    both = _BOTH_UNITS.fullmatch(unit)
-    units = both.groups() if both else (unit, "")
-    halves = [vectors.get(cell) or ("", "") for cell in cells]
-    return [_Column(heading, pair[k], units[k], [half[k] for half in halves]) for k in (0, 1)]
+    if stem == "vector" or (some and stem != "sensor" and not paired and not dates):
+        for cell in (cell for cell, vector in vectors.items() if vector is None):
+            raise _unclear(grid, column, "amplitude and phase, unmistakable as 6.93 @ 98°", cell)
+        both = BOTH_UNITS.fullmatch(heading.unit)
+        units = both.groups() if both else (heading.unit, "")
+        halves = [vectors.get(cell) or ("", "") for cell in cells]
+        parts = [_Column(heading, pair[k], units[k], [half[k] for half in halves]) for k in (0, 1)]
+        return [_with_unit(grid, part, conventions) for part in parts]
+    return [_with_unit(grid, column, conventions) if stem in (*MEASURED, *pair) else column]
 
 
 def vector_in(cell: Cell) -> tuple[str, str] | None:
@@ -280,44 +242,10 @@ def vector_in(cell: Cell) -> tuple[str, str] | None:
     return None if match is None else (match[1].strip(), match[2])
 
 
-def _unit(column: _Column, text: str, phase: str, row: int | None = None, cell: Cell = "") -> str:
-    """The unit that a text means; a direction in it must be that of the job."""
-    try:
-        unit, direction = read_unit(column.stem, text)
-    except UnitError as error:
-        raise Unclear(str(error), column.heading, row, cell) from None
-    if phase and direction not in ("", phase):
-        remedy = 'state phase = "lag" or "lead" in the job, as the instrument shows it, without words here'
-        raise Unclear(
-            f"phases that {phase}, as the job says or is assumed: {remedy}", column.heading, row, cell
-        )
-    return unit
-
-
-def _with_unit(column: _Column, rows: Sequence[Row], phase: str, *, rms: bool) -> _Column:
-    """Numbers and their one unit, which the heading states, or every cell."""
-    heading, stem, unit, cells = column
-    stated: dict[str, tuple[int | None, Cell]] = {}
-    if unit:
-        stated[spelt(unit) if heading.tidy and stem != "mass" else _unit(column, unit, phase)] = (
-            None,
-            heading.name,
-        )
-    whole, numbers = bool(stated), dict[Cell, Cell]()
-    for cell in dict.fromkeys(cells) if stem in NUMBERS else ():
-        match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
-        fits, here = match is not None and readable(stem, match[2]), ""
-        if match and fits:
-            numbers[cell] = match[1]  # what is left as it is, the table explains
-            here = _unit(column, match[2], phase, rows[cells.index(cell)][0], cell)
-        if here or (cell != "" and not whole):
-            stated.setdefault(here, (rows[cells.index(cell)][0], cell))
-    if len(stated) > 1:
-        (one, (at, _)), (_, (row, cell)) = list(stated.items())[:2]
-        unit, place = f"in {one}" if one else "without a unit", f"row {at}" if at else "the heading"
-        raise Unclear(f"a number {unit}, as {place} says", heading, row, cell)
-    unit = next(iter(stated), "")
-    cells = [numbers.get(cell, cell) for cell in cells] if numbers else cells
+def _with_unit(grid: Grid, column: _Column, conventions: Conventions) -> _Column:
+    """Numbers in one unit, with what may be assumed of one that is not written."""
+    unit, cells = _one_unit(grid, column, conventions)
+    heading, stem, name = column.heading, column.stem, column.heading.name
     if stem in ("phase", "angle") and not unit:
         texts = (text for cell in cells if _DECIMAL.fullmatch(text := show(cell).replace(",", ".")))
         plain = [abs(float(text)) for text in texts]
@@ -325,33 +253,74 @@ def _with_unit(column: _Column, rows: Sequence[Row], phase: str, *, rms: bool) -
             unit = "deg"
         elif stem == "angle" or not heading.tidy:
             example = f"'{stem.capitalize()} (deg)' or 98°"
-            raise Unclear(f"its unit, as in {example}: {stem}s so small may be radians", heading)
-    if unit == "mm_s" and not heading.tidy and (rms or _SEVERITY.search(heading.name)):
-        unit = "mm_s" if _PEAK.search(heading.name) else "mm_s_rms"
+            raise _unclear(grid, column, f"its unit, as in {example}: {stem}s so small may be radians")
+    if stem == "speed" and not unit and not heading.tidy:
+        raise _unclear(grid, column, f"its unit too, such as '{name} (rpm)'")
+    if unit == "mm_s" and not heading.tidy and (conventions.rms or _SEVERITY.search(name)):
+        unit = "mm_s" if _PEAK.search(name) else "mm_s_rms"
     return _Column(heading, stem, unit, cells)
 
 
-def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dict[str, dict[str, _Column]]:
+def _one_unit(grid: Grid, column: _Column, conventions: Conventions) -> tuple[str, Sequence[Cell]]:
+    """The one unit that the heading states, or every cell; and the cells without it."""
+    heading, stem, unit, cells = column
+    written: dict[str, Cell | None] = {unit: None} if unit else {}
+    numbers = dict[Cell, Cell]()
+    for cell in dict.fromkeys(cells) if stem in MEASURED else ():
+        match = None if not isinstance(cell, str) or _PLAIN.fullmatch(cell) else _WITH_UNIT.fullmatch(cell)
+        if match and readable(stem, match[2]):
+            numbers[cell] = match[1]  # what is left as it is, the table explains
+            written.setdefault(match[2], cell)
+        elif cell != "" and not unit:
+            written.setdefault("", cell)
+    stated = dict[str, Cell | None]()
+    for text, at in written.items():
+        name, direction = spelt(text), ""
+        if at is not None or not heading.tidy or stem == "mass":
+            try:
+                name, direction = read_unit(stem, text)
+            except UnitError as error:
+                raise _unclear(grid, column, str(error), at) from None
+        if direction not in ("", conventions.labels.phase):
+            words = f"phases that {conventions.labels.phase}, as the job says or is assumed: state phase = "
+            words += '"lag" or "lead" in the job, as the instrument shows it, without words here'
+            raise _unclear(grid, column, words, at)
+        if name or not unit:
+            stated.setdefault(name, at)
+    if len(stated) > 1:
+        (one, first), (_, other) = [*stated.items()][:2]
+        place = "the heading" if first is None else f"row {grid.rows[cells.index(first)][0]}"
+        words = f"a number {f'in {one}' if one else 'without a unit'}, as {place} says"
+        raise _unclear(grid, column, words, other)
+    return next(iter(stated), ""), [numbers.get(cell, cell) for cell in cells] if numbers else cells
+
+
+def _by_name(
+    grid: Grid, columns: Sequence[_Column], pair: tuple[str, str], key: str
+) -> dict[str, dict[str, _Column]]:
     """Both columns of each sensor or plane; the name is empty where a column has the names."""
-    sensors: dict[str, dict[str, _Column]] = {}
-    common: dict[str, _Column] = {}
+    sensors: dict[str, dict[str, _Column]] = defaultdict(dict)
     listed = any(column.stem == key for column in columns)
-    for column in columns:
+    for column in (column for column in columns if column.stem not in _NO_DATA):
         heading, stem = column.heading, column.stem
-        if stem in ("", "note"):
-            continue
         sensor = heading.sensor if stem in pair and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:
             words = f"as another column has the {key}s: leave {sensor!r} out, or begin the name with note"
-            raise Unclear(f"the {stem} alone, {words}", heading)
-        other = (sensors.setdefault(sensor, {}) if sensor else common).setdefault(stem, column)
+            raise _unclear(grid, column, f"the {stem} alone, {words}")
+        other = sensors[sensor].setdefault(stem, column)
         if other is not column:
             words = f"and {other.heading.name!r} could be it too: begin the name of one with note"
-            raise Unclear(f"one column of the {stem}, {words}", heading)
-    loose = {stem: column for stem, column in common.items() if stem in pair}
+            raise _unclear(grid, column, f"one column of the {stem}, {words}")
+    loose = {stem: column for stem, column in sensors.pop("", {}).items() if stem in pair}
     if not sensors:
         return {"": loose}
-    _pair_by_number(sensors)
+    for names in combinations([*sensors], 2):  # `A1 (mm/s)` and `P1 (deg)` are no two sensors, but 1
+        numbers = {re.sub(r"^[^\W\d_]{1,3}(?=[0-9]+$)", "", name) for name in names}
+        halves = [own for name in names if len(own := sensors.get(name, {})) == 1]
+        if len(numbers) == 1 and len(halves) == 2 and len({**halves[0], **halves[1]}) == 2:
+            for name in names:
+                del sensors[name]
+            sensors[numbers.pop()] = {**halves[0], **halves[1]}
     if len(sensors) == 1 and len(loose) == 1 and not loose.keys() & next(iter(sensors.values())).keys():
         next(iter(sensors.values())).update(loose)  # one sensor, named in one of its headings
         loose = {}
@@ -359,34 +328,5 @@ def _by_name(columns: Sequence[_Column], pair: tuple[str, str], key: str) -> dic
         if own and (own is loose or len(own) < 2):
             one = next(iter(sensors))
             words = f"in columns such as '{one} {pair[0]}' and '{one} {pair[1]}'"
-            heading = next(iter(own.values())).heading
-            raise Unclear(f"{pair[0]} and {pair[1]} of each {key}, {words}", heading)
+            raise _unclear(grid, next(iter(own.values())), f"{pair[0]} and {pair[1]} of each {key}, {words}")
     return sensors
-
-
-def _pair_by_number(sensors: dict[str, dict[str, _Column]]) -> None:
-    """Join `A1 (mm/s)` and `P1 (deg)`, which are no two sensors, as 1."""
-    halves = {name: next(iter(own)) for name, own in sensors.items() if len(own) == 1}
-    numbers = {name: re.sub(r"^[^\W\d_]{1,3}(?=[0-9]+$)", "", name) for name in halves}
-    for number in dict.fromkeys(numbers.values()):
-        pair = [name for name in halves if numbers[name] == number]
-        if number.isdecimal() and len(pair) == 2 == len({halves[name] for name in pair}):
-            sensors[number] = {stem: column for name in pair for stem, column in sensors.pop(name).items()}
-
-
-def _name(column: _Column, place: int = 0) -> str:
-    """The name that a column has in a runs or weights table; that of a remark is of no other column."""
-    name, stem = column.heading.name, column.stem
-    if stem == "note":
-        known = name == "time_s" or name.casefold().startswith(REMARKS) or DEVIATION.match(name)
-        return name if known else f"note {place} {name}"
-    if stem == "speed" and not column.unit and not column.heading.tidy:
-        raise Unclear(f"its unit too, such as '{name} (rpm)'", column.heading)
-    return f"{stem}_{column.unit}" if stem and column.unit else stem or name
-
-
-def _once(common: Sequence[_Column]) -> bool:
-    """Whether no run has two readings of one speed, so that there can be one sensor only."""
-    keys = (map(show, column.cells) for column in common if column.stem in ("run", "speed", "repeat"))
-    rows = [*zip(*keys, strict=True)]
-    return len(set(rows)) == len(rows)

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.complex_numbers import polar
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
+from rotorid.base.arrays import ComplexArray, FloatArray, polar
+from rotorid.base.choices import did_you_mean
+from rotorid.base.text import Shown, listing, speed_axis, vibration_unit_words
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fem import Rotor
-from rotorid.base.arrays import FloatArray
-from rotorid.base.complex_numbers import polar
+from rotorid.base.arrays import FloatArray, polar
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
-from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.files.input_file import STANDARD_INPUT
+from rotorid.base.json import SCHEMA_VERSION
 
 _T = TypeVar("_T")
+STANDARD_INPUT = "-"
 LONGEST_VALUE = 60
 FEW = 3
 """So many equal complaints about a column stand alone; more share a line."""
@@ -42,8 +43,7 @@ class Problem:
     expected: str
 
     def __str__(self) -> str:
-        rows = "" if self.row is None else f"row {self.row}"
-        return _line(self, rows, () if self.value is None else (quote(self.value),))
+        return _line([self])
 
 
 class InputError(ValueError):
@@ -62,23 +62,27 @@ class InputError(ValueError):
         super().__init__(_message(self.problems))
 
 
+def refusal(
+    path: Path | str,
+    expected: str,
+    row: int | None = None,
+    column: str | None = None,
+    value: str | None = None,
+) -> InputError:
+    """To be raised: one problem of a file."""
+    return InputError([Problem(str(path), row, column, value, expected)])
+
+
 class TableWarning(UserWarning):
     """Something in a file that is usable but that its owner should know."""
 
 
-class Problems:
+class Problems(list[Problem]):
     """Collects the problems of one or several files, to be raised together."""
-
-    def __init__(self) -> None:
-        self._items: list[Problem] = []
 
     def add(self, file: str, row: int | None, column: str | None, value: str | None, expected: str) -> None:
         """Note one problem."""
-        self._items.append(Problem(file, row, column, value, expected))
-
-    def extend(self, more: Iterable[Problem]) -> None:
-        """Note those of another file, or of an `InputError`."""
-        self._items.extend(more)
+        self.append(Problem(file, row, column, value, expected))
 
     def need(self, value: _T | None) -> _T:
         """What was read; raises `InputError` where that is nothing, for which there is a problem then."""
@@ -87,19 +91,13 @@ class Problems:
             raise AssertionError("nothing and no problem")
         return value
 
-    def __iter__(self) -> Iterator[Problem]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
     def drop(self, file: str) -> None:
         """Forget those of a file."""
-        self._items = [problem for problem in self._items if problem.file != file]
+        self[:] = [problem for problem in self if problem.file != file]
 
     def of(self, file: str) -> list[Problem]:
         """Problems of one file so far."""
-        return [problem for problem in self._items if problem.file == file]
+        return [problem for problem in self if problem.file == file]
 
     def refuse_newer(self, file: str, version: object) -> None:
         """Note a file of a later `schema_version`, which may mean something else, and what is none."""
@@ -109,46 +107,40 @@ class Problems:
 
     def stop(self) -> None:
         """Raise `InputError` with all problems, file by file and row by row, if there are any."""
-        if not self._items:
-            return
-        files = list(dict.fromkeys(problem.file for problem in self._items))
-        place = {file: number for number, file in enumerate(files)}
-        unique = dict.fromkeys(self._items)
-        raise InputError(sorted(unique, key=lambda problem: (place[problem.file], problem.row or 0)))
+        if self:
+            files = list(dict.fromkeys(problem.file for problem in self))
+            unique = dict.fromkeys(self)
+            raise InputError(sorted(unique, key=lambda one: (files.index(one.file), one.row or 0)))
 
 
-def _message(problems: tuple[Problem, ...]) -> str:
+def _message(problems: Sequence[Problem]) -> str:
     groups: dict[tuple[str, str | None, str], list[Problem]] = {}
-    for problem in problems:
-        groups.setdefault((problem.file, problem.column, problem.expected), []).append(problem)
-    lines: list[str] = []
-    left = len(problems)
+    for one in problems:
+        groups.setdefault((one.file, one.column, one.expected), []).append(one)
+    parts = list[list[Problem]]()
     for group in groups.values():
-        together = len(group) > FEW and all(problem.row is not None for problem in group)
-        for problem in () if len(lines) >= MOST_LINES or together else group[: MOST_LINES - len(lines)]:
-            lines.append(str(problem))
-            left -= 1
-        if together and len(lines) < MOST_LINES:
-            values = tuple(dict.fromkeys(quote(p.value) for p in group if p.value is not None))
-            rows = sorted({problem.row for problem in group if problem.row is not None})
-            first = f"{rows[0]}–{rows[-1]}"
-            if rows[-1] - rows[0] >= len(rows):
-                first = f"{', '.join(map(str, rows[:FEW]))} and others ({len(rows)} in all)"
-            lines.append(_line(group[0], f"rows {first}", values))
-            left -= len(group)
+        together = len(group) > FEW and all(one.row is not None for one in group)
+        parts += [group] if together else [[one] for one in group]
+    lines = [_line(part) for part in parts[:MOST_LINES]]
+    left = sum(map(len, parts[MOST_LINES:]))
     return "\n".join([*lines, *([f"and {left} more problems"] if left else [])])
 
 
-def _line(problem: Problem, rows: str, values: tuple[str, ...]) -> str:
-    file = "standard input" if problem.file == STANDARD_INPUT else problem.file
-    place = [printable(file), *([rows] if rows else [])]
-    if problem.column is not None:
-        what = "key" if problem.file.endswith(".toml") else "column"
-        place.append(f"{what} {printable(problem.column)}")
-    found = ""
-    if values:
-        found = f"found {', '.join(values[:FEW])}{' and so on' if len(values) > FEW else ''}, "
-    return f"{', '.join(place)}: {found}expected {problem.expected}"
+def _line(problems: Sequence[Problem]) -> str:
+    """One problem, or the same one of several rows."""
+    first = problems[0]
+    place = ["standard input" if first.file == STANDARD_INPUT else printable(first.file)]
+    rows = sorted({one.row for one in problems if one.row is not None})
+    if len(rows) > 1 and rows[-1] - rows[0] >= len(rows):
+        place.append(f"rows {', '.join(map(str, rows[:FEW]))} and others ({len(rows)} in all)")
+    elif rows:
+        place.append(f"rows {rows[0]}–{rows[-1]}" if len(rows) > 1 else f"row {rows[0]}")
+    if first.column is not None:
+        place.append(f"{'key' if first.file.endswith('.toml') else 'column'} {printable(first.column)}")
+    values = list(dict.fromkeys(quote(one.value) for one in problems if one.value is not None))
+    more = " and so on" if len(values) > FEW else ""
+    there = f"found {', '.join(values[:FEW])}{more}, " if values else ""
+    return f"{', '.join(place)}: {there}expected {first.expected}"
 
 
 def printable(text: str) -> str:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import listing
-from rotorid.base.unit_words import Shown
+from rotorid.base.text import Shown, listing
 from rotorid.files.cells import show
 from rotorid.files.columns import Column, make_table, read_grid
 from rotorid.files.problems import Problems

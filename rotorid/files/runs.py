@@ -7,8 +7,8 @@ make trials.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.complex_numbers import off_axis, turned
+from rotorid.base.arrays import ComplexArray, FloatArray, off_axis, turned
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
@@ -31,7 +30,7 @@ from rotorid.files.conventions import (
     Conventions,
     Phase,
 )
-from rotorid.files.layout import joined, read_runs_grids, stated_phase
+from rotorid.files.layout import MOUNTED, joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
@@ -170,32 +169,41 @@ def read_runs(
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
     table = None if grid is None else readings_table(grid, problems)
-    if table is None:
+    if grid is None or table is None:
         return None, None
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
-    start = len(problems)
-    speeds, index, words = merge_speeds(table, usable, conventions.speed_tolerance_percent)
+    start, band = len(problems), conventions.speed_tolerance_percent
+    speeds, index, words = _merge_speeds(table, usable, band)
     runs, sensors = (tuple(name for name in dict.fromkeys(names) if name) for names in (run, sensor))
-    run_at, sensor_at = ({name: k for k, name in enumerate(names)} for names in (runs, sensors))
-    cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
-    for i in usable:
-        cells[run_at[run[i]], index[i], sensor_at[sensor[i]]].append(i)
+    repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
+    order, run_at, sensor_at = (
+        {name: k for k, name in enumerate(dict.fromkeys(of))} for of in (repeat, runs, sensors)
+    )
+    rows, readings = sorted(usable, key=lambda i: order[repeat[i]]), Counter[tuple[int, int, int]]()
+    places = list[tuple[int, int, int, int]]()
+    for i in rows:
+        place = run_at[run[i]], index[i], sensor_at[sensor[i]]
+        places.append((readings[place], *place))
+        readings[place] += 1
     if len(problems) == start:  # with unclear speeds all the rest would be noise
-        _complain_about_repeats(table)
+        _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.complete and len(usable) == len(table) and len(problems) == start:
-        _complain_about_gaps(table, (runs, speeds, sensors), cells, conventions.speed_tolerance_percent)
+        _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
     if not len(problems):
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
-    repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
-    order = {label: k for k, label in enumerate(dict.fromkeys(repeat))}
-    rows = [row for own in cells.values() for row in sorted(own, key=lambda i: order[repeat[i]])]
-    at = np.array([(k, *place) for place, own in cells.items() for k in range(len(own))], dtype=int).T
-    shape = max(map(len, cells.values()), default=1), len(runs), len(speeds), len(sensors)
+    shape = max(readings.values()), len(runs), len(speeds), len(sensors)
+
+    def placed(values: NDArray[Any]) -> NDArray[Any]:
+        """Values (…, rows of the table) among repeats, runs, speeds, sensors; NaN elsewhere."""
+        nothing = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
+        out = np.full((*values.shape[:-1], *shape), nothing)
+        out[..., *np.transpose(places)] = values[..., rows]
+        return out
+
     vectors = conventions.labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
-    steps = np.array([table.steps("amplitude"), table.steps("phase")])
     unit = table.unit("amplitude")
     labels = replace(
         conventions.labels,
@@ -205,35 +213,29 @@ def read_runs(
         weight_scale=1e3,
         speed_unit=table.unit("speed").name,
     )
-    covariance = None
-    if "phase_std" in table:
-        covariance = _placed(np.moveaxis(covariances(table, vectors), 0, -1)[..., rows], at, shape)
+    passed_over = [
+        f"column {name.removeprefix(MOUNTED)!r} is passed over: weights stand in the weights table"
+        for name in grid.header
+        if name.startswith(MOUNTED)
+    ]
+    stated = np.moveaxis(covariances(table, vectors), 0, -1) if "phase_std" in table else None
     return runs, Trials(
         runs,
         speeds,
         sensors,
         (),
-        _placed(vectors[rows], at, shape),
+        placed(vectors),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=words + _which_mm_s(table),
-        steps=_placed(steps[:, rows], at, shape),
-        covariance=covariance,
+        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged))),
+        steps=placed(np.array([table.steps("amplitude"), table.steps("phase")])),
+        covariance=None if stated is None else placed(stated),
     )
 
 
-def _placed(values: NDArray[Any], at: IntArray, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Values (…, n) of rows at their places (4, n) among repeats, runs, speeds, sensors; NaN elsewhere."""
-    out = np.full((*values.shape[:-1], *shape), np.nan, dtype=values.dtype)
-    if np.iscomplexobj(out):
-        out[:] = complex(np.nan, np.nan)
-    out[..., *at] = values
-    return out
-
-
-def merge_speeds(
+def _merge_speeds(
     table: Table, usable: Sequence[int], tolerance_percent: float
-) -> tuple[FloatArray, dict[int, int], tuple[str, ...]]:
+) -> tuple[FloatArray, dict[int, int], list[str]]:
     """Merge the speeds that lie within the tolerance; a merged speed is their mean.
 
     They are those of different runs, or of the sensors of one steady run. Two such speeds of one sensor of
@@ -254,40 +256,35 @@ def merge_speeds(
         rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
     values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
-    run, *others = (table.texts(stem) for stem in ("run", "sensor", "repeat") if stem in table)
     distinct = np.unique(values[usable])
     apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
-    index = dict(
-        zip(usable, np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist(), strict=True)
-    )
-    remedy = f"within the tolerance of {band:g} %; write the nominal speed, or set "
-    remedy += "speed_tolerance_percent smaller"
-    first: dict[tuple[object, ...], int] = {}
-    read: dict[int, dict[tuple[str, float], None]] = defaultdict(dict)
-    unclear: dict[tuple[int, str], int] = {}
-    for row, g in index.items():
-        one = first.setdefault((g, run[row], *(each[row] for each in others)), row)
-        read[g][run[row], float(values[row])] = None
-        if values[one] != values[row] and unclear.setdefault((g, run[row]), row) == row:
-            other = table.shown("speed", one)
-            table.complain(row, "speed", f"one speed: run {run[row]!r} has {other} as well, {remedy}")
+    groups = np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist()
+    read: dict[int, set[tuple[str, float]]] = defaultdict(set)
+    for row, g in zip(usable, groups, strict=True):
+        read[g].add((table.texts("run")[row], float(values[row])))
     merged, alike = [], []
-    for g, pairs in sorted(read.items()):
-        speeds = sorted({speed for _, speed in pairs})
-        merged.append(float(np.mean([speed for _, speed in pairs])) if len(speeds) > 1 else speeds[0])
+    for g in sorted(read):
+        speeds = sorted({speed for _, speed in read[g]})
+        one = speeds[0] if len(speeds) == 1 else float(np.mean(sorted(speed for _, speed in read[g])))
+        merged.append(one)
+        if same_speed(speeds[0], speeds[-1], UNSAID):
+            continue
         shown = [show_speed(speed, unit) for speed in speeds]
-        if g not in {k for k, _ in unclear} and not same_speed(speeds[0], speeds[-1], band):
+        alike.append(f"{', '.join(words.split()[0] for words in shown)} as {show_speed(one, unit)}")
+        if not same_speed(speeds[0], speeds[-1], band):
             chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
-            expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
-            table.as_whole(table.fields["speed"].name, expected)
-        if not same_speed(speeds[0], speeds[-1], UNSAID):
-            numbers = ", ".join(words.split()[0] for words in shown)
-            alike.append(f"{numbers} as {show_speed(merged[g], unit)}")
-    steady = any(len(pairs) > len({name for name, _ in pairs}) for pairs in read.values())
+            words = (
+                f"speeds that are clearly the same or not: {chain} form a chain, neighbours {_remedy(band)}"
+            )
+            table.as_whole(table.fields["speed"].name, words)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-    of = "of one run, or of different ones," if steady else "of different runs"
-    words = f"speeds {of} within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
-    return np.array(merged), index, (words,) if alike else ()
+    words = f"speeds within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
+    return np.array(merged), dict(zip(usable, groups, strict=True)), [words] if alike else []
+
+
+def _remedy(tolerance_percent: float) -> str:
+    within = f"within the tolerance of {tolerance_percent:g} %"
+    return f"{within}; write the nominal speed, or set speed_tolerance_percent smaller"
 
 
 def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
@@ -325,49 +322,50 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
     return table
 
 
-def _which_mm_s(table: Table) -> tuple[str, ...]:
+def _which_mm_s(table: Table, *, exchanged: bool) -> list[str]:
     """How mm/s alone are read, below a heading that does not say it."""
-    heading, unit = table.fields["amplitude"].heading, table.unit("amplitude").name
+    heading = table.fields["phase" if exchanged else "amplitude"].heading
+    unit = table.unit("amplitude").name
     if unit not in ("mm_s", "mm_s_rms") or re.search("mm_s|rms|peak|pk", heading, re.IGNORECASE):
-        return ()
-    read, other = ("peak", "rms") if unit == "mm_s" else ("rms", "the peak")
-    return (
-        f"{heading!r} is read as mm/s {read}: write {other.split()[-1]} in the heading where it is {other}",
-    )
+        return []
+    read, other = ("peak", "rms") if unit == "mm_s" else ("rms", "peak")
+    return [f"{heading!r} is read as mm/s {read}: write {other} in the heading where it is {other}"]
 
 
 def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
-    """Amplitudes that look like angles beside phases that look like amplitudes, unless the job names both."""
-    stated = conventions.columns
-    if (
-        (stated is not None and stated.has("amplitude"))
-        or table.unit("phase").name != "deg"
-        or len(table) < 4
-    ):
+    """Amplitudes that look like angles beside phases that look like amplitudes, unless the job says it."""
+    if conventions.exchanged is not None or table.unit("phase").name != "deg" or len(table) < 4:
         return
-    unit = table.unit("amplitude")
-    amplitude, phase = table.numbers("amplitude") * unit.scale, np.degrees(table.numbers("phase"))
-    like_angles = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
-    small = np.all(np.abs(phase) < 30) and np.any(table.steps("phase") < np.radians(0.5))
-    if like_angles and np.ptp(amplitude) > 90 and small:
-        one, other = table.fields["amplitude"].heading, table.fields["phase"].name
-        key = f"amplitude_{unit.name}" if unit.name else "amplitude"
+    amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
+    small = np.all(np.abs(table.numbers("phase")) < np.radians(30)) and table.steps(
+        "phase"
+    ).min() < np.radians(0.5)
+    whole = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
+    if small and whole and np.ptp(amplitude) > 90:
         expected = (
-            "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, and "
-            f'all amplitudes look like angles. If they are, state [columns] {key} = "{other}", phase_deg = '
-            f'"{one}" in the job; if not, {key} = "{one}", phase_deg = "{other}"'
+            "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, all "
+            "amplitudes look like angles: state exchanged = true in the job, or exchanged = false"
         )
-        table.as_whole(one, expected)
+        table.as_whole(table.fields["amplitude"].heading, expected)
 
 
-def _complain_about_repeats(table: Table) -> None:
+def _complain_about_twins(
+    table: Table, places: Mapping[int, tuple[int, ...]], repeat: Sequence[str], tolerance_percent: float
+) -> None:
     """Two readings of one run, speed and sensor must say that they are repeats."""
     stem, expected = "repeat", "another repeat than in row {}, the same reading"
     if stem not in table:
         stem, expected = "sensor", "one reading per run, speed and sensor (row {} has the same); "
         expected += "repeated readings need a column repeat"
-    keys = zip(table.numbers("speed").tolist(), *map(table.texts, {"run", "sensor", stem}), strict=True)
-    table.once(stem, (key if all(key) else None for key in keys), expected)
+    first: dict[tuple[object, ...], int] = {}
+    speed = table.numbers("speed")
+    for row, place in sorted(places.items()):
+        other = first.setdefault((place[1:], repeat[row]), row)
+        if speed[other] != speed[row]:
+            there = f"run {table.shown('run', row)!r} has {table.shown('speed', other)} as well"
+            table.complain(row, "speed", f"one speed: {there}, {_remedy(tolerance_percent)}")
+        elif other != row:
+            table.complain(row, stem, expected.format(table.rows[other]))
 
 
 def _complain_about_gaps(
@@ -380,17 +378,14 @@ def _complain_about_gaps(
     runs, speeds, sensors = names
     unit, column = table.unit("speed"), table.fields["speed"].name
     read = {(r, s) for r, s, _ in present}
-    anywhere = {(s, c) for _, s, c in present}
-    gaps = (key for key in np.ndindex(len(runs), len(speeds), len(sensors)) if key not in present)
-    if len(present) == len(runs) * len(speeds) * len(sensors):
-        return
+    shape = len(runs), len(speeds), len(sensors)
+    gaps = (key for key in np.ndindex(shape) if key not in present) if len(present) < np.prod(shape) else ()
     for r, s, c in islice(gaps, MOST_LINES):
-        place = f"run {runs[r]!r} at {show_speed(float(speeds[s]), unit)}"
+        place = f"run {runs[r]!r} at {show_speed(float(speeds[s]), unit)}, as every run needs at every speed"
         if (r, s) in read:
-            why = "as other runs have" if (s, c) in anywhere else "as every run needs at every speed"
-            table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in {place}, {why}")
+            table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in {place}")
         elif c == 0:
             near = min((speeds[k] for q, k in read if q == r), key=lambda speed: abs(speed - speeds[s]))
-            hint = f"as other runs have; its nearest speed is {show_speed(near, unit)}"
-            hint += f", speeds count as one within {tolerance_percent:g} %"
-            table.as_whole(column, f"readings of {place}, {hint}")
+            hint = f"its nearest speed is {show_speed(near, unit)}, speeds count as one within "
+            hint += f"{tolerance_percent:g} %"
+            table.as_whole(column, f"readings of {place}; {hint}")

@@ -10,9 +10,11 @@ from __future__ import annotations
 import datetime
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -21,8 +23,8 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    GetPydanticSchema,
     PrivateAttr,
     StringConstraints,
     ValidationError,
@@ -33,13 +35,18 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
-from rotorid.base.versions import SCHEMA_VERSION
-from rotorid.files.decimal_numbers import LARGEST, NotANumber, decimal_comma, parse_number
+from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
+from rotorid.files.disk import read_bytes
 from rotorid.files.problems import Problem, Problems
-from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
+from rotorid.files.units import Quantity, Unit
 
+MOST_BYTES = 2_000_000
+_DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
+"""A key of so many parts; the time that tomllib takes grows with their square."""
+MOST_NAMES = 1_000
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Place = tuple[str, int, str]
 """Sheet, row and column of a setting of a workbook."""
@@ -68,14 +75,9 @@ _WORDS = {
 """What is expected, by the beginning of the type of pydantic's error."""
 
 
-class of:
+def of(inner: Any) -> Any:  # noqa: ANN401  an annotation
     """Of a field that keeps its unit, `Annotated[Quantity, of(Positive)]`; others with units are in SI."""
-
-    def __init__(self, inner: Any) -> None:  # noqa: ANN401  an annotation
-        self._inner = inner
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return handler.generate_schema(self._inner)
+    return GetPydanticSchema(lambda _, handler: handler.generate_schema(inner))
 
 
 @dataclass(frozen=True)
@@ -84,28 +86,25 @@ class Key:
 
     names: tuple[str, ...] = ()
     about: str = ""
-    units: Mapping[str, Unit] | UnitReader | None = None
+    units: Mapping[str, Unit] = field(default_factory=dict)
     expected: str = ""
 
     def __call__(self, schema: dict[str, Any]) -> None:
         """Of `json_schema_extra`: adds nothing."""
 
-    def unit(self, written: str) -> Unit | None:
-        """The unit in which a key is written, None without one; `UnitError` for another."""
-        if callable(self.units):
-            return self.units(written[len(self.names[0]) + 1 :])
-        return self.variants[written] if self.units else None
-
     @cached_property
     def variants(self) -> dict[str, Unit]:
-        """All names that can be listed, with their units."""
-        out, units = dict[str, Unit](), self.units if isinstance(self.units, Mapping) else {}
+        """All its names, with their units."""
+        out = dict[str, Unit]()
         for name in self.names:
             out[name] = Unit("", "")
-            for usual in units:
+            for usual, unit in self.units.items():
                 if name.endswith(f"_{usual}"):
-                    alike = (unit for unit in units.values() if unit.kind == units[usual].kind)
-                    out |= {f"{name.removesuffix(usual)}{unit.name}": unit for unit in alike}
+                    stem, alike = (
+                        name.removesuffix(usual),
+                        (u for u in self.units.values() if u.kind == unit.kind),
+                    )
+                    out |= {f"{stem}{other.name}": other for other in alike}
         return out
 
 
@@ -114,7 +113,7 @@ def key(
     name: str = "",
     default: Any = ...,  # noqa: ANN401  of the type of the field
     *,
-    units: Mapping[str, Unit] | UnitReader | None = None,
+    units: Mapping[str, Unit] | None = None,
     expected: str = "",
     example: str = "",
     **limits: Any,  # noqa: ANN401
@@ -131,9 +130,8 @@ def key(
     default
         Without the key; none: it is required.
     units
-        Where the name ends in a unit: the units that it may end in (those of the same kind of quantity count
-        for each name), or a reader of any unit after the name. The field is in SI, unless its type is `of` a
-        `Quantity`.
+        Where the name ends in a unit: those that it may end in (of the same kind of quantity for each name).
+        The field is in SI, unless its type is `of` a `Quantity`.
     expected
         For messages: what is expected, with an example; also where a required key is missing. Unstated: what
         it is, with the example.
@@ -150,7 +148,7 @@ def key(
         alias=names[0] if names else None,
         description=plain,
         examples=[example] if example else None,
-        json_schema_extra=Key(names, about, units, expected),
+        json_schema_extra=Key(names, about, units or {}, expected),
         **limits,
     )
 
@@ -170,13 +168,9 @@ class _Table:
     data: Mapping[str, Any] = field(default_factory=dict)
     keys: dict[str, str] = field(default_factory=dict)
 
-    def dotted(self, key: str) -> str:
-        """The dotted name of a key."""
-        return f"{self.name}.{key}".strip(".")
-
     def problem(self, key: str, expected: str, value: object = None) -> Problem:
         """A problem with a key, in the cell of it or of the table that holds it."""
-        name = at = self.dotted(key)
+        name = at = f"{self.name}.{key}".strip(".")
         while at and at not in self.where:
             at = at.rpartition(".")[0]
         source, row, column = self.where.get(at, (self.source, None, name or None))
@@ -245,33 +239,30 @@ class Settings(BaseModel):
 
     @classmethod
     @cache
-    def usual(cls, written: str) -> str:
-        """The usual name of a key; of one that is not known the name itself."""
-        keys = cls.known_keys()
-        exact = [usual for usual, key in keys.items() if written in key.variants]
-        longer = [
-            name for name, key in keys.items() if callable(key.units) and written.startswith(f"{name}_")
-        ]
-        return [*exact, *longer, written][0]
+    def _units(cls) -> dict[str, tuple[str, Unit | None]]:
+        """The usual name of every key, and its unit where it has one."""
+        return {
+            written: (usual, unit if key.units else None)
+            for usual, key in cls.known_keys().items()
+            for written, unit in key.variants.items()
+        }
 
     @model_validator(mode="wrap")
     @classmethod
     def _read(cls, data: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:  # noqa: ANN401
         if not isinstance(data, dict):
             return handler(data)
-        context: tuple[str, Mapping[str, Place], Mapping[int, str]] = info.context or ("", {}, {})
+        context: tuple[str, Mapping[str, Place], dict[int, str]] = info.context or ("", {}, {})
         table = _Table(*context[:2], context[2].get(id(data), ""), data)
         problems, values = list[Problem](), dict[str, Any]()
         for written, value in data.items():
-            usual = cls.usual(written)
-            try:
-                if usual in table.keys:
-                    raise UnitError(f"one key of them; {table.keys[usual]} says it already")
-                table.keys[usual] = written
-                unit = cls.known_keys().get(usual, Key()).unit(written)
-                values[usual] = value if unit is None else Quantity(written, value, unit)
-            except UnitError as error:
-                problems.append(table.problem(written, str(error), value))
+            usual, unit = cls._units().get(written, (written, None))
+            if usual in table.keys:
+                expected = f"one key of them; {table.keys[usual]} says it already"
+                problems.append(table.problem(written, expected, value))
+                continue
+            table.keys[usual] = written
+            values[usual] = value if unit is None else Quantity(written, value, unit)
         try:
             made = handler(values)
         except ValidationError as error:
@@ -284,29 +275,29 @@ class Settings(BaseModel):
         return made
 
     @classmethod
-    def _problems(cls, error: ErrorDetails, table: _Table) -> list[Problem]:
+    def _problems(cls, error: ErrorDetails, table: _Table) -> Sequence[Problem]:
         """What pydantic found wrong with a field, or with something in it, in our words."""
         ctx, kind, value = error.get("ctx", {}), error["type"], error["input"]
         if isinstance(ctx.get("error"), _Wrong):
             return list(ctx["error"].args)
-        usual, steps = str(error["loc"][0]), error["loc"][1:]
-        about, key = cls.known_keys().get(usual, Key()), table.keys.get(usual)
-        words = about.expected
-        if key is None or (kind == "missing" and not steps):  # the latter with a unit that is none
-            return [] if key else [table.problem(usual, words)]
+        keys, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
+        words, key = keys.get(usual, Key()).expected, table.keys.get(usual)
+        if key is None:
+            return [table.problem(usual, words)]
         inside = table.data[key] if isinstance(table.data[key], dict) else {}
         key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
-            known = [one for each in cls.known_keys().values() for one in each.names]
-            near = did_you_mean(usual, known)
-            words = f"a known key{near}; known are {listing(known, 'and') or 'none yet'}"
+            names = [name for each in keys.values() for name in each.names]
+            near = did_you_mean(usual, names)
+            words = f"a known key{near}; known are {listing(names, 'and') or 'none yet'}"
             if not (table.name or near or len(table.keys) > 1):
                 value = None  # nothing is printed of a file of something else
         elif kind != "missing":
+            about = words
             words = next((words for begin, words in _WORDS.items() if kind.startswith(begin)), error["msg"])
-            words = words.format(**ctx, name=table.dotted(key))
+            words = words.format(**ctx, name=f"{table.name}.{key}".strip("."))
             words += did_you_mean(str(value), re.findall(r"'([^']*)'", words) if "literal" in kind else ())
-            words += "" if about.expected in words else f": {about.expected}"
+            words += "" if about in words else f": {about}"
         return [table.problem(key, words, value)]
 
     @field_validator("*", mode="wrap")
@@ -325,10 +316,7 @@ class Settings(BaseModel):
         schema, keys = handler.resolve_ref_schema(handler(core)), cls.known_keys()
         plain = schema.get("properties", {})
         schema["properties"] = {name: plain[usual] for usual, key in keys.items() for name in key.variants}
-        schema["patternProperties"] = {
-            f"^{usual}_": plain[usual] for usual, key in keys.items() if callable(key.units)
-        }
-        required = [keys[usual] for usual in schema.pop("required", []) if not callable(keys[usual].units)]
+        required = [keys[usual] for usual in schema.pop("required", [])]
         if required:
             schema["allOf"] = [{"anyOf": [{"required": [name]} for name in key.variants]} for key in required]
         return schema
@@ -450,3 +438,52 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
         "description": "of the keys of this file; unstated: this one",
     }
     return {"$schema": DRAFT, **schema, "title": title}
+
+
+def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
+    """The content of a TOML file without its `schema_version`, or None and a problem."""
+    data = read_bytes(path, problems)
+    if data is None:
+        return None
+    try:
+        if len(data) > MOST_BYTES:
+            raise ValueError(f"at most {MOST_BYTES // 10**6} MB")
+        text = data.decode("utf-8-sig")
+        if not text.strip():
+            raise ValueError("settings; the file is empty")
+        if _DEEP.search(text):
+            raise ValueError("a key of more than 20 parts")
+        # A lone carriage return ends a line for no reader of TOML.
+        settings = tomllib.loads(text.replace("\r\n", "\n"))
+    except UnicodeDecodeError:
+        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
+    except (ValueError, RecursionError) as error:
+        problems.add(str(path), None, None, None, f"a TOML file: {error}")
+    else:
+        problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
+        return settings
+    return None
+
+
+def toml_bytes(data: Mapping[str, Any], comments: Iterable[str] = ()) -> bytes:
+    """A file of settings, with comment lines at the top; numbers keep all their digits, empty parts go.
+
+    Raises
+    ------
+    ValueError
+        For a name that is no Unicode text.
+    """
+    import tomli_w
+
+    lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
+    lines.append(f"schema_version = {SCHEMA_VERSION}")
+    tables = {}
+    for name, part in data.items():
+        rows = part if isinstance(part, list) else []
+        if isinstance(part, dict) or (rows and isinstance(rows[0], dict)):
+            tables[name] = part
+        elif rows and isinstance(rows[0], list):
+            lines += [f"{name} = [", *(f"  {json.dumps(row)}," for row in rows), "]"]
+        else:
+            lines.append(f"{name} = {json.dumps(part)}")
+    return "\n".join([*lines, "", tomli_w.dumps(tables)]).encode()

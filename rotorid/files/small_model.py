@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from fem import GRAVITY, Motion
-from rotorid.base.complex_numbers import polar
+from rotorid.base.arrays import polar
 from rotorid.files import units
 from rotorid.files.attached import (
     Attached,
@@ -28,9 +28,7 @@ from rotorid.files.attached import (
     whole,
 )
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
-from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml
-from rotorid.files.toml_writing import toml_bytes
+from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 
 STANDARD_GRAVITY = 9.80665
@@ -66,64 +66,56 @@ _SPELLING = str.maketrans(
     {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "/": "_", "·": "_", "*": "_"}
 )
 _POUND, _POUND_FORCE = 0.45359237, 4.4482216152605
-_LENGTHS = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "um": (1.0, 1e6), "mil": (254.0, 1e7), "in": (254.0, 1e4)}
-_MASSES = {
-    "kg": (1.0, 1.0),
-    "g": (1.0, 1e3),
-    "mg": (1.0, 1e6),
-    "oz": (_POUND, 16.0),
-    "lb": (_POUND, 1.0),
-}
-_RADII = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "in": (254.0, 1e4)}
 
 
-def _table(kind: str, factors: dict[str, tuple[float, float]]) -> dict[str, Unit]:
+def _table(kind: str, **factors: tuple[float, float]) -> dict[str, Unit]:
     return {name: Unit(name, kind, up, down) for name, (up, down) in factors.items()}
 
 
-LENGTH = _table("length", _LENGTHS)
-MASS = _table("mass", _MASSES)
+LENGTH = _table(
+    "length", m=(1.0, 1.0), mm=(1.0, 1e3), um=(1.0, 1e6), mil=(254.0, 1e7), **{"in": (254.0, 1e4)}
+)
+MASS = _table("mass", kg=(1.0, 1.0), g=(1.0, 1e3), mg=(1.0, 1e6), oz=(_POUND, 16.0), lb=(_POUND, 1.0))
 UNBALANCE = {
-    f"{mass}_{radius}": Unit(f"{mass}_{radius}", "unbalance", up * far, down * near)
-    for mass, (up, down) in _MASSES.items()
-    for radius, (far, near) in _RADII.items()
+    f"{name}_{radius}": Unit(
+        f"{name}_{radius}",
+        "unbalance",
+        mass.multiply * LENGTH[radius].multiply,
+        mass.divide * LENGTH[radius].divide,
+    )
+    for name, mass in MASS.items()
+    for radius in ("m", "mm", "in")
 }
-WEIGHT = {**MASS, **UNBALANCE}
-SPEED = _table("speed", {"rpm": (2.0 * pi, 60.0), "rad_s": (1.0, 1.0), "Hz": (2.0 * pi, 1.0)})
-ANGLE = _table("angle", {"deg": (pi, 180.0), "rad": (1.0, 1.0)})
-INERTIA = _table("inertia", {"kg_m2": (1.0, 1.0), "lb_in2": (_POUND * 254.0**2, 1e8)})
+WEIGHT = MASS | UNBALANCE
+SPEED = _table("speed", rpm=(2.0 * pi, 60.0), rad_s=(1.0, 1.0), Hz=(2.0 * pi, 1.0))
+ANGLE = _table("angle", deg=(pi, 180.0), rad=(1.0, 1.0))
+INERTIA = _table("inertia", kg_m2=(1.0, 1.0), lb_in2=(_POUND * 254.0**2, 1e8))
 STIFFNESS = _table(
     "stiffness",
-    {
-        "N_per_m": (1.0, 1.0),
-        "N_per_mm": (1e3, 1.0),
-        "N_per_um": (1e6, 1.0),
-        "lbf_per_in": (_POUND_FORCE * 1e4, 254.0),
-    },
+    N_per_m=(1.0, 1.0),
+    N_per_mm=(1e3, 1.0),
+    N_per_um=(1e6, 1.0),
+    lbf_per_in=(_POUND_FORCE * 1e4, 254.0),
 )
 DAMPING = _table(
-    "damping",
-    {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0), "lbf_s_per_in": (_POUND_FORCE * 1e4, 254.0)},
+    "damping", N_s_per_m=(1.0, 1.0), N_s_per_mm=(1e3, 1.0), lbf_s_per_in=(_POUND_FORCE * 1e4, 254.0)
 )
-MODULUS = _table(
-    "modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0), "psi": (_POUND_FORCE * 1e8, 254.0**2)}
-)
-DENSITY = _table(
-    "density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0), "lb_per_in3": (_POUND * 1e12, 254.0**3)}
-)
-FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (_POUND_FORCE, 1.0)})
-TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "min": (60.0, 1.0)})
-VELOCITY = _table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)})
-VISCOSITY = _table("viscosity", {"Pa_s": (1.0, 1.0), "mPa_s": (1.0, 1e3), "cP": (1.0, 1e3)})
+MODULUS = _table("modulus", Pa=(1.0, 1.0), MPa=(1e6, 1.0), GPa=(1e9, 1.0), psi=(_POUND_FORCE * 1e8, 254.0**2))
+DENSITY = _table("density", kg_per_m3=(1.0, 1.0), g_per_cm3=(1e3, 1.0), lb_per_in3=(_POUND * 1e12, 254.0**3))
+FORCE = _table("force", N=(1.0, 1.0), kN=(1e3, 1.0), lbf=(_POUND_FORCE, 1.0))
+TIME = _table("time", s=(1.0, 1.0), ms=(1.0, 1e3), us=(1.0, 1e6), min=(60.0, 1.0))
+VELOCITY = _table("velocity", m_s=(1.0, 1.0), mm_s=(1.0, 1e3), in_s=(254.0, 1e4))
+VISCOSITY = _table("viscosity", Pa_s=(1.0, 1.0), mPa_s=(1.0, 1e3), cP=(1.0, 1e3))
 CUBIC_STIFFNESS = _table(
     "cubic stiffness",
-    {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0), "lbf_per_in3": (_POUND_FORCE * 1e12, 254.0**3)},
+    N_per_m3=(1.0, 1.0),
+    N_per_mm3=(1e9, 1.0),
+    lbf_per_in3=(_POUND_FORCE * 1e12, 254.0**3),
 )
-
 _PEAK = {
     **LENGTH,
     **VELOCITY,
-    **_table("acceleration", {"g": (STANDARD_GRAVITY, 1.0), "m_s2": (1.0, 1.0), "mm_s2": (1.0, 1e3)}),
+    **_table("acceleration", g=(STANDARD_GRAVITY, 1.0), m_s2=(1.0, 1.0), mm_s2=(1.0, 1e3)),
 }
 VIBRATION = {
     name + suffix: Unit(name + suffix, unit.kind, unit.multiply * up, unit.divide * down)
@@ -144,11 +136,25 @@ def one_of(units: dict[str, Unit]) -> UnitReader:
     def read(name: str) -> Unit:
         unit = units.get(spelt(name))
         if unit is None:
-            found = f"not {name!r}" if name else "which is missing"
-            raise UnitError(f"one of the units {listing(units)}, {found}{did_you_mean(name, units)}")
+            other = f"not {name!r}" if name else "which is missing"
+            raise UnitError(f"one of the units {listing(units)}, {other}{did_you_mean(name, units)}")
         return unit
 
     return read
+
+
+def weight(name: str) -> Unit:
+    """The unit of a weight: a mass or a mass × radius.
+
+    Raises
+    ------
+    UnitError
+        For any other name.
+    """
+    unit = WEIGHT.get(spelt(name))
+    if unit is None:
+        raise UnitError(f"a unit of weight: {listing(WEIGHT)}, not {name!r}{did_you_mean(name, WEIGHT)}")
+    return unit
 
 
 def ratio(name: str) -> Unit:
@@ -175,10 +181,10 @@ def vibration(name: str) -> Unit:
     name = spelt(name)
     if name in VIBRATION:
         return VIBRATION[name]
-    for known in VIBRATION:
-        if name.casefold() == known.casefold():
-            raise UnitError(f"the unit written {known}, not {name}")
-    base = max((known for known in _PEAK if name.startswith(f"{known}_")), key=len, default=None)
+    for unit in VIBRATION:
+        if name.casefold() == unit.casefold():
+            raise UnitError(f"the unit written {unit}, not {name}")
+    base = max((unit for unit in _PEAK if name.startswith(f"{unit}_")), key=len, default=None)
     if base is not None:
         raise UnitError(
             f"{base} (peak), {base}_pp (peak to peak) or {base}_rms, not {name}; known vibration units are "
@@ -187,22 +193,24 @@ def vibration(name: str) -> Unit:
     return Unit(name, f"label {name!r}")
 
 
-def weight(name: str) -> Unit:
-    """The unit of a weight: a mass or a mass × radius.
-
-    Raises
-    ------
-    UnitError
-        For any other name.
-    """
-    name = spelt(name)
-    unit = WEIGHT.get(name)
-    if unit is None:
-        raise UnitError(f"a unit of weight: {listing(WEIGHT)}, not {name!r}{did_you_mean(name, WEIGHT)}")
-    return unit
-
-
 def spelt(name: str) -> str:
     """A unit's name as this project spells it: `µm` is `um`, `mm/s` is `mm_s`, `lbs` is `lb`."""
     spelling = name.translate(_SPELLING)
     return "lb" if spelling == "lbs" else spelling
+
+
+def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:
+    """A mass or unbalance, or several, in kg or kg·m, as weights in a unit are.
+
+    Returns
+    -------
+    None where masses and unbalances convert only with a radius, m, and there is none.
+    """
+    values = weight.value if isinstance(weight.value, tuple) else (weight.value,)
+    sizes = tuple(map(weight.unit.to_si, values))
+    wanted = WEIGHT[unit].kind
+    if weight.unit.kind == wanted:
+        return sizes
+    if radius is None:
+        return None
+    return tuple(size * radius if wanted == "unbalance" else size / radius for size in sizes)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from balancing import Labels
-from rotorid.base.words import Phase
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import Phase
 from rotorid.files import runs as runs_table
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table
 from rotorid.files.conventions import Conventions
-from rotorid.files.layout import read_runs_grid
+from rotorid.files.layout import joined, read_runs_grids
 from rotorid.files.problems import Problems
 from rotorid.files.units import one_of
 from rotorid.identify.modes_result import Readings
@@ -27,7 +27,7 @@ _SAME = 1e-9
 
 
 def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
-    """Read the vectors of each run over speed.
+    """Read the vectors of each run over speed, by rising time or, without times, speed.
 
     The columns are those of a runs table without `repeat` (`run`, `speed_rpm`, `sensor`, `amplitude_<unit>`,
     `phase_deg`) and, optionally, `time_s` and, both or neither, `amplitude_std_<unit>` and `phase_std_deg`,
@@ -42,48 +42,44 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     """
     problems = Problems()
     files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
-    conventions = Conventions(Labels(phase=phase))
-    grid = problems.need(read_runs_grid(files, conventions, problems, first=True))
+    grids = read_runs_grids(files, Conventions(Labels(phase=phase)), problems, first=True)
+    grid = problems.need(joined(grids, problems))
     table = problems.need(runs_table.readings_table(grid, problems, COLUMNS))
-    _complain_about_twins(table)
+    instants = _instants(table)
     problems.stop()
-    unit = table.unit("amplitude")
+    unit, sweeps = table.unit("amplitude"), []
     labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
-    return tuple(_sweeps(table, labels))
-
-
-def _sweeps(table: Table, labels: Labels) -> Iterator[Readings]:
-    """The rows of each run as vectors of its sensors, by rising time or, without times, speed."""
     vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     covariances = runs_table.covariances(table, vectors) if "amplitude_std" in table else None
     runs, names, speeds = np.array(table.texts("run")), table.texts("sensor"), table.numbers("speed")
-    instants = table.numbers("time" if "time" in table else "speed")
     for run in dict.fromkeys(runs.tolist()):
         rows = np.flatnonzero(runs == run)
         instant, first, place = np.unique(instants[rows], return_index=True, return_inverse=True)
         sensors = tuple(dict.fromkeys(names[row] for row in rows))
         at = place, [sensors.index(names[row]) for row in rows]
-        Z = np.full((len(instant), len(sensors)), complex(np.nan, np.nan))
+        Z, stated = np.full((len(instant), len(sensors)), complex(np.nan, np.nan)), None
         Z[at] = vectors[rows]
-        stated = None
         if covariances is not None:
             stated = np.full((*Z.shape, 2, 2), np.nan)
             stated[at] = covariances[rows]
         timed = instant if "time" in table else None
-        yield Readings(run, timed, speeds[rows][first], sensors, Z, stated, labels)
+        sweeps.append(Readings(run, timed, speeds[rows][first], sensors, Z, stated, labels))
+    return tuple(sweeps)
 
 
-def _complain_about_twins(table: Table) -> None:
-    """A sensor is read once at a time, and all at one speed."""
-    stem = "time" if "time" in table else "speed"
+def _instants(table: Table) -> FloatArray:
+    """Times, or else speeds; a sensor is read once at a time, and all at one speed."""
+    stem, where = "time", "time"
+    if "time" not in table:
+        stem, where = "speed", "speed; vectors read one after the other need a column time_s"
     runs, instants, speeds = table.texts("run"), table.numbers(stem), table.numbers("speed")
-    where = "time" if stem == "time" else "speed; vectors read one after the other need a column time_s"
     keys = [*zip(runs, table.texts("sensor"), instants.tolist(), strict=True)]
-    known = (None if unknown else key for key, unknown in zip(keys, np.isnan(instants), strict=True))
-    table.once("sensor", known, f"another sensor than in row {{}}, which has the same run and {where}")
+    unlike = f"another sensor than in row {{}}, which has the same run and {where}"
+    table.once("sensor", (None if np.isnan(key[2]) else key for key in keys), unlike)
     first: dict[tuple[str, float], int] = {}
     for row, (run, _, instant) in enumerate(keys):
         other = first.setdefault((run, instant), row)
         if abs(speeds[row] - speeds[other]) > _SAME * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)
+    return instants

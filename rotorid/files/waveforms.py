@@ -15,17 +15,15 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
 from balancing import Labels
-from rotorid.base.arrays import AnyArray, significant
-from rotorid.base.result import Column
-from rotorid.base.rpm import RPM
-from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
-from rotorid.base.words import Phase
+from rotorid.base.arrays import significant
+from rotorid.base.choices import did_you_mean
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.conventions import as_phase
-from rotorid.files.instruments import DERIVATIVE, read_samples, refusal
-from rotorid.files.problems import InputError, Problems, TableWarning
+from rotorid.files.instruments import DERIVATIVE, read_samples
+from rotorid.files.problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import (
     NotNegative,
     Number,
@@ -36,8 +34,8 @@ from rotorid.files.settings import (
     key,
     listed,
     read_settings,
+    read_toml,
 )
-from rotorid.files.toml_file import read_toml
 from rotorid.files.units import VIBRATION, Unit, spelt
 from rotorid.waveforms.record import Channel, Edge, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import Vectors, find_vectors
@@ -163,10 +161,10 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     InputError
         With the problems of all files.
     """
-    problems, paths = Problems(), [Path(file) for file in files]
+    problems, paths = Problems(), [*map(Path, files)]
     settings = next((path for path in paths if path.suffix.lower() == ".toml"), None)
+    source, folder = str(settings or "the options"), (settings or Path()).parent
     data: dict[str, Any] = {"records": {path.stem: str(path) for path in paths}}
-    source = str(settings or "the options")
     if settings is not None:
         data = dict(problems.need(read_toml(settings, problems)))
     if len(paths) > (1 if settings else len(data["records"])):
@@ -175,10 +173,7 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     options = {key: value for key, value in (stated or {}).items() if value is not None}
     if "speeds_rad_s" in options:
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}
-    file, folder = (
-        problems.need(read_settings(WaveformsFile, data | options, source, problems)),
-        (settings or Path()).parent,
-    )
+    file = problems.need(read_settings(WaveformsFile, data | options, source, problems))
     problems.stop()
     records, amplitude = list[WaveformRecord](), file.amplitude
     for run, name in file.records.items():
@@ -217,43 +212,38 @@ def _record(run: str, path: Path, file: WaveformsFile) -> tuple[WaveformRecord, 
     parts = {column: _parted(column) for column in sampled.channels}
     stems = Counter(stem for stem, _ in parts.values())
     short = {stem if stems[stem] == 1 else column: column for column, (stem, _) in parts.items()}
+    columns = short | {column: column for column in parts}  # with or without the unit in the name
     there = f"; the channels are {listing(parts, 'and')}"
     if file.tacho is None:
         expected = "a tacho channel, without which there is no phase: --tacho NAME (tacho in a file)"
         raise refusal(path, expected + there)
-
-    def channel(name: str) -> tuple[str, AnyArray]:
-        """A channel, named with or without its unit, and its samples without gaps."""
-        column = short.get(name, name)
-        if column not in parts:
-            hint = did_you_mean(name, {**short, **parts})
-            raise refusal(path, f"a channel of this name{hint}{there}", column=name)
-        samples = sampled.channels[column]
+    marks = columns.get(file.tacho)
+    keys = file.channels or {name: ChannelKeys() for name, column in short.items() if column != marks}
+    channels, measured = list[Channel](), list[Unit]()
+    for name, stated in (("tacho", ChannelKeys(channel=file.tacho)), *keys.items()):
+        column = columns.get(stated.channel or name, "")
+        if not column:
+            hint = did_you_mean(stated.channel or name, columns)
+            raise refusal(path, f"a channel of this name{hint}{there}", column=stated.channel or name)
+        samples, in_name = sampled.channels[column], parts[column][1]
         for at in np.flatnonzero(~np.isfinite(samples))[:1]:
             value = "" if np.isnan(samples[at]) else str(samples[at])
             raise refusal(path, "a number in each sample", int(at) + sampled.first_row, column, value)
-        return column, samples
-
-    marks, pulses = channel(file.tacho)
-    others = {name: ChannelKeys(channel=column) for name, column in short.items() if column != marks}
-    sensors, measured = [], []
-    for name, keys in (file.channels or others).items():
-        column, samples = channel(keys.channel or name)
-        in_name = parts[column][1]
-        unit = keys.unit or in_name or file.unit or Unit("", "label ''")
+        unit = stated.unit or in_name or file.unit or Unit("", "label ''")
         if in_name is not None and in_name.name != unit.name:
             raise refusal(path, f"the unit {in_name.name} of its name, not {unit.name}", column=column)
         if unit.name.endswith(("_pp", "_rms")) and unit.kind in DERIVATIVE:
             expected = f"the unit of a sample, {unit.name.rpartition('_')[0]}, not {unit.name}"
             raise refusal(path, expected, column=column)
-        factor = keys.scale * unit.to_si(sampled.scale)
-        signal_path = SignalPath(keys.high_pass, keys.high_pass_order, keys.delay)
-        sensors.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
+        factor = stated.scale * unit.to_si(sampled.scale)
+        signal_path = SignalPath(stated.high_pass, stated.high_pass_order, stated.delay)
+        channels.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
         measured.append(unit)
+    pulses, *sensors = channels
     if not sensors:
         raise refusal(path, "a channel besides that of the tacho")
-    tacho = Channel(marks, pulses * np.float32(sampled.scale))
-    return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), measured
+    tacho = Channel(str(marks), pulses.samples * np.float32(sampled.scale))
+    return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), measured[1:]
 
 
 def _parted(name: str) -> tuple[str, Unit | None]:
@@ -286,39 +276,50 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
     return each
 
 
-def vectors_columns(each: Sequence[Vectors], labels: Labels) -> tuple[Column, ...]:
-    """A runs table of records of the same sensors and orders, one row an instant and a sensor."""
+def vectors_table(each: Sequence[Vectors], labels: Labels) -> tuple[Table, dict[str, str]]:
+    """A runs table of records of the same sensors and orders, one row an instant and a sensor.
+
+    Returns
+    -------
+    Table, dict
+        The table, and the headings of those of its columns that people read, by their names.
+    """
     rows: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in each]) for name in _ROWS}
     whole = replace(each[0], **rows)
     runs = np.repeat([one.run for one in each], [len(one.times) for one in each])
-    unit, scale, columns = labels.vibration_unit, labels.vibration_scale, list[Column]()
+    unit, scale = labels.vibration_unit, labels.vibration_scale
     plain, end = unit.removesuffix("_pp").removesuffix("_rms"), f"_{unit}" if unit else ""
-
-    def column(name: str, values: ArrayLike, form: str = "", heading: str | None = None) -> None:
-        """Values (P, C), (P, 1) of all sensors or (C,) of all instants."""
-        cells = np.broadcast_to(values, whole.gap.shape).ravel()
-        shown = significant(cells, DIGITS) if cells.dtype.kind == "f" else cells
-        columns.append(Column(name, shown.tolist(), form.format if form else None, heading))
-
-    column("run", runs[:, None], "{}")
-    column("time_s", whole.times[:, None])
-    column("speed_rpm", whole.speeds[:, None] * RPM, "{:.1f}", "rpm")
-    column("sensor", whole.sensors, "{}")
+    columns: list[tuple[str, ArrayLike, str, str]] = [
+        ("run", runs[:, None], "{}", "run"),
+        ("time_s", whole.times[:, None], "{}", ""),
+        ("speed_rpm", whole.speeds[:, None] * RPM, "{:.1f}", "rpm"),
+        ("sensor", whole.sensors, "{}", "sensor"),
+    ]
     for k, order in enumerate(whole.orders):
         name, about = ("", unit.replace("_", " ")) if order == 1 else (f"order{order}_", f"{order}×")
         vectors = whole.vectors[..., k]
         amplitudes, phases = labels.vibration(vectors)
         turned = np.minimum(whole.tangential[..., k] / np.maximum(np.abs(vectors), 1e-300), np.pi)
-        column(f"{name}amplitude{end}", amplitudes, "{:.4g}", about)
-        column(f"{name}phase_deg", phases, "{:.1f}°", "phase")
-        column(f"{name}amplitude_std{end}", whole.radial[..., k] * scale, "{:.2g}", "±")
-        column(f"{name}phase_std_deg", np.degrees(turned), "{:.2g}°", "±")
-    column(f"overall{end}", whole.overall[..., int(unit.endswith("_rms"))] * scale, "{:.4g}", "all")
-    read = whole.gap * (scale if plain == unit else VIBRATION[plain].scale)
-    column(f"gap_{plain}" if plain else "gap", read, "{:.4g}", "gap")
-    column("turns", whole.turns[:, None], "{:.0f}")
-    column("note", np.where(whole.end[:, None], "end of the record", ""))
-    return tuple(columns)
+        columns += [
+            (f"{name}amplitude{end}", amplitudes, "{:.4g}", about or "amplitude"),
+            (f"{name}phase_deg", phases, "{:.1f}°", "phase"),
+            (f"{name}amplitude_std{end}", whole.radial[..., k] * scale, "{:.2g}", "std"),
+            (f"{name}phase_std_deg", np.degrees(turned), "{:.2g}°", "std"),
+        ]
+    overall = whole.overall[..., int(unit.endswith("_rms"))] * scale
+    gap = whole.gap * (scale if plain == unit else VIBRATION[plain].scale)
+    columns += [
+        (f"overall{end}", overall, "{:.4g}", "all"),
+        (f"gap_{plain}" if plain else "gap", gap, "{:.4g}", "gap"),
+        ("turns", whole.turns[:, None], "{:.0f}", "turns"),
+        ("note", np.where(whole.end[:, None], "end of the record", ""), "{}", ""),
+    ]
+    made = []
+    for name, values, form, _ in columns:
+        cells = np.broadcast_to(values, gap.shape).ravel()
+        cells = significant(cells, DIGITS) if cells.dtype.kind == "f" else cells
+        made.append(Column(name, cells.tolist(), form.format))
+    return Table("vectors", tuple(made)), {name: heading for name, *_, heading in columns if heading}
 
 
 def read_vectors_grid(
@@ -357,9 +358,7 @@ def read_vectors_grid(
     for one in each:
         for word in one.warnings:
             warnings.warn(f"{path}: run {one.run!r}: {word}", TableWarning, stacklevel=2)
-    columns = vectors_columns(each, labels)
-    rows = zip(
-        *(["" if value != value else value for value in column.values] for column in columns), strict=True
-    )
-    header = tuple(column.name for column in columns)
-    return Grid(str(path), 1, header, tuple(enumerate(rows, start=2))), labels.phase, waveforms.files
+    table, _ = vectors_table(each, labels)
+    rows = (tuple("" if value is None else value for value in row) for row in table.rows)
+    grid = Grid(str(path), 1, tuple(table.headings), tuple(enumerate(rows, start=2)))
+    return grid, labels.phase, waveforms.files

@@ -14,16 +14,15 @@ from functools import partial
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.cells import Grid, show
+from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.conventions import FULL_TURN, Conventions
-from rotorid.files.decimal_numbers import NotANumber, parse_number
-from rotorid.files.headings import find_header, read_headings
-from rotorid.files.layout import NUMBER, WEIGHT, explained, long_rows
-from rotorid.files.problems import Problems
+from rotorid.files.headings import WEIGHT, find_header, read_headings
+from rotorid.files.layout import NUMBER, long_rows
+from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
@@ -69,16 +68,15 @@ def read_weights(
     """
     find, before = partial(find_header, weights=True), len(problems)
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
-    if grid is None:
-        return None
-    with explained(grid, problems):
-        grid = _one_weight_a_row(grid, conventions)
-    if len(problems) > before:
+    try:
+        grid = None if grid is None else _one_weight_a_row(grid, conventions)
+    except InputError as error:
+        problems.extend(error.problems)
+    if grid is None or len(problems) > before:
         return None
     there = {name.partition("_")[0] for name in grid.header}
-    one = runs is not None and len(runs) == 1  # whose name need not stand there
     columns = (
-        Column("run", required=not one),
+        replace(COLUMNS[0], required=runs is None or len(runs) > 1),  # the only run need not be named
         *COLUMNS[1:3],
         replace(COLUMNS[3], required=there.isdisjoint(_PLACES)),
         *(Column(stem, required=False, blank=True, lenient=True) for stem in _BESIDE if stem in there),
@@ -92,34 +90,31 @@ def read_weights(
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
     known = {name.casefold(): name for name in runs or ()}
     run = [name if name in (runs or ()) else known.get(name.casefold(), name) for name in names]
-    values = conventions.labels.weight_from(size, _angles(table, conventions))
-    planes = tuple(dict.fromkeys(filter(None, plane)))
-    total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
+    values = conventions.labels.weight_from(size, _angles(table, conventions)).tolist()
     rows: dict[tuple[str, str, complex], int] = {}
-    for i, key in enumerate(zip(run, plane, values.tolist(), strict=True)):
+    for i, row in enumerate(zip(run, plane, values, strict=True)):
         if runs is not None and run[i] and run[i] not in runs:
             hint = f"{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
             table.complain(i, "run", f"a run of the runs table{hint}")
-        elif run[i] and plane[i] and size[i] > 0 and np.isfinite(values[i]):
-            if rows.setdefault(key, i) != i:
-                table.complain(i, stem, f"each weight once (row {table.rows[rows[key]]} says the same)")
-            elif runs is not None:
-                total[runs.index(run[i]), planes.index(plane[i])] += values[i]
+        elif rows.setdefault(row, i) != i and all(row):
+            table.complain(i, stem, f"each weight once (row {table.rows[rows[row]]} says the same)")
+    planes = tuple(dict.fromkeys(filter(None, plane)))
+    total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
+    for name, its, value in rows if runs and len(problems) == before else ():
+        total[(runs or ()).index(name), planes.index(its)] += value
     return Weights(planes, total, table.unit("mass"), tuple(rows))
 
 
 def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:
     """The table with one row a weight and its columns by their own names; blank rows say nothing."""
     headings = read_headings(grid.header, weights=True)
-    at = {h.stem: h.index for h in headings}
+    at = {heading.stem: heading.index for heading in headings}
     wide = "plane" not in at and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
     if {"unit", "mass"} <= at.keys():
         k, unit = at["mass"], at["unit"]
-        with_units = [
-            (n, (*r[:k], f"{show(r[k])} {show(r[unit])}".strip(), *r[k + 1 :])) for n, r in grid.rows
-        ]
-        grid = replace(grid, rows=tuple(with_units))
-    headings = headings if wide else [replace(h, sensor="") for h in headings]
+        rows = ((n, (*r[:k], f"{show(r[k])} {show(r[unit])}".strip(), *r[k + 1 :])) for n, r in grid.rows)
+        grid = replace(grid, rows=tuple(rows))
+    headings = headings if wide else [replace(heading, sensor="") for heading in headings]
     grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
     filled = ("mass", *_PLACES, *(() if wide else ("plane",)))
     places = [k for k, name in enumerate(grid.header) if name.partition("_")[0] in filled]
@@ -150,12 +145,11 @@ def _angles(table: Table, conventions: Conventions) -> FloatArray:
 def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float:
     """The angle in degrees of 90°, a clock, a hole, a blade or a position."""
     written = table.shown(stem, i)
-    if match := _ANGLE.fullmatch(written):
-        return parse_number(match[1].replace(",", "."))
-    clock = _CLOCK.fullmatch(written)
+    clock, match = _CLOCK.fullmatch(written), _HOLE.fullmatch(written)
+    if angle := _ANGLE.fullmatch(written):
+        return parse_number(angle[1].replace(",", "."))
     if clock and (stem == "clock" or ":" in written or not written[-1:].isdigit()):
         return (30.0 * int(clock[1]) + int(clock[2] or 0) / 2.0) % 360.0
-    match = _HOLE.fullmatch(written)
     if stem == "clock" and written:
         raise NotANumber("a time of the clock face, such as 10:20")
     if not written or (stem != "hole" and match is None):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.base.unit_words import Shown
+from rotorid.base.text import Shown
 from rotorid.identify.operator_model import (
     HarmonicModel,
     mode_slopes,

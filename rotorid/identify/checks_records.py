@@ -25,11 +25,9 @@ from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import Iterations, Problem, at
 from rotorid.regression import gain, least_squares, solution
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.normal_matrix import normal_matrix
+from rotorid.regression.estimate import Combination, Estimate
+from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
 from rotorid.regression.prior import effect
-from rotorid.regression.search import RCOND
-from rotorid.regression.undetermined_combinations import Combination
 
 FEWEST, LAGS = 20, 10
 """Samples below which nothing can be said of correlations; neighbours that are looked at."""
@@ -56,12 +54,12 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         words.append(f"the model cannot be simulated with the result: {error}")
         nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
         return nothing | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
-    prior = effect(problem.prior, J, r, theta, stated=problem.stated, at_bounds=path.at_bounds)
+    prior = effect(problem.prior, J, r, theta, at_bounds=path.at_bounds)
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
-            alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=RCOND), theta, r)
+            alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=JACOBIAN_RCOND), theta, r)
             prior = replace(prior, alone=combined(problem, alone).describe_rank())
-        estimate, r = prior.apart(estimate, stated=problem.stated), prior.best  # of the data alone
+        estimate, r = prior.apart(estimate), prior.best  # of the data alone
     seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
     rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
@@ -183,7 +181,11 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
         frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
-    C, G, waves = np.zeros((len(r), 2)), gain(J, rcond=RCOND), np.exp(2j * np.pi * frequency * t[series])
+    C, G, waves = (
+        np.zeros((len(r), 2)),
+        gain(J, rcond=JACOBIAN_RCOND),
+        np.exp(2j * np.pi * frequency * t[series]),
+    )
     C[series] = problem.scale[series, None] * np.column_stack((waves.real, waves.imag))
     outside = C - J @ (G @ C)  # what the parameters take of y is J G y
     free = len(r) - round(float(np.sum(G.T * J))) - 2

@@ -15,7 +15,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.choices import did_you_mean
 from rotorid.identify.combinations import (
     CONSTANT,
     NAME,

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.registry import find
+from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
 from rotorid.identify.amplitudes import Comparison, Experiments, compare
 from rotorid.identify.combinations import NAME, why_several
@@ -30,13 +30,16 @@ from rotorid.identify.ode import check_known
 from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
-from rotorid.regression.normal_matrix import normal_matrix
-from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
-from rotorid.regression.robust import LOSSES
-from rotorid.regression.search import together
-from rotorid.regression.undetermined_combinations import FoundCombination, only_determined
+from rotorid.regression.estimate import Combination, Estimate, only_determined
+from rotorid.regression.linear import normal_matrix
+from rotorid.regression.nonlinear import (
+    LOSSES,
+    Bounds,
+    NonlinearEstimate,
+    evaluated_once,
+    nonlinear_least_squares,
+)
+from rotorid.regression.prior import PriorEffect, PriorValues, effect, prior_rows
 
 REWEIGHTINGS, MOVED = 2, 0.01
 """Rounds at most with weights from predicted amplitudes, after the first with measured ones; standard
@@ -57,7 +60,7 @@ def identify(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
-    prior: Known | None = None,
+    prior: PriorValues | None = None,
     ridge: float = 0.0,
 ) -> Identification:
     """Identify a model's parameters from measured amplitudes, natural frequencies and shapes.
@@ -72,7 +75,7 @@ def identify(
     bounds
         Lowest and highest value by name, None: no limit; they also choose among several solutions.
     loss
-        One of `LOSSES` in `rotorid.regression.robust`.
+        One of `LOSSES` in `rotorid.regression.nonlinear`: "linear", or "huber" against gross errors.
     start
         Starting values by name, tried beside the linear estimate.
     prior, ridge
@@ -98,11 +101,11 @@ def _check(
     *,
     bounds: Bounds,
     loss: str,
-    prior: Known,
+    prior: PriorValues,
     ridge: float,
 ) -> None:
     """Refuse names that are not the model's, or that stand for two things."""
-    find(LOSSES, loss, "loss")
+    one_of(loss, "loss", LOSSES)
     for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
         check_known(what, names, "parameter", model.parameters)
     for name, (low, high) in bounds.items():
@@ -169,12 +172,12 @@ def output_error(
     *,
     bounds: Bounds | None = None,
     loss: str = "linear",
-    prior: Known | None = None,
+    prior: PriorValues | None = None,
     ridge: float = 0.0,
 ) -> OutputError:
     """Fit predicted to measured amplitudes from a start (n,)."""
     names, data, point = comparison.model.parameters, comparison.experiments, begin
-    residual, jacobian = together(comparison.residuals)
+    residual, jacobian = evaluated_once(comparison.residuals)
     known = prior_rows(names, prior or {}, ridge, begin, jacobian)
     iterations, moved = 0, np.inf
     for left in reversed(range(REWEIGHTINGS + 1)):
@@ -198,10 +201,10 @@ def output_error(
         if not left or not fit.converged or moved < MOVED or same:
             break
         comparison = comparison.reweighted(point)
-        residual, jacobian = together(comparison.residuals)
+        residual, jacobian = evaluated_once(comparison.residuals)
     J = jacobian(point)
-    did = effect(known, J, fit.estimate.residuals, point, stated=data.stated, at_bounds=fit.at_bounds)
-    estimate = did.apart(fit.estimate, stated=data.stated) if did else fit.estimate
+    did = effect(known, J, fit.estimate.residuals, point, at_bounds=fit.at_bounds)
+    estimate = did.apart(fit.estimate) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
     return replace(fit, estimate=estimate, message=message), comparison, did, J
 
@@ -342,7 +345,7 @@ def _named(model: HarmonicModel, theta: FloatArray) -> dict[str, float]:
     return dict(zip(model.parameters, theta.tolist(), strict=True))
 
 
-def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCombination, ...]:
+def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[Combination, ...]:
     """Products, sums and ratios that the data see, at the estimate, with the spread of the linearised model.
 
     They are those of the linear estimate: exact, and not tangents at the end of the search. Without it
@@ -351,7 +354,7 @@ def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCo
     theta, spread = estimate.solution, estimate.solution_covariance
     if linear is None:
         tangents = [] if estimate.full_rank else estimate.combinations
-        return tuple(FoundCombination(f"(near these values) {c.words}", c.value, None) for c in tangents)
+        return tuple(Combination(f"(near these values) {c.words}", c.value, None) for c in tangents)
     values, slopes = linear.system.combinations(theta)
     scale = np.where(theta == 0, 1.0, theta)
     rows, relative = np.linalg.qr((estimate.row_space * scale).T)[0], slopes * scale
@@ -365,11 +368,11 @@ def _combinations(estimate: Estimate, linear: LinearFit | None) -> tuple[FoundCo
 
 def _listed(
     linear: LinearFit, values: FloatArray, std: FloatArray, seen: BoolArray
-) -> tuple[FoundCombination, ...]:
+) -> tuple[Combination, ...]:
     """Combinations that the data see, but for single parameters; NaN: no standard deviation is known."""
     each = zip(linear.words, values.tolist(), std.tolist(), seen, strict=True)
     return tuple(
-        FoundCombination(words, value, None if np.isnan(error) else error)
+        Combination(words, value, None if np.isnan(error) else error)
         for words, value, error, shown in each
         if shown and words not in linear.system.names
     )

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 from rotorid.base.text import counted
 from rotorid.identify.checks_records import judge, misfit
 from rotorid.identify.expressions import finite
@@ -21,9 +21,8 @@ from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
-from rotorid.regression.nonlinear import nonlinear_least_squares
+from rotorid.regression.nonlinear import inside, nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
-from rotorid.regression.search import inside
 
 MOST_STARTS, OTHERS, MOST_WARNINGS = 10_000, 7, 3
 """Starts at most; so many where the first does not describe the record; warnings at most, the worst first."""
@@ -67,7 +66,7 @@ def fit(  # noqa: PLR0913
     start
         Starting values by name, instead of the model's.
     loss
-        One of `LOSSES` in `rotorid.regression.robust`.
+        One of `LOSSES` in `rotorid.regression.nonlinear`: "linear", or "huber" against gross errors.
     starts
         Number of starts: the first is `start`, the others spread over the bounds, or around it. None: others
         where levenberg-marquardt ends at a minimum that does not describe the record.

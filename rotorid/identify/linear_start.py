@@ -30,8 +30,7 @@ from rotorid.identify.combinations import (
 )
 from rotorid.identify.operator_model import HarmonicModel, products_of_powers
 from rotorid.regression import least_squares, solution
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.undetermined_combinations import echelon, only_determined
+from rotorid.regression.estimate import Estimate, echelon, only_determined
 
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""

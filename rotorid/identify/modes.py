@@ -15,8 +15,7 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.identify.amplitudes import trusted
 from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
 from rotorid.identify.modes_result import RARE, FittedModes, Readings, projected
-from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
-from rotorid.regression.search import together
+from rotorid.regression.nonlinear import NonlinearEstimate, evaluated_once, nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
@@ -100,7 +99,7 @@ def _search(
             return projected(answers.basis(q), Z, root)
 
         fit = nonlinear_least_squares(
-            *together(both),
+            *evaluated_once(both),
             q,
             names=names,
             sigma_stated=stated,

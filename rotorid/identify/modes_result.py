@@ -312,7 +312,7 @@ class FittedModes:
     def notes(self) -> tuple[str, ...]:
         """Which probes read a whirl, and what errors are taken for."""
         unstated = f"errors are not stated: the same {self.same}, as what is left of the amplitudes shows"
-        return (*self._shapes[3], *self.fit.estimate.told().notes, *[unstated] * bool(self.same))
+        return (*self._shapes[3], *self.fit.estimate.answer.notes, *[unstated] * bool(self.same))
 
     def file_table(self, speed: str = "frequency_rad_s", scale: float = 1.0) -> Table:
         """The table of modes that `reduce` and `identify` read, a row per mode and point.

@@ -19,8 +19,7 @@ from rotorid.base.plot_style import (
     new_figure,
     plain,
 )
-from rotorid.base.rpm import RPM
-from rotorid.base.unit_words import SPEEDS, Shown
+from rotorid.base.text import RPM, SPEEDS, Shown
 from rotorid.identify.amplitudes import real_matrices
 
 if TYPE_CHECKING:

@@ -7,11 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, legend_below, look, new_figure, plain
+from rotorid.base.plot_style import (
+    BLUE,
+    DARK,
+    MARKERS,
+    QUIET,
+    TEXT,
+    legend_below,
+    look,
+    new_figure,
+    plain,
+)
 from rotorid.base.text import counted
 from rotorid.identify.records import refined
 from rotorid.identify.simulation import STEPWISE, simulate
-from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +37,7 @@ def figure_fit(result: Fit) -> Figure:
     """All about a fit: each signal with the model and its residuals, the inputs, the parameters."""
     outputs, inputs = result.model.outputs, tuple(result.records[0].inputs)
     heights = [1.4, 0.8] * len(outputs) + [0.9] * len(inputs)
-    parts = 0.9 + sum(heights), 0.2 + ROOM[0] + ROOM[1] * len(result.parameters)
+    parts = 0.9 + sum(heights), 0.8 + 0.26 * len(result.parameters)
     figure = new_figure(sum(parts))
     above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
     axes = above.subplots(len(heights), sharex=True, height_ratios=heights, squeeze=False)[:, 0]
@@ -86,11 +95,22 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
 
 
 def draw_parameters(result: Fit, axes: Axes) -> None:
-    """Parameters with their 95 % intervals, below how the search ended."""
-    values, ends = result.values.tolist(), result.ci95
-    half = [np.nan] * len(values) if ends is None else (np.diff(ends)[:, 0] / 2).tolist()
-    words = ["not determined" if np.isnan(value) else "no interval" for value in values]
-    draw_intervals(axes, [*zip(result.parameters, values, half, words, strict=True)])
+    """Parameters with their 95 % intervals in percent of each, below how the search ended."""
+    values, n = result.values, len(result.parameters)
+    half = np.full(n, np.nan) if result.ci95 is None else np.diff(result.ci95)[:, 0] / 2
+    shares = 100 * half / np.where(values, np.abs(values), np.nan)
+    axes.errorbar(0 * values, range(n), xerr=shares, fmt="o", color=DARK, capsize=4)
+    beside, names = axes.get_yaxis_transform(), []
+    for k, (name, value, share) in enumerate(zip(result.parameters, values, shares, strict=True)):
+        words = "not determined" if np.isnan(value) else "no interval"
+        words = f"± {share:.2g} %" if np.isfinite(share) else words
+        axes.text(1.02, k, words, va="center", transform=beside, fontsize=TEXT)
+        names.append(name if np.isnan(value) else f"{name} = {value:.4g}")
+    axes.set_yticks(range(n), names)
+    widest = 1.15 * max(filter(np.isfinite, shares), default=1.0)
+    axes.set(xlim=(-widest, widest), ylim=(n - 0.4, -0.6), xlabel="95 % interval, % of the value")
+    axes.locator_params(axis="x", nbins=6)
+    plain(axes)
     state = "converged" if result.converged else "not converged"
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 

@@ -15,9 +15,9 @@ from rotorid.identify.records import Record, inputs_of, models_of
 from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.linear import JACOBIAN_RCOND
 from rotorid.regression.nonlinear import NonlinearEstimate
 from rotorid.regression.prior import prior_rows
-from rotorid.regression.search import RCOND
 
 LARGEST = 1e140
 """Residuals and sensitivities beyond this size have no sum of squares."""
@@ -183,7 +183,7 @@ class Problem:
         """The step of the parameters (n,) from linearised rows K δ = Y, (m, n) and (m,), and the prior's."""
         A, y = self.prior.below(K), np.append(Y, -self.prior.residual(theta))
         sigma = 1.0 if self.stated else None
-        step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
+        step = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=JACOBIAN_RCOND)
         return replace(step, residuals=step.residuals[: len(Y)])
 
 

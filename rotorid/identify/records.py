@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
-from rotorid.base.unit_words import Shown
+from rotorid.base.text import Shown
 from rotorid.identify.ode import OdeModel
 
 T = TypeVar("T")

@@ -9,18 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, percent, sentence
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.linear_start import LinearFit
 from rotorid.identify.operator_model import HarmonicModel
-from rotorid.regression.estimate import Estimate, Uncertain, parameter_columns, parameter_dict, parameter_text
-from rotorid.regression.normal_matrix import NormalMatrix
+from rotorid.regression.estimate import (
+    Combination,
+    Estimate,
+    Uncertain,
+    parameter_columns,
+    parameter_dict,
+    parameter_text,
+)
+from rotorid.regression.linear import NormalMatrix
 from rotorid.regression.prior import PriorEffect
-from rotorid.regression.undetermined_combinations import FoundCombination
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +78,7 @@ class Identification(Answered, Uncertain):
     covariance: FloatArray | None
     estimate: Estimate
     linear: LinearFit | None
-    combinations: tuple[FoundCombination, ...]
+    combinations: tuple[Combination, ...]
     solutions: tuple[Mapping[str, float], ...]
     theta: FloatArray
     unidentifiable: tuple[str, ...]

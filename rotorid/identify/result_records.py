@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base import tables
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered, frame
 from rotorid.base.json import plain
-from rotorid.base.result import frame
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
 from rotorid.identify.record_residuals import Iterations
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import Trajectory
 from rotorid.regression.estimate import parameter_columns
-from rotorid.regression.normal_matrix import NormalMatrix
+from rotorid.regression.linear import NormalMatrix
 from rotorid.regression.prior import PriorEffect
 
 if TYPE_CHECKING:
@@ -125,7 +124,8 @@ class Fit(Answered, Iterations):
     def answer(self) -> Answer:
         """Whether there is an answer, the values with their intervals, and what the model leaves."""
         prior, rank = self.prior, self.estimate.describe_rank()
-        parts = self.estimate.told(self.at_bounds, prior.why if prior else {})
+        at_bounds = dict.fromkeys(self.at_bounds, "at its bound")
+        parts = self.estimate.answer_with((prior.why if prior else {}) | at_bounds)
         judgement = prior.judgement(parts.judgement) if prior else parts.judgement
         warnings = [w for w in self.warnings if w != rank and not w.startswith(self.message)]
         data = np.concatenate([values for record in self.records for values in record.outputs.values()])
@@ -139,14 +139,14 @@ class Fit(Answered, Iterations):
             judgement = f"NO intervals: {warnings.pop(0)}."
         else:
             judgement = f"NO intervals, see why. {judgement}"
-        found = f"{parts.found}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
-        found += f"\n  residual rms {self.residual_rms:.4g}"
+        numbers = f"{parts.numbers}\n\n  {self.method}, integrator {self.integrator}: {self.message}"
+        numbers += f"\n  residual rms {self.residual_rms:.4g}"
         texts = [f"{capital(table.name)}:\n{tables.terminal(table, COLUMNS)}" for table in self.tables()]
         texts += [self.normal_matrix.text()] if self.normal_matrix else []
         return replace(
             parts,
             judgement=judgement,
-            found=found,
+            numbers=numbers,
             warnings=tuple(warnings),
             notes=parts.notes if self.described or self.estimate.dof <= 0 else (),
             tables=tuple(texts),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, significant
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 from rotorid.identify.adaptive_steps import LARGEST, adaptive
 from rotorid.identify.integrators import HEUN, System, exact, stepwise
 from rotorid.identify.ode import OdeModel, SimulationError

@@ -16,7 +16,7 @@ from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.combinations import CONSTANT
 from rotorid.identify.linear_start import passive_elements
 from rotorid.identify.operator_model import HarmonicModel
-from rotorid.regression.search import search_from
+from rotorid.regression.nonlinear import search_from
 
 SEARCHES, AGAIN, BEST = 60, 6, 3
 """Random starts at most; enough of them with one end; how many ends are handed on."""

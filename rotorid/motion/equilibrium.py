@@ -13,9 +13,8 @@ import numpy as np
 
 from fem import JournalBearing, NodeForce, Stop
 from fem.forces import kind_of, law
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.checks import number
-from rotorid.base.rpm import speed_text
+from rotorid.base.arrays import ComplexArray, FloatArray, number
+from rotorid.base.text import speed_text
 from rotorid.motion.system import MotionSystem, followers
 
 _SMALLEST_STEP = 1e-9

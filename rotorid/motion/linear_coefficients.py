@@ -12,7 +12,7 @@ import fem
 from fem import SqueezeFilm, Stop
 from fem.forces import kind_of
 from rotorid.base.arrays import FloatArray
-from rotorid.base.rpm import speed_text
+from rotorid.base.text import speed_text
 from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria
 from rotorid.motion.system import MotionSystem
 from rotorid.reduction import SmallModel

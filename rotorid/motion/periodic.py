@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fem import InternalDamping
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import listing, percent
+from rotorid.base.text import RPM, listing, percent, rpm_text
 from rotorid.motion.branches import HOPF, Branch, follow, straight
 from rotorid.motion.collocation import UNITY, Orbit, Periodic, turning
 from rotorid.motion.equilibrium import equilibrium, room, whirl_at_rest

@@ -21,7 +21,7 @@ from rotorid.base.plot_style import (
     plain,
     rad_s_above,
 )
-from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import RPM, rpm_text
 from rotorid.motion.run import MotionRun
 from rotorid.motion.steady import steady_linear, synchronous_part
 

@@ -10,10 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from fem import NodeForce
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.checks import number
-from rotorid.base.rpm import rpm_text
-from rotorid.base.text import counted
+from rotorid.base.arrays import ComplexArray, FloatArray, number
+from rotorid.base.text import counted, rpm_text
 from rotorid.motion.equilibrium import check_journals, named
 from rotorid.motion.rosenbrock import DONE, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem

@@ -23,8 +23,7 @@ import numpy as np
 import fem
 from fem import GRAVITY, NodeForce
 from fem.forces import law, tables
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.base.checks import number
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, number
 from rotorid.base.compiled import compiled_part
 from rotorid.reduction import SmallModel
 

@@ -21,11 +21,9 @@ from fem import (
 )
 from fem.assembly import both_planes
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.checks import checked_speeds
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import percent
+from rotorid.base.text import RPM, percent, rpm_text
 from rotorid.reduction.small_model import SmallModel
 
 CLOSE = 0.08

@@ -27,10 +27,9 @@ import numpy as np
 import fem
 from fem import Pencil, whole_rotor
 from fem.assembly import assemble, multiply
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import Answer, Answered, Column, text
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
 from rotorid.base.text import counted, percent
 from rotorid.reduction.masses import like, mac
 from rotorid.reduction.reduce import Reduction

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
-from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.checks import whole
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, text
+from rotorid.base.arrays import AnyArray, FloatArray, IndexArray, whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.text import counted
 from rotorid.reduction.masses import (
     Normalisation,
@@ -165,6 +163,10 @@ class Placement(Answered):
     def to_frame(self) -> pd.DataFrame:
         """One row per choice, in rank order: nodes, masses, frequencies, error, MAC, condition number."""
         rows = np.arange(self.considered)
+
+        def numbered(name: str, values: AnyArray) -> list[Column]:
+            return [Column(name.format(k), column) for k, column in enumerate(values.T, start=1)]
+
         table = frame(
             (
                 Column("rank", np.where(rows < self.ranked, rows + 1.0, np.nan)),

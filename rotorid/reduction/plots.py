@@ -20,13 +20,11 @@ from rotorid.base.plot_style import (
     legend_above,
     look,
     new_axes,
-    new_pair,
     plain,
     plain_numbers,
     rad_s_above,
 )
-from rotorid.base.rpm import RPM
-from rotorid.base.text import counted
+from rotorid.base.text import RPM, counted
 from rotorid.reduction.masses import like
 from rotorid.reduction.placement import NAMED
 
@@ -176,7 +174,12 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
 
     Of the response the largest influence coefficient at each speed; its axes are returned.
     """
-    above, below = ax or new_pair(5.6)
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        ratios = {"height_ratios": (3, 2)}
+        _, ax = plt.subplots(2, sharex=True, layout="constrained", figsize=(WIDTH, 5.6), gridspec_kw=ratios)
+    above, below = ax
     moving = running.speeds > 0
     each = (running.full, running.small, running.small - running.full)
     full, small, difference = (np.abs(values[moving]).max(axis=(1, 2)) for values in each)

@@ -16,13 +16,10 @@ from numpy.typing import ArrayLike
 
 import fem
 from fem.assembly import ignored_inertia
-from rotorid.base.answer import Answer, Answered, together
-from rotorid.base.arrays import FloatArray
-from rotorid.base.checks import whole
+from rotorid.base.answer import Answer, Answered, Column, frame, text, together
+from rotorid.base.arrays import FloatArray, whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
-from rotorid.base.rpm import RPM
-from rotorid.base.text import counted, error_figures, percent
+from rotorid.base.text import RPM, counted, error_figures, percent
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem import GRAVITY, JournalBearing, NodeForce, SqueezeFilm, StateSpace, Whirl, solve
+from fem import GRAVITY, JournalBearing, NodeForce, SqueezeFilm, StateSpace, Whirl, solve_modes
 from fem.assembly import (
     Reduced,
     assemble,
@@ -42,8 +42,7 @@ from fem.assembly import (
 )
 from fem.forces import kind_of
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, read_only
-from rotorid.base.checks import checked_speeds, number
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, checked_speeds, number, read_only
 from rotorid.base.text import counted, listing
 from rotorid.reduction.condensation import held, static_shapes
 from rotorid.reduction.masses import bending_stiffness, mass_nodes, natural_frequencies, plane_at_rest
@@ -265,7 +264,7 @@ class SmallModel(Answered):
         # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
         n = Q.size if Q.P.planes == 2 else 2 * Q.size
         K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
-        return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
+        return solve_modes(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
     def critical_speeds(self, lowest: float, highest: float) -> FloatArray:
         """Speeds between two, rad/s, ascending, at which a mode whirls once a turn, either way."""

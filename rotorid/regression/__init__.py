@@ -1,6 +1,6 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
-from rotorid.regression.estimate import Estimate, coverage_factor
+from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
 from rotorid.regression.linear import (
     RCOND,
     covariance_root,
@@ -12,7 +12,6 @@ from rotorid.regression.linear import (
     stretch,
     unstretch,
 )
-from rotorid.regression.undetermined_combinations import WORD_TOLERANCE, Combination, echelon
 
 __all__ = [
     "RCOND",

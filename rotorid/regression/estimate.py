@@ -1,4 +1,8 @@
-"""Estimate of a regression: values, covariance, intervals, and what the data do not determine."""
+"""Estimate of a regression: values, covariance, intervals, and what the data do not determine.
+
+Parameters that the data do not determine by themselves are told by their combinations that are determined: a
+basis of the row space of K in reduced echelon form, such as "b − 0.5·d".
+"""
 
 from __future__ import annotations
 
@@ -9,17 +13,37 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import FloatArray
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column
+from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.json import cell, plain
-from rotorid.base.result import Column
-from rotorid.base.text import error_figures, percent, sentence, table
-from rotorid.regression.undetermined_combinations import (
-    Combination,
-    combination_words,
-    echelon,
-    only_determined,
-)
+from rotorid.base.text import error_figures, listing, percent, sentence, table
+
+WORD_TOLERANCE = 1e-7
+"""A parameter whose share in the null space is below this is taken as determined."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A combination of parameters that the data determine.
+
+    Attributes
+    ----------
+    words
+        The combination, such as "b − 0.5·d" or "b*(1 - delta)".
+    value, std
+        Its estimate and one standard deviation, None where that is unknown.
+    coefficients
+        Of the parameters, shape (n,), where it is linear (a tangent, where it is not); None: in words only.
+    """
+
+    words: str
+    value: float
+    std: float | None
+    coefficients: FloatArray | None = None
+
+    def line(self) -> str:
+        """One line of text: "b − 0.5·d = 3.1 ± 0.2"."""
+        return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
 
 
 class Uncertain:
@@ -57,15 +81,15 @@ class Uncertain:
         std, factor = self.std, self.coverage_factor
         if std is None or factor is None:
             return None
-        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
+        return self.values[:, None] + factor * std[:, None] * [-1.0, 1.0]
 
     @property
     def correlation(self) -> FloatArray | None:
         """Correlation matrix (n, n); None where errors are unknown."""
-        if self.covariance is None:
+        if (std := self.std) is None:
             return None
-        std = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.covariance / np.outer(*[np.where(std > 0, std, 1.0)] * 2))
+        size = np.where(std > 0, std, 1.0)
+        return np.asarray(self.covariance / np.outer(size, size))
 
 
 def parameter_columns(names: Sequence[str], numbers: Uncertain) -> tuple[Column, ...]:
@@ -87,28 +111,20 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
     for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, numbers)), strict=True):
         digits = value_digits(value, std)
-        texts = [f"{x:.{digits}g}" for x in (value, *ends)]
-        share = percent(std / abs(value)) if value else ""
-        reason = "" if np.isnan(value) else why.get(name, "")
-        error = "" if np.isnan(std) else error_figures(std)
-        cells = [name, texts[0], error, share, *texts[1:], reason]
-        lines.append(["" if text == "nan" else text for text in cells])
+        cells = [f"{value:.{digits}g}", error_figures(std), percent(std / abs(value)) if value else ""]
+        cells += [f"{end:.{digits}g}" for end in ends]
+        reason = why.get(name, "not determined" if np.isnan(value) else "")
+        lines.append([name, *("" if cell in ("nan", "unknown") else cell for cell in cells), reason])
     filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    shown = table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS).splitlines()
-    blank = np.flatnonzero(np.isnan(numbers.values)).tolist()
-    wide = max((len(names[k]) for k in blank), default=0)
-    for k in blank:  # the words stand beside the name, where a number would begin
-        shown[k + 1] = f"  {names[k]:<{wide}}  {why.get(names[k], 'not determined')}"
-    return "\n".join(shown)
+    return table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS)
 
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
+    cells = (cell(column.values) for column in parameter_columns(names, numbers))
     return {
         name: {"value": value, "std": std, "ci95": None if low is None else [low, high]}
-        for name, value, std, low, high in zip(
-            *(cell(column.values) for column in parameter_columns(names, numbers)), strict=True
-        )
+        for name, value, std, low, high in zip(*cells, strict=True)
     }
 
 
@@ -130,7 +146,7 @@ class Estimate(Answered, Uncertain):
         Y − K θ, shape (m,).
     dof
         Degrees of freedom, m − rank (rows of zero weight not counted).
-    rank, condition_number, singular_values
+    rank, condition_number
         Of the row-weighted, column-scaled matrix.
     errors_stated
         Whether the covariance comes from errors that the user stated (normal intervals) and not from the
@@ -155,7 +171,6 @@ class Estimate(Answered, Uncertain):
     dof: int
     rank: int
     condition_number: float
-    singular_values: FloatArray
     errors_stated: bool
     chi_square: float | None
     row_space: FloatArray
@@ -171,16 +186,20 @@ class Estimate(Answered, Uncertain):
     def combinations(self) -> tuple[Combination, ...]:
         """What the data determine instead, where they do not determine every parameter (else empty).
 
-        Those of a nonlinear model, where they have been found (`curved`). Otherwise a basis of the row space
-        of K in reduced echelon form; combinations of a single parameter are left out, for that parameter is
+        Those of a nonlinear model where they were given (`curved`). Otherwise a basis of the row space of K
+        in reduced echelon form; combinations of a single parameter are left out, for that parameter is
         determined.
         """
         if self.full_rank:
             return ()
         if self.curved is not None:
             return self.curved
-        basis = echelon(self.row_space)
-        return tuple(self._combination(row) for row in basis if np.count_nonzero(row) > 1)
+        return tuple(self._combination(row) for row in echelon(self.row_space) if np.count_nonzero(row) > 1)
+
+    def _combination(self, row: FloatArray) -> Combination:
+        cov = self.solution_covariance
+        std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
+        return Combination(combination_words(row, self.names), float(row @ self.solution), std, row)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -195,11 +214,6 @@ class Estimate(Answered, Uncertain):
             return f"{who} determined (condition number {condition:.3g})"
         words = only_determined(self.names, self.undetermined, [c.words for c in self.combinations])
         return f"{words} (rank {self.rank} of {len(self.names)})"
-
-    def _combination(self, row: FloatArray) -> Combination:
-        cov = self.solution_covariance
-        std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
-        return Combination(combination_words(row, self.names), float(row @ self.solution), std, row)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
@@ -222,22 +236,19 @@ class Estimate(Answered, Uncertain):
         if self.chi_square is None or self.dof < 1 or chdtrc(self.dof, self.chi_square) > chance:
             return ""
         ratio = float(np.sqrt(self.chi_square / self.dof))
-        more = f"{ratio:.2g} times as large as" if ratio >= 2 else f"{100 * (ratio - 1):.2g} % larger than"
-        return f"residuals are {more} the stated errors explain"
+        return f"residuals are {ratio:.3g} times as large as the stated errors explain"
 
     @property
     def answer(self) -> Answer:
         """Values ± standard deviations, intervals, and what is not determined."""
-        return self.told()
+        return self.answer_with({})
 
-    def told(self, at_bounds: Sequence[str] = (), why: Mapping[str, str] | None = None) -> Answer:
+    def answer_with(self, why: Mapping[str, str]) -> Answer:
         """The answer with words beside parameters: that they stand at a bound, or what a prior says."""
         notes = [words] if (words := self.misfit(1.0)) else []
         if self.covariance is None and self.dof <= 0:
             notes.append("no intervals: no errors are stated and there are no more equations than parameters")
-        beside = {**(why or {}), **dict.fromkeys(at_bounds, "at its bound")}
-        lines = [parameter_text(self.names, self, beside)]
-        lines += [f"  {c.line()}" for c in self.combinations]
+        lines = [parameter_text(self.names, self, why), *(f"  {c.line()}" for c in self.combinations)]
         return Answer(sentence(self.describe_rank()), "\n".join(lines), notes=tuple(notes))
 
 
@@ -260,8 +271,54 @@ def coverage_factor(dof: float | None) -> float | None:
     return float(stdtrit(dof, 0.975)) if dof > 0 else None
 
 
-def value_digits(value: float, std: float | None) -> int:
+def value_digits(value: float, std: float) -> int:
     """Significant digits of a value that show two of its standard deviation, from six to ten."""
-    if std is None or not (std > 0 and np.isfinite(std)) or value == 0:
+    if not (0 < std < np.inf and value):
         return 6
     return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 10))
+
+
+def combination_words(coefficients: FloatArray, names: Sequence[str]) -> str:
+    """Write a linear combination as an engineer would: "b − 0.5·d"."""
+    words = ""
+    for c, name in zip(coefficients, names, strict=True):
+        if c:
+            size = f"{abs(c):.4g}·".removeprefix("1·")
+            words += f" {'−' if c < 0 else '+'} {size}{name}"
+    return ("−" if words.startswith(" −") else "") + words[3:]
+
+
+def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
+    """Say which parameters and combinations, in words, are determined and which parameters are not."""
+    seen = [name for name in parameters if name not in lost]
+    seen += [w for w in words if w not in seen and any(name in w for name in lost)]
+    verb = "is" if len(seen) == 1 else "are"
+    which = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
+    itself = "itself is" if len(lost) == 1 else "themselves are"
+    return f"{which}; {listing(lost, 'and')} by {itself} not"
+
+
+def unit_columns(A: AnyArray) -> tuple[AnyArray, FloatArray]:
+    """Matrices (…, m, n) with columns of length 1, and these lengths (…, n), 1 for a column of zeros."""
+    size = np.linalg.norm(A, axis=-2)
+    scale = np.where(size > 0, size, 1.0)
+    return A / scale[..., None, :], scale
+
+
+def echelon(rows: FloatArray) -> list[FloatArray]:
+    """Reduced row echelon form with clean zeros; columns are compared after scaling to unit length."""
+    A, scale = unit_columns(rows)
+    pivots: list[int] = []
+    for column in range(A.shape[1]):
+        more = [*pivots, column]
+        if np.linalg.matrix_rank(A[:, more], WORD_TOLERANCE) == len(more):
+            pivots = more
+    reduced = np.linalg.lstsq(A[:, pivots], A, rcond=None)[0]
+    reduced[np.abs(reduced) <= WORD_TOLERANCE] = 0.0
+    return [_snapped(row * scale / scale[p]) for row, p in zip(reduced, pivots, strict=True)]
+
+
+def _snapped(row: FloatArray) -> FloatArray:
+    """Whole and half numbers that rounding has blurred become exact again."""
+    near = np.round(2 * row) / 2
+    return np.where(np.abs(row - near) <= WORD_TOLERANCE * np.maximum(1.0, np.abs(row)), near, row)

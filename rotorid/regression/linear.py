@@ -14,17 +14,21 @@ variance of the residuals and Student's t; without degrees of freedom there is n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import Column, text
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.undetermined_combinations import WORD_TOLERANCE
+from rotorid.base.json import plain
+from rotorid.regression.estimate import WORD_TOLERANCE, Estimate, unit_columns
 
 RCOND = 1e-12
 """Singular values below RCOND times the largest count as zero (after column scaling)."""
+JACOBIAN_RCOND = 1e-10
+"""The same for derivatives, which carry more rounding than a table."""
 
 
 def stretch(a: ArrayLike) -> FloatArray:
@@ -125,7 +129,7 @@ def least_squares(
         `sigma` only.
     sigma
         Stated errors of Y, which weight the rows: one standard deviation of each entry, shape of Y or scalar,
-        > 0 (of real and imaginary part alike, for complex Y); or the covariance matrix of the (stretched) Y.
+        > 0 (of real and imaginary part alike, for complex Y).
     rcond
         Scaled singular values below `rcond` times the largest count as zero.
 
@@ -151,19 +155,18 @@ def least_squares(
     """
     A, y, labels = _real_problem(K, Y, names)
     m, n = A.shape
-    white = _whitened(np.column_stack((A, y)), weights, sigma, m // len(np.asarray(Y)))
-    white_A, white_y = white[:, :n], white[:, n]
-    norms = np.linalg.norm(white_A, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    U, s, Vt = np.linalg.svd(white_A / scale, full_matrices=False)
-    rank = int(np.count_nonzero(s > rcond * s[0])) if s[0] > 0 else 0
+    over = _row_factors(weights, sigma, len(np.asarray(Y)), m)
+    white, white_y = A * over[:, None], y * over
+    unit, scale = unit_columns(white)
+    U, s, Vt = np.linalg.svd(unit, full_matrices=False)
+    rank = int(np.count_nonzero(s > rcond * s[0]))
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
-    x = x + inverse @ (white_y - white_A @ x)
-    left = white_y - white_A @ x
+    x = x + inverse @ (white_y - white @ x)
+    left = white_y - white @ x
     chi_square, stated = float(left @ left), sigma is not None
-    dof = (m if weights is None else int(np.count_nonzero(white.any(axis=1)))) - rank
+    dof = int(np.count_nonzero(over)) - rank
     covariance: FloatArray | None = None
     if stated or dof > 0:
         covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof)
@@ -178,7 +181,6 @@ def least_squares(
         dof=dof,
         rank=rank,
         condition_number=float(s[0] / s[-1]) if rank == n else float("inf"),
-        singular_values=s,
         errors_stated=stated,
         chi_square=chi_square if stated else None,
         row_space=Vt[:rank] * scale,
@@ -202,10 +204,8 @@ def gain(A: ArrayLike, *, rcond: float = 1e-14) -> Any:  # noqa: ANN401
     -------
     (…, n, m), real where A is.
     """
-    K = np.asarray(A)
-    size = np.linalg.norm(K, axis=-2, keepdims=True)
-    scale = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.pinv(K / scale, rcond=rcond) / np.swapaxes(scale, -1, -2))
+    unit, scale = unit_columns(np.asarray(A))
+    return np.asarray(np.linalg.pinv(unit, rcond=rcond) / scale[..., None])
 
 
 def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noqa: ANN401
@@ -234,10 +234,8 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
 
 def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tuple[Any, int]:
     """As `solution`, and the rank of A: below n the equations leave combinations of x open."""
-    K = np.asarray(A)
-    size = np.linalg.norm(K, axis=0)
-    scale = np.where(size > 0, size, 1.0)
-    x, _, rank, _ = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)
+    unit, scale = unit_columns(np.asarray(A))
+    x, _, rank, _ = np.linalg.lstsq(unit, np.asarray(y), rcond=rcond)
     return (x.T / scale).T, int(rank)
 
 
@@ -257,7 +255,7 @@ def _real_problem(
     if A.ndim != 2 or A.shape[:1] != y.shape or 0 in A.shape:
         raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
     n = A.shape[1]
-    labels = tuple(names) if names is not None else tuple(f"θ{i + 1}" for i in range(n))
+    labels = tuple(names or (f"θ{i + 1}" for i in range(n)))
     if len(labels) != n or len(set(labels)) != n:
         raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
     if np.iscomplexobj(A) or np.iscomplexobj(y):
@@ -269,22 +267,47 @@ def _real_problem(
     return A, y, labels
 
 
-def _whitened(rows: FloatArray, weights: ArrayLike | None, sigma: ArrayLike | None, parts: int) -> FloatArray:
-    """Rows (m, n + 1) of equal weight; each entry of Y stands in so many `parts`."""
-    if weights is None and sigma is None:
-        return rows
+def _row_factors(weights: ArrayLike | None, sigma: ArrayLike | None, rows: int, m: int) -> FloatArray:
+    """What makes the m real rows of so many rows of Y weigh alike, (m,)."""
     if weights is not None and sigma is not None:
         raise ValueError("give either weights or errors of Y, not both")
-    each = np.asarray(weights if sigma is None else sigma, dtype=np.float64)
-    m, lowest = len(rows), each.min(initial=np.inf)
-    good = np.isfinite(each).all() and each.any()
-    if not good or (each.ndim < 2 and (lowest < 0 or (sigma is not None and lowest == 0))):
+    stated = sigma is not None
+    each = np.asarray(sigma if stated else 1.0 if weights is None else weights, dtype=np.float64)
+    fits = each.shape in ((), (rows,)) and np.isfinite(each).all() and not (each < 0).any()
+    if not fits or not (each.all() if stated else each.any()):
         raise ValueError(
-            "errors must be finite and greater than zero, weights finite, not negative, not all 0"
+            f"weights and errors need one finite entry per row of Y, {rows}: errors greater than zero, "
+            f"weights not negative and not all 0; got {each.shape}"
         )
-    if each.ndim == 2 and each.shape == (m, m) and sigma is not None:
-        return np.asarray(np.linalg.solve(np.linalg.cholesky(each), rows))
-    if each.ndim > 1 or (each.ndim and len(each) * parts != m):
-        raise ValueError(f"weights and errors need one entry per row of Y, {m // parts}; got {each.shape}")
-    each = np.broadcast_to(np.repeat(each, parts) if each.ndim else each, m)
-    return np.asarray(rows * (np.sqrt(each) if sigma is None else 1.0 / each)[:, None])
+    over = 1.0 / each if stated else np.sqrt(each)
+    return np.repeat(np.broadcast_to(over, rows), m // rows)
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMatrix:
+    """KᵀK (n, n) of the data's rows, [Q] (2.28), to look at: nothing is solved by it.
+
+    Rows are taken over their errors where these are known, in the units of the unknowns. The condition number
+    has four digits; it is infinite where the rows do not determine all unknowns.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    condition_number: float
+
+    def text(self) -> str:
+        """As a table."""
+        columns = (Column(n, row, "{:.6g}".format) for n, row in zip(self.names, self.matrix, strict=True))
+        title = f"normal matrix of the last step, condition number {self.condition_number:.4g}"
+        return f"{title}\n{text((Column('', self.names, str), *columns), width=10_000)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        return plain(vars(self))
+
+
+def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
+    """That of rows K (m, n)."""
+    s = np.linalg.svd(K, compute_uv=False)
+    full = least_squares(K, np.zeros(len(K)), rcond=JACOBIAN_RCOND).full_rank
+    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)

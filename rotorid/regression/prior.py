@@ -1,4 +1,4 @@
-"""What is known of parameters beside the data: a prior, or a ridge; both are more measured rows.
+"""Priors of parameters, and a ridge; both are more measured rows.
 
 A prior θ_j = v ± s is the row θ_j / s = v / s beside rows that are divided by their errors. A ridge λ is a
 prior at the start with s = 1 / (√λ |K_j|), K_j the column of θ_j there: it minimises
@@ -8,7 +8,7 @@ asks for regularisation where its information matrix (2.28) is ill-conditioned, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,15 +18,15 @@ from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.text import percent
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.linear import least_squares, solution_and_rank
-from rotorid.regression.search import RCOND, Function
+from rotorid.regression.linear import JACOBIAN_RCOND, least_squares, solution_and_rank
 
 FAR = 3.0
 """Standard deviations between a prior and the data from which on they contradict each other."""
 SILENT = 1e-6
 """Share of the data below which they say nothing of a parameter."""
-Known = Mapping[str, tuple[float, float]]
+PriorValues = Mapping[str, tuple[float, float]]
 """Value and standard deviation of parameters, by name, in their units."""
+Function = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Prior:
         return len(self.place)
 
     @property
-    def own(self) -> list[str]:
+    def parameters(self) -> list[str]:
         """Names of the p parameters."""
         return [self.names[j] for j in self.place]
 
@@ -68,18 +68,18 @@ class Prior:
 
 def prior_rows(
     names: tuple[str, ...],
-    known: Known,
+    prior: PriorValues,
     ridge: float = 0.0,
     start: FloatArray | None = None,
     slopes: Function | None = None,
 ) -> Prior:
-    """Rows of what is known, or of a ridge λ at the start (n,), by the derivatives of the data there.
+    """Rows of a prior, or of a ridge λ at the start (n,), by the derivatives of the data there.
 
     ValueError for both of them, and a λ that is not above 0.
     """
-    if not (np.isfinite(ridge) and ridge >= 0) or (ridge and known):
+    if not (np.isfinite(ridge) and ridge >= 0) or (ridge and prior):
         raise ValueError("--ridge takes a number above 0, such as 0.01, and a model without [prior]")
-    value, std = np.array([known.get(name, (0.0, np.inf)) for name in names]).T
+    value, std = np.array([prior.get(name, (0.0, np.inf)) for name in names]).T
     if ridge and start is not None and slopes is not None:
         with np.errstate(divide="ignore"):
             value, std = start, 1.0 / (np.sqrt(ridge) * np.linalg.norm(slopes(start), axis=0))
@@ -92,23 +92,21 @@ class PriorEffect:
     """What a prior or a ridge did to an estimate: `share` and `away` (p,), the rest once.
 
     `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
-    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing, and
-    `limit` from where on that is much. `alone` is what the data alone determine, in words, if that is not
-    everything, `lost` what only the rows determine, `rank` and `best` rank and residuals (m,) of the data,
-    with what stands at a bound held there. Condition numbers and rms are those without and with the prior;
-    a nonlinear model is linearised.
+    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
+    is what the data alone determine, in words, if that is not everything, `lost` what only the rows
+    determine, `rank` and `best` rank and residuals (m,) of the data, with what stands at a bound held there.
+    Condition numbers and rms are those without and with the prior; a nonlinear model is linearised.
     """
 
     rows: Prior
     share: FloatArray
     away: FloatArray
-    limit: FloatArray
     alone: str
     lost: tuple[str, ...]
     rank: int
     best: FloatArray
-    condition_numbers: tuple[float, float]
-    residual_rms: tuple[float, float]
+    condition_number: dict[str, float]
+    residual_rms: dict[str, float]
 
     @property
     def why(self) -> dict[str, str]:
@@ -117,25 +115,22 @@ class PriorEffect:
             return dict.fromkeys(self.lost, "by the ridge only")
         return dict.fromkeys(self.lost, "through the prior") | {
             name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
-            for name, share in zip(self.rows.own, self.share, strict=True)
+            for name, share in zip(self.rows.parameters, self.share, strict=True)
             if not np.isnan(share)
         }
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """The prior that all the rest contradicts most; that a ridge has no intervals."""
-        if self.rows.ridge:
-            return (
-                f"--ridge {self.rows.ridge:g} biases the estimate by nobody knows how much: no intervals",
-            )
-        far = np.nan_to_num(np.abs(self.away))
-        i = int(np.argmax(far / self.limit))
-        if far[i] <= self.limit[i]:
+        rows, far = self.rows, np.nan_to_num(np.abs(self.away))
+        if rows.ridge:
+            return (f"--ridge {rows.ridge:g} biases the estimate by nobody knows how much: no intervals",)
+        if far.max() <= FAR:
             return ()
-        rest = "the data" if len(far) == 1 else "the data and the other priors"
+        i, rest = int(np.argmax(far)), "the data" if len(far) == 1 else "the data and the other priors"
         return (
-            f"{rest} contradict the prior {self.rows.own[i]} = {self.rows.value[i]:.6g} ± "
-            f"{self.rows.std[i]:.2g} by {far[i]:.2g} standard deviations: one of these or the model is wrong",
+            f"{rest} contradict the prior {rows.parameters[i]} = {rows.value[i]:.6g} ± "
+            f"{rows.std[i]:.2g} by {far[i]:.2g} standard deviations: one of these or the model is wrong",
         )
 
     def judgement(self, words: str) -> str:
@@ -144,65 +139,60 @@ class PriorEffect:
         with_it = f"With the {which} {words[0].lower()}{words[1:]}"
         return f"{with_it}\nWithout it {self.alone}." if self.alone else words
 
-    def apart(self, estimate: Estimate, *, stated: bool) -> Estimate:
+    def apart(self, estimate: Estimate) -> Estimate:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         if self.rows.ridge:
             estimate = replace(estimate, covariance=None, solution_covariance=None)
-        chi_square = float(self.best @ self.best) if stated else None
-        return replace(estimate, errors_stated=stated, chi_square=chi_square, dof=len(self.best) - self.rank)
+        chi_square = None if estimate.chi_square is None else float(self.best @ self.best)
+        return replace(estimate, chi_square=chi_square, dof=len(self.best) - self.rank)
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
-        numbers = np.transpose([self.rows.value, self.rows.std, self.share, self.away])
+        each = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
         keys = ("value", "std", "data_share", "deviation")
         part = {
             "lambda": self.rows.ridge or None,
             "parameters": {
                 name: dict(zip(keys, row, strict=True))
-                for name, row in zip(self.rows.own, numbers, strict=True)
+                for name, row in zip(self.rows.parameters, each, strict=True)
             },
             "data_alone": self.alone or None,
-            "condition_number": dict(zip(("without", "with"), self.condition_numbers, strict=True)),
-            "residual_rms": dict(zip(("without", "with"), self.residual_rms, strict=True)),
+            "condition_number": self.condition_number,
+            "residual_rms": self.residual_rms,
         }
         return plain({"ridge" if self.rows.ridge else "prior": part})
 
 
 def effect(
-    rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray, *, stated: bool, at_bounds: Collection[str]
+    rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray, at_bounds: Collection[str]
 ) -> PriorEffect | None:
     """What the rows of a prior did to the estimate (n,); None without any.
 
-    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors, which are `stated`
-    or estimated.
+    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors.
     """
     if not len(rows):
         return None
-    from scipy.special import ndtr, stdtrit
-
     moves = np.array([name not in at_bounds for name in rows.names])
     free = K * moves
     nothing = np.zeros(len(K) + len(rows))
-    alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=RCOND)
-    both = least_squares(rows.below(K), nothing, names=rows.names, rcond=RCOND)
-    std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=RCOND).std
+    alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=JACOBIAN_RCOND)
+    both = least_squares(rows.below(K), nothing, names=rows.names, rcond=JACOBIAN_RCOND)
+    std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=JACOBIAN_RCOND).std
     assert std is not None
     share = np.nan_to_num(1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         away = rows.residual(theta) / np.sqrt(share)
-    step, rank = solution_and_rank(free, -r, rcond=RCOND)
-    best, dof = r + free @ step, 1e9 if stated else max(len(r) - rank, 1)
-    # of the difference only the part of the data, 1 - share, has an estimated error (Cochran)
-    limit = np.sqrt(share * FAR**2 + (1.0 - share) * stdtrit(dof, ndtr(FAR)) ** 2)
+    step, rank = solution_and_rank(free, -r, rcond=JACOBIAN_RCOND)
+    best = r + free @ step
+    rms = [float(np.sqrt(np.mean(each**2))) for each in (best, r)]
     return PriorEffect(
         rows=rows,
         share=np.where(moves[rows.place], share, np.nan),
         away=np.where(share > SILENT, away, np.nan),
-        limit=limit,
         alone="" if alone.full_rank else alone.describe_rank(),
         lost=tuple(name for name in alone.undetermined if name not in both.undetermined),
         rank=rank,
         best=best,
-        condition_numbers=(alone.condition_number, both.condition_number),
-        residual_rms=(float(np.sqrt(np.mean(best**2))), float(np.sqrt(np.mean(r**2)))),
+        condition_number={"without": alone.condition_number, "with": both.condition_number},
+        residual_rms=dict(zip(("without", "with"), rms, strict=True)),
     )

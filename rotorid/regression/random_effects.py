@@ -72,13 +72,12 @@ def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomE
     y (J, n) has one row a job, `error` (J, n / 2, 2, 2) the covariances by its own errors, pairs of numbers
     together, `group` (J,) the number of its group, from 0 without gaps.
     """
-    jobs, n = np.bincount(group), y.shape[1]
-    groups, errors = np.zeros((len(jobs), n)), np.zeros((len(jobs), *error.shape[1:]))
-    np.add.at(groups, group, y / jobs[group, None])
-    np.add.at(errors, group, error / jobs[group, None, None, None] ** 2)
-    within, several = np.zeros((n, n)), jobs[group] > 1
-    if several.any():
-        dof = int(several.sum() - (jobs > 1).sum())
+    member = group == np.arange(group.max() + 1)[:, None]
+    jobs = member.sum(axis=1)
+    share = member / jobs[:, None]
+    groups, errors = share @ y, np.tensordot(share**2, error, 1)
+    within, dof, several = np.zeros((y.shape[1],) * 2), len(y) - len(jobs), jobs[group] > 1
+    if dof:
         left = np.tensordot(1 - 1 / jobs[group], error, 1) / dof
         within = _without(shrunk((y - groups[group])[several], dof), _in_blocks(left))
     mean = groups.mean(axis=0)
@@ -113,35 +112,42 @@ def _without(scatter: FloatArray, error: FloatArray) -> FloatArray:
 def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArray, float]:
     """Squared distance of each job from the groups that belong together, (J,), and the limit of these.
 
-    The half of the groups that lies closest together is found by concentration steps, and grown by the jobs
+    The half of the groups that lies closest together comes from concentration steps, and grows by the jobs
     that fit it; each group of these is then left out and compared with the rest (of many, in `_FOLDS` parts),
     so that none hides itself. A group counts once, however many jobs it has. The scale is the median of these
     distances: that of an estimated, shrunk covariance has no closed form. Infinite without `LEAST_GROUPS`
     groups. Parameters as `random_effects`.
     """
+    from scipy.special import fdtri
+
     n, M = y.shape[1], len(np.bincount(group))
     if M < LEAST_GROUPS:
         return np.zeros(len(y)), np.inf
+
+    def limit_of(jobs: BoolArray, dof: int) -> float:
+        """What `LEVEL` of groups stay within, by the median of those of some jobs."""
+        middle = np.median(_medians(distance[jobs], group[jobs]))
+        return float(middle * fdtri(n, dof, LEVEL) / fdtri(n, dof, 0.5))
+
     each = _medians(y, group)
     centre = np.median(each, axis=0)
     spread = np.median(np.abs(each - centre), axis=0)
     distance = np.mean(((y - centre) / np.where(spread > 0, spread, 1.0)) ** 2, axis=1)
     inside = np.zeros(len(y), dtype=bool)
     for _ in range(_STEPS):
-        nearest = np.full(M, np.inf)
-        np.minimum.at(nearest, group, distance)
+        nearest = [distance[group == m].min() for m in range(M)]
         half = distance <= np.sort(nearest)[M // 2]
         if (half == inside).all():
             break
         inside, distance = half, _distances(y, error, group, half, 1)
-    limit = _limit(_medians(distance, group), n, M // 2)
+    limit = limit_of(distance < np.inf, M // 2)
     for _ in range(_STEPS):
         fits = distance <= limit
         kept = len(np.unique(group[fits]))
         if kept < LEAST_GROUPS or (fits == inside).all():
             break
         inside, distance = fits, _distances(y, error, group, fits, _FOLDS)
-        limit = _limit(_medians(distance[fits], group[fits]), n, kept - 1)
+        limit = limit_of(fits, kept - 1)
     return distance, limit
 
 
@@ -150,21 +156,13 @@ def _medians(values: FloatArray, group: IntArray) -> FloatArray:
     return np.array([np.median(values[group == m], axis=0) for m in np.unique(group)])
 
 
-def _limit(distance: FloatArray, n: int, dof: int) -> float:
-    """What `LEVEL` of groups stay within, by the median of some."""
-    from scipy.special import fdtri
-
-    return float(np.median(distance) * fdtri(n, dof, LEVEL) / fdtri(n, dof, 0.5))
-
-
 def _distances(
     y: FloatArray, error: FloatArray, group: IntArray, inside: BoolArray, folds: int
 ) -> FloatArray:
-    """Squared distance of each job from those inside, its group's own fold left out if there are several."""
-    distances = np.empty(len(y))
-    fold = group % folds
+    """Squared distance of each job from those inside, its group's fold left out if there are several."""
+    distances, fold = np.empty(len(y)), group % folds
     for k in np.unique(fold).tolist():
-        rest = inside & (fold != k) if folds > 1 else inside
+        rest = inside & ((fold != k) | (folds == 1))
         number = np.unique(group[rest], return_inverse=True)[1]
         effects = random_effects(y[rest], error[rest], number)
         for j in np.flatnonzero(fold == k).tolist():

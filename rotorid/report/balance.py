@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.plot_style import new_figure
-from rotorid.base.rpm import RPM
 from rotorid.base.tables import Column, Table, html
-from rotorid.base.text import figures, sentence
+from rotorid.base.text import RPM, figures, sentence
 from rotorid.files import units
 from rotorid.report import conventions_explained
 from rotorid.report.page import block, inline_svg, render_report
@@ -80,7 +79,7 @@ def balance_report(
     key = job.key_phasor if places or job.key_phasor else None
     first = Path(job.files[0]).resolve()
     names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
-    plain = left is None and mounted is None
+    plain, head = left is None and mounted is None, job.settings.sheet
     return render_report(
         "balance.html",
         document,
@@ -88,7 +87,7 @@ def balance_report(
         warnings=list(map(sentence, answer.warnings)),
         provenance=provenance,
         judgement=answer.judgement.splitlines(),
-        head={key: job.sheet.get(key) or getattr(job, key, "") or "" for key in _HEAD},
+        head={key: getattr(head, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD},
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
         source=_SOURCES.get(result.influence.reading.source, ""),
@@ -110,7 +109,9 @@ def balance_report(
         holes="" if plain else _holes(document, labels, "mounting" if left is None else "left_to_do"),
         stays=_if_run_stays(result) if plain else "",
         readings=_readings(document, result, check),
-        verdict="" if verdict is None else block("\n\n".join([verdict.answer.found, *verdict.answer.tables])),
+        verdict=""
+        if verdict is None
+        else block("\n\n".join([verdict.answer.numbers, *verdict.answer.tables])),
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),
@@ -279,7 +280,7 @@ def _discs(result: Correction, job: Job, mounted: Mounted | None, left: LeftToDo
     """A picture of each plane with what goes into it; none where nothing does after a check run."""
     from balancing.plots import draw_plane
 
-    zero = 1j if job.sheet.get("zero") == "top" else 1.0
+    zero = 1j if job.settings.sheet.zero == "top" else 1.0
     if left is not None:
         if left.word != "trim":
             return {}

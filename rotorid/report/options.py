@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rotorid.base.registry import Method, find
+from rotorid.base.choices import Method, find
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

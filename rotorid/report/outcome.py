@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rotorid.base.answer import COLUMNS, LINES, Answer, Answered
+from rotorid.base.json import SCHEMA_VERSION, now
 from rotorid.base.tables import Column, Table, csv, frame, terminal
 from rotorid.base.text import capital, listing
-from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.report.options import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -135,9 +135,9 @@ class Outcome(Answered):
 
     def written(self, path: Path) -> Written:
         """What `--output` writes to a file of this name."""
-        build = self.files.get(path.suffix.lower())
-        if build is not None:
-            return build(path)
+        for ending, build in self.files.items():
+            if path.name.lower().endswith(ending):
+                return build(path)
         if path.suffix.lower() != ".xlsx":
             return csv(self.table())
         from rotorid.base.tables import excel
@@ -192,7 +192,7 @@ def outcome_of(
     draw = getattr(result, "figure", None)
     given: dict[str, Any] = {
         "sentences": tuple(told.judgement.splitlines()),
-        "tables": tuple(filter(None, [told.found])),
+        "tables": tuple(filter(None, [told.numbers])),
         "more": told.tables,
         "beyond": told.more,
         "warnings": told.warnings,
@@ -237,7 +237,7 @@ def command(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
-        from rotorid.files.input_file import each_file_once
+        from rotorid.files.disk import each_file_once
 
         given = signature.bind(*args, **kwargs)
         options = given.arguments.get("options")
@@ -269,7 +269,7 @@ def provenance(
         For a file that cannot be read.
     """
     from rotorid import __version__
-    from rotorid.files.input_file import sha256
+    from rotorid.files.disk import sha256
 
     return {
         "program": "rotorid",

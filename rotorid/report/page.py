@@ -9,9 +9,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.tables import LONG, Table, html
 from rotorid.base.text import figures
-from rotorid.base.versions import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable

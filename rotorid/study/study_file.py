@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from balancing import ReadingErrors
+from balancing import ReadingErrors, RunScatter
 from fem import Sensor
 from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.files import units
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.problems import Problems
 from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings import (
     NotNegative,
@@ -28,8 +28,8 @@ from rotorid.files.settings import (
     listed,
     of,
     read_settings,
+    read_toml,
 )
-from rotorid.files.toml_file import read_toml
 from rotorid.files.units import Quantity
 
 if TYPE_CHECKING:
@@ -119,11 +119,13 @@ class StudyKeys(Settings):
 
 
 @dataclass(frozen=True, eq=False)
-class MachineStudy:
+class Study:
     """What is drawn of a machine, in SI; readings are in shares of their limits.
 
     Attributes
     ----------
+    samples, seed, files
+        How many, of what, and what was read.
     rotor, speeds
         As built, and rad/s, (S,).
     planes, sensors
@@ -136,10 +138,13 @@ class MachineStudy:
         Standard deviation of x and y by node, kg·m.
     scatter
         Numbers of the rotor by path, and standard deviations of their logarithms.
-    errors, run_error, corrections
-        Of readings, None where they have none; from run to run, relative; at most so many.
+    errors, run_errors, corrections
+        Of readings and from run to run, None where there are none; at most so many.
     """
 
+    samples: int
+    seed: int
+    files: tuple[Path, ...]
     rotor: Rotor
     speeds: FloatArray
     planes: Mapping[str, int]
@@ -149,21 +154,11 @@ class MachineStudy:
     unbalance: Mapping[int, float]
     scatter: Mapping[str, tuple[float, float]]
     errors: ReadingErrors | None
-    run_error: float
+    run_errors: RunScatter | None
     corrections: int
 
 
-@dataclass(frozen=True, eq=False)
-class StudyFile:
-    """A study as it is read."""
-
-    samples: int
-    seed: int
-    files: tuple[Path, ...]
-    machine: MachineStudy
-
-
-def read_study(path: str | Path) -> StudyFile:
+def read_study(path: str | Path) -> Study:
     """Read a study file with its rotor.
 
     Raises
@@ -174,55 +169,48 @@ def read_study(path: str | Path) -> StudyFile:
     path, problems = Path(path), Problems()
     data = problems.need(read_toml(path, problems))
     values = problems.need(read_settings(StudyKeys, data, str(path), problems))
-    file = path.parent / getattr(values, "rotor", "")
-    try:
-        rotor = read_rotor(file) if values.has("rotor") else None
-    except InputError as error:
-        problems.extend(error.problems)
-    problems.stop()
-    machine = _machine(values, problems.need(rotor), problems)
-    problems.stop()
-    return StudyFile(values.samples, values.seed, (path, *rotor_files(file)), machine)
-
-
-def _machine(values: StudyKeys, rotor: Rotor, problems: Problems) -> MachineStudy:
-    """What is drawn; nodes and numbers that the rotor does not have are noted."""
-    speeds = np.array(values.speeds)
+    file = path.parent / values.rotor
+    rotor = read_rotor(file)
 
     def node(section: Settings, field: str, place: int | str) -> int:
         try:
             return rotor.node(place)
         except ValueError as error:
-            problems.extend([section.problem(field, f"a node or station of the rotor: {error}")])
+            section.complain(problems, field, f"a node or station of the rotor: {error}")
             return 0
 
-    limits = [sensor.limit for sensor in values.sensors.values()]
-    velocity = [limit.unit.kind == "velocity" for limit in limits]
     unbalance: dict[int, float] = {}
     for place, drawn in values.unbalance.items():
         rayleigh = np.sqrt(2 * np.log(2) if drawn.written("size").startswith("median") else 2)
         at = node(values, "unbalance", place)
         unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), drawn.size.si / rayleigh))
-    readings = values.readings
-    sizes = (
-        readings.amplitude_percent / 100,
-        float(np.radians(readings.phase_deg)),
-        readings.floor_percent / 100,
-    )
-    return MachineStudy(
-        rotor=rotor,
-        speeds=speeds,
-        planes={name: node(plane, "node", plane.node) for name, plane in values.planes.items()},
-        sensors={
-            name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
-            for name, sensor in values.sensors.items()
-        },
+    planes = {name: node(plane, "node", plane.node) for name, plane in values.planes.items()}
+    sensors = {
+        name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
+        for name, sensor in values.sensors.items()
+    }
+    scatter = _scatter(values, rotor, problems)
+    problems.stop()
+    speeds, errors = np.array(values.speeds), values.readings
+    per_metre = [
+        (1j * speeds if sensor.limit.unit.kind == "velocity" else 1.0 + 0 * speeds) / sensor.limit.si
+        for sensor in values.sensors.values()
+    ]
+    sizes = errors.amplitude_percent / 100, float(np.radians(errors.phase_deg)), errors.floor_percent / 100
+    return Study(
+        values.samples,
+        values.seed,
+        (path, *rotor_files(file)),
+        rotor,
+        speeds,
+        planes,
+        sensors,
         trials=np.array([plane.trial for plane in values.planes.values()]),
-        gains=np.where(velocity, 1j * speeds[:, None], 1.0) / np.array([limit.si for limit in limits]),
+        gains=np.stack(per_metre, axis=-1),
         unbalance=unbalance,
-        scatter=_scatter(values, rotor, problems),
+        scatter=scatter,
         errors=ReadingErrors(*sizes) if any(sizes) else None,
-        run_error=readings.run_percent / 100,
+        run_errors=RunScatter(errors.run_percent / 100) if errors.run_percent else None,
         corrections=values.corrections,
     )
 
@@ -231,17 +219,18 @@ def _scatter(values: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, t
     """Numbers of the rotor by path, each once, with the standard deviation of its logarithm."""
     scatter: dict[str, tuple[float, float]] = {}
     taken: set[object] = set()
-    for pattern, share in values.scatter.items():
+    for pattern, percent in values.scatter.items():
+        spread = float(np.sqrt(np.log1p((percent / 100) ** 2)))
         try:
             paths = expand(rotor, pattern)
             for path in paths:
                 numbers = numbers_of(rotor, path)
                 if not numbers or numbers & taken:
                     raise ValueError(f"{pattern}: each number of the rotor once")
-                scatter[path] = parameter_value(rotor, path), float(np.sqrt(np.log1p((share / 100) ** 2)))
+                scatter[path] = parameter_value(rotor, path), spread
                 taken |= numbers
             if not any(scatter[path][0] for path in paths):
                 raise ValueError(f"{pattern} is 0, and so is any share of it")
         except ValueError as error:
-            problems.extend([values.problem("scatter", f"numbers of the rotor: {error}")])
+            values.complain(problems, "scatter", f"numbers of the rotor: {error}")
     return scatter

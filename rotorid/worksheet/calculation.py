@@ -36,7 +36,7 @@ _read: dict[str, int] = {}
 
 def main() -> None:
     """Answer requests until standard input ends."""
-    from rotorid.files.input_file import reading
+    from rotorid.files.disk import reading
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reading.set(_noted)
@@ -89,8 +89,7 @@ def _balance(job: str, asked: dict[str, Any]) -> tuple[Balance, list[str]]:
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run."""
-    from rotorid.files.job import Overrides, job_of
-    from rotorid.files.job_excel import open_job
+    from rotorid.files.job import job_of, open_job
     from rotorid.files.problems import Problems
 
     problems = Problems()
@@ -98,7 +97,7 @@ def _without_check(path: Path) -> Job:
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
-    return job_of(written, Overrides(), problems)
+    return job_of(written, problems)
 
 
 def in_words(outcome: Outcome) -> dict[str, Any]:
@@ -106,7 +105,7 @@ def in_words(outcome: Outcome) -> dict[str, Any]:
     answer = outcome.answer
     return {
         "judgement": answer.judgement,
-        "lines": answer.found,
+        "lines": answer.numbers,
         "warnings": list(answer.warnings),
         "notes": list(answer.notes),
         "document": outcome.document,

@@ -133,12 +133,11 @@ def runs_so_far(job: Path) -> RunsSoFar:
     """
     from balancing import reading_of
     from rotorid.files.columns import make_table, read_grid
-    from rotorid.files.job import conventions_of, tables_of
-    from rotorid.files.job_excel import open_job
-    from rotorid.files.layout import read_runs_grid
+    from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
+    from rotorid.files.job import conventions_of, open_job, tables_of
+    from rotorid.files.layout import joined, read_runs_grids
     from rotorid.files.problems import Problems
     from rotorid.files.runs import COLUMNS, make_trials
-    from rotorid.files.slow_roll import make_slow_roll, subtract_slow_roll
 
     problems = Problems()
     written = open_job(job, problems)
@@ -146,7 +145,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     conventions = conventions_of(settings)
     sources, _ = tables_of(written, settings)
     grid = None if "runs" not in sources else read_grid(sources["runs"], "runs", problems)
-    grid = None if grid is None else read_runs_grid(_finished(grid), conventions, problems)
+    grid = None if grid is None else joined(read_runs_grids(_finished(grid), conventions, problems), problems)
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
         problems.stop()
@@ -163,7 +162,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
         if isinstance(slow, Mapping):
             its = {sensor: vector for sensor, vector in slow.items() if sensor in trials.sensors}
         roll = None if its is None else make_slow_roll(its, trials, conventions, Problems())
-        return trials if roll is None else subtract_slow_roll(trials, roll)
+        return trials if roll is None else subtract_slow_roll(trials, roll[0])
 
     whole, channels = read(range(len(table))), []
     for rows in _rows_by_channel(table, conventions.speed_tolerance_percent):

@@ -1,21 +1,20 @@
-"""A table of a job in memory: rows with ids that stay, changed one at a time, written as a whole file."""
+"""A table of a job as its file holds it, line by line, so that an edit changes its row alone."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from difflib import SequenceMatcher
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from rotorid.base.tables import guarded
 from rotorid.files import runs, weights
-from rotorid.files.cells import SEP_LINE, Grid, clean, decode_as, parse_text, show
+from rotorid.files.cells import SEP_LINE, Grid, clean, decimal_comma, decode, parse_text, show
 from rotorid.files.columns import REMARKS, column_of
-from rotorid.files.decimal_numbers import decimal_comma
 from rotorid.files.headings import find_header
 from rotorid.files.job_excel import TEXT_COLUMNS
 from rotorid.files.job_models import READINGS
@@ -24,50 +23,54 @@ from rotorid.files.problems import InputError, Problems
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
-class Line(NamedTuple):
-    """One line of a file; `cells` is None in a comment, a blank line and the header."""
+@dataclass(eq=False)
+class Line:
+    """One line of a file; `cells` is empty in a comment, a blank line and the header.
+
+    `number` is that of a spreadsheet; `id` what edits call the row.
+    """
 
     text: str
-    cells: tuple[str, ...] | None
+    number: int = 0
+    cells: list[str] = field(default_factory=list)
     id: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Table:
-    """A table as the page shows it; edits make another one.
+    """A table as the page shows it.
 
     Attributes
     ----------
     path
         Where it is, or what messages call its sheet.
     header, lines
-        Names of the columns; all lines of the file. Row 1 is the line at the place `first`.
-    separator, sign, newline, mark
-        How it is written: between cells, in decimals ("" where there are none), between lines, at the start.
+        Names of the columns; the lines of the file, of a sheet its rows alone.
     read_only
         Why it cannot be edited, else empty.
-    original
-        The file, as long as nothing is edited.
+    separator, sign, newline, encoding
+        What stands between cells, in decimals ("" where there are none) and between lines; of the file.
+    changed
+        Whether it was edited.
     """
 
     path: Path
-    header: tuple[str, ...] = ()
-    lines: tuple[Line, ...] = ()
-    first: int = 0
+    header: Sequence[str] = ()
+    lines: list[Line] = field(default_factory=list)
+    read_only: str = ""
     separator: str = ","
     sign: str = ""
     newline: str = "\n"
-    mark: str = ""
-    read_only: str = ""
-    original: bytes = b""
+    encoding: str = "utf-8"
+    changed: bool = False
 
-    def rows(self) -> Iterator[tuple[int, Line]]:
-        """The rows, each with its number in a spreadsheet."""
-        return ((i + 1 - self.first, line) for i, line in enumerate(self.lines) if line.cells is not None)
+    def rows(self) -> Iterator[Line]:
+        """Its rows."""
+        return (line for line in self.lines if line.cells)
 
     def row(self, row_id: object) -> Line | None:
         """The row with this id, None if it is gone."""
-        return next((line for _, line in self.rows() if line.id == row_id), None)
+        return next((line for line in self.rows() if line.id == row_id), None)
 
     def column(self, name: str) -> int:
         """The place of a column; ValueError if there is none."""
@@ -75,56 +78,53 @@ class Table:
             raise ValueError(f"{self.path.name} has no column {name!r}")
         return self.header.index(name)
 
-    def with_cells(self, line: Line, cells: Mapping[str, str]) -> Table:
-        """With some cells of a row changed."""
-        new = list(line.cells or ())
+    def write(self, line: Line, cells: Mapping[str, str]) -> None:
+        """Change some cells of a row."""
         for name, text in cells.items():
-            new[self.column(name)] = self._written(name, clean(text))
+            line.cells[self.column(name)] = self._written(name, clean(text))
         stream = io.StringIO()
-        csv.writer(stream, delimiter=self.separator, lineterminator="").writerow(map(_plain, new))
-        made = Line(stream.getvalue(), tuple(map(clean, new)), line.id)
-        return self._with(made if one is line else one for one in self.lines)
+        csv.writer(stream, delimiter=self.separator, lineterminator="").writerow(map(_plain, line.cells))
+        line.text, self.changed = stream.getvalue(), True
 
-    def with_row(self, after: object, cells: Mapping[str, str], row_id: str) -> Table:
-        """With a new row below the one with the id `after`, or below the last."""
-        below = self.row(after)
-        at = 1 + (self.lines.index(below) if below else self._last())
-        made = Line("", ("",) * len(self.header), row_id)
-        return self._with((*self.lines[:at], made, *self.lines[at:])).with_cells(made, cells)
+    def add(self, cells: Mapping[str, str]) -> str:
+        """A new row below the last of the same run, else below all rows; its id."""
+        rows = list(self.rows())
+        same = [
+            line
+            for line in rows
+            if "run" in self.header and line.cells[self.column("run")] == cells.get("run")
+        ]
+        made = Line("", cells=[""] * len(self.header))
+        above = [*(line for line in self.lines if line.id == "header"), *rows, *same][-1]
+        self.lines.insert(self.lines.index(above) + 1, made)
+        self.write(made, cells)
+        self.name_rows()
+        return made.id
 
-    def without(self, line: Line) -> Table:
-        """Without a row."""
-        return self._with(one for one in self.lines if one is not line)
+    def remove(self, line: Line) -> None:
+        """Remove a row."""
+        self.lines.remove(line)
+        self.changed = True
 
-    def with_ids(self, old: Table | None, new_ids: Iterator[str]) -> Table:
-        """Read anew after another program: rows that are as they were, or were replaced, keep their ids."""
-        ids, before = [""] * len(self.lines), () if old is None else old.lines
-        match = SequenceMatcher(None, [one.text for one in before], [one.text for one in self.lines], False)
-        for kind, a, b, c, d in match.get_opcodes():
-            if kind == "equal" or b - a == d - c:
-                ids[c:d] = [line.id for line in before[a:b]]
-        pairs = zip(self.lines, ids, strict=True)
-        return replace(
-            self, lines=tuple(one._replace(id=one.id or kept or next(new_ids)) for one, kept in pairs)
-        )
+    def name_rows(self) -> None:
+        """Give rows their ids: run, speed and sensor, or run, and how many times these stood above."""
+        names = [
+            k for k, name in enumerate(self.header) if name.partition("_")[0] in ("run", "speed", "sensor")
+        ]
+        times = Counter[str]()
+        for line in self.rows():
+            place = "|".join(line.cells[k] for k in names)
+            times[place] += 1
+            line.id = f"{place}|{times[place]}"
 
     def data(self) -> bytes:
         """The whole file."""
-        return self.original or (self.mark + self.newline.join(line.text for line in self.lines)).encode()
-
-    def _with(self, lines: Iterable[Line]) -> Table:
-        return replace(self, lines=tuple(lines), original=b"")
-
-    def _last(self) -> int:
-        """The place of the last row, or of the header."""
-        rows = [i for i, line in enumerate(self.lines) if line.cells is not None]
-        return rows[-1] if rows else next(i for i, line in enumerate(self.lines) if line.id == "header")
+        return self.newline.join(line.text for line in self.lines).encode(self.encoding)
 
     def _written(self, column: str, text: str) -> str:
         """A number with the decimal sign of the file; 1,350 and 1.350 stay, since they may mean thousands."""
-        if is_text(column) or not _NUMBER.fullmatch(text):
-            return guarded(text)
-        if not decimal_comma([text.replace(".", ",")], "\t"):
+        unclear = not decimal_comma([text.replace(".", ",")], "\t")
+        if is_text(column) or not _NUMBER.fullmatch(text) or unclear:
             return text
         sign = self.sign or ("," if self.separator != "," and "," in text else ".")
         return text.replace(",", ".").replace(".", sign)
@@ -133,46 +133,43 @@ class Table:
 def read_table(path: Path, key: str, data: bytes) -> Table:
     """The table that the job names by `key`; one of another form is read only."""
     problems = Problems()
-    text, encoding = decode_as(path.name, data, problems) or ("", "")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a guessed encoding; the calculation says so
+        text = decode(path.name, data, problems) or ""
     find = find_header if key in READINGS else None
     grid = None if len(problems) else parse_text(path.name, text, problems, may_be_empty=True, find=find)
     if grid is None:
         return Table(path, read_only=str(InputError(problems)))
-    lines = re.split(r"\r\n|\n|\r", text)
-    first = 1 if SEP_LINE.fullmatch(lines[0].strip(" \ufeff")) else 0
-    numbers = [
-        c
-        for cells in _cells(grid).values()
-        for c, name in zip(cells, grid.header, strict=True)
-        if not is_text(name)
-    ]
-    comma = decimal_comma(numbers, grid.separator)
-    return replace(
-        shown(path, key, grid, lines, first),
-        separator=grid.separator,
-        sign="," if comma else "." if grid.separator == "," or any("." in c for c in numbers) else "",
-        newline="\r\n" if "\r\n" in text else "\n",
-        mark="" if encoding == "utf-8" else "\ufeff",
-        original=data,
-    )
+    table = shown(path, key, grid)
+    rows = {line.number: line for line in table.lines}
+    texts = re.split(r"\r\n|\n|\r", text)
+    above = 1 if SEP_LINE.fullmatch(texts[0].strip(" \ufeff")) else 0
+    table.lines = [rows.get(k, Line("")) for k in range(1 - above, len(texts) + 1 - above)]
+    for line, its in zip(table.lines, texts, strict=True):
+        line.text = its
+    table.lines[grid.header_row - 1 + above].id = "header"
+    pairs = [pair for line in rows.values() for pair in zip(grid.header, line.cells, strict=True)]
+    numbers = [cell for name, cell in pairs if not is_text(name)]
+    if decimal_comma(numbers, grid.separator):
+        table.sign = ","
+    elif grid.separator == "," or any("." in cell for cell in numbers):
+        table.sign = "."
+    table.separator, table.newline = grid.separator, "\r\n" if "\r\n" in text else "\n"
+    table.encoding = "utf-8" if data == text.encode() else "utf-8-sig"
+    return table
 
 
-def shown(path: Path, key: str, grid: Grid, lines: Sequence[str] | None = None, first: int = 0) -> Table:
-    """What the reader of tables has found; without lines, as in a sheet of a workbook."""
-    cells = _cells(grid)
-    texts = lines or [""] * max([grid.header_row, *cells])
-    rows = [Line(text, cells.get(i + 1 - first)) for i, text in enumerate(texts)]
-    rows[grid.header_row + first - 1] = Line(texts[grid.header_row + first - 1], None, "header")
-    return Table(path, grid.header, tuple(rows), first, read_only=_untidy(path.name, key, grid.header))
+def shown(path: Path, key: str, grid: Grid) -> Table:
+    """What the reader of tables makes of a file or a sheet, without the lines between its rows."""
+    rows = [Line("", n, [getattr(cell, "text", show(cell)) for cell in row]) for n, row in grid.rows]
+    table = Table(path, grid.header, rows, _untidy(path.name, key, grid.header))
+    table.name_rows()
+    return table
 
 
 def is_text(column: str) -> bool:
     """Whether a column holds names or remarks, in which nothing is a number."""
     return column in TEXT_COLUMNS or column.casefold().startswith(REMARKS)
-
-
-def _cells(grid: Grid) -> dict[int, tuple[str, ...]]:
-    return {n: tuple(getattr(cell, "text", show(cell)) for cell in row) for n, row in grid.rows}
 
 
 def _plain(cell: str) -> str:
@@ -181,6 +178,7 @@ def _plain(cell: str) -> str:
 
 
 def _untidy(name: str, key: str, header: Sequence[str]) -> str:
+    """Why a table of other columns is not edited; empty for the form that the page writes."""
     columns = runs.COLUMNS if key in READINGS else weights.COLUMNS
     stems = [column.stem for one in header if (column := column_of(one, columns)) is not None]
     needed = {column.stem for column in columns if column.required}

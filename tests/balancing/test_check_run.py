@@ -6,14 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, stored, synthetic
-from fem_rotors import rotor23
 from repetitions import highest_share, lowest_share
 
-import fem
 from balancing import (
-    Labels,
     ReadingErrors,
-    UndeterminedError,
     compare_check,
     correct,
     estimate_influence,
@@ -66,23 +62,6 @@ def test_linear_jobs_are_called_explained_and_chi_square_has_its_degrees_of_free
     assert np.mean(np.array(distances) < 2.4477) == pytest.approx(0.95, abs=0.03)
 
 
-def test_unbalance_outside_the_planes_is_detected():
-    """The 23-element rotor: planes at nodes 4 and 20, and a part at node 12 that moved before the check."""
-    model = fem.influence(rotor23(2e4), [4, 20, 12], [3, 8, 16, 22], [150.0, 280.0, 420.0])
-    W, outside = model.W[..., :2], model.W[..., 2]
-    rng = np.random.default_rng(76)
-    comparisons = []
-    for _ in range(12):
-        Y0 = model.W @ complex_normal(rng, 3)
-        influence, correction = balanced(rng, W, Y0, np.vstack((np.zeros(2), np.eye(2))))
-        true = Y0 + W @ correction.weights + outside
-        check = check_of(noisy(rng, true, ERRORS), errors=ERRORS)
-        comparisons.append(compare_check(correction, check, influence))
-    assert not any(c.explained for c in comparisons)
-    # in a few noisy jobs weights in the planes could have done the same
-    assert sum("unbalance outside the planes, or a nonlinearity" in c.verdict for c in comparisons) > 9
-
-
 def test_a_wrongly_mounted_weight_is_named():
     """The weight of plane B at the wrong angle: the change that explains it, within its error, is named."""
     rng, fine = np.random.default_rng(78), ReadingErrors(0.004, 0.004)
@@ -122,35 +101,29 @@ def test_the_covariance_is_that_of_a_prediction_and_a_reading():
         assert np.allclose(comparison.covariance[1, s, c], V[2:, 2:])
     assert comparison.chi_square == pytest.approx(total, rel=1e-6)
     assert comparison.n == 4 * S * C
-    # the same within what 400 draws tell
-    ratio = np.trace(comparison.covariance[0], axis1=-2, axis2=-1) / np.trace(
-        correction.after_covariance, axis1=-2, axis2=-1
-    )
-    assert np.median(ratio) == pytest.approx(1, abs=0.1)
 
 
 def test_some_sensors_and_speeds_are_enough():
     rng = np.random.default_rng(81)
     influence, correction = balanced(rng, *rotor(rng))
-    whole = compare_check(
-        correction, check_of(noisy(rng, correction.after, ERRORS), errors=ERRORS), influence
-    )
-    part = job(
-        whole.achieved[:, [2, 0]][..., [3, 1]],
-        np.zeros((1, 0)),
-        speeds=[300.0, 100.0],
+    read = check_of(noisy(rng, correction.after, ERRORS), errors=ERRORS)
+    whole = compare_check(correction, read, influence)
+    part = replace(
+        read,
+        readings=whole.achieved[:, [2, 0]][..., [3, 1]][None],
+        speeds=np.array([300.0, 100.0]),
         sensors=("s3", "s1"),
-        errors=ERRORS,
     )
     comparison = compare_check(correction, part, influence)
     assert np.allclose(comparison.distance[0], whole.distance[0][[2, 0]][:, [3, 1]], rtol=1e-6)
     assert comparison.n == 8
-    with pytest.raises(ValueError, match="no coefficients of sensor 'x'"):
-        compare_check(correction, replace(part, sensors=("s3", "x")), influence)
-    with pytest.raises(ValueError, match="there are no coefficients at 2387"):
-        compare_check(correction, replace(part, speeds=np.array([300.0, 250.0])), influence)
-    with pytest.raises(ValueError, match="no coefficients of plane 'Z'"):
-        compare_check(correction, runs_of(whole.achieved, [[GRAM]], planes=("Z",)), influence)
+    for check, words in (
+        (replace(part, sensors=("s3", "x")), "no coefficients of sensor 'x'"),
+        (replace(part, speeds=np.array([300.0, 250.0])), "there are no coefficients at 2387"),
+        (runs_of(whole.achieved, [[GRAM]], planes=("Z",)), "no coefficients of plane 'Z'"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            compare_check(correction, check, influence)
     empty = runs_of(whole.achieved, [[0.0, 0.0]], planes=("A", "Z"), errors=ERRORS)
     assert not compare_check(correction, empty, influence).weights.any()
 
@@ -158,75 +131,14 @@ def test_some_sensors_and_speeds_are_enough():
 def test_without_known_errors_there_is_no_verdict():
     measured = estimate_influence(bruel_kjaer())
     influence = stored(measured.W, measured.baseline, labels=measured.labels)
-    check = job([[0.5, 1.0]], np.zeros((1, 0)))
-    comparison = compare_check(correct(influence), check, influence)
+    comparison = compare_check(correct(influence), job([[0.5, 1.0]], np.zeros((1, 0))), influence)
     assert comparison.explained is comparison.chi_square is None
-    assert comparison.verdict == (
-        "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-        "sensor 's1' at 954.93 rpm differs most, by 1.00"
-    )
+    assert comparison.verdict.startswith("no verdict: the errors of the readings are not known")
     document = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
     assert document["improvement_predicted"] is None  # an exact solution leaves nothing
     assert document["improvement_achieved"] == pytest.approx(np.hypot(7.2, 13.5) / np.hypot(0.5, 1.0))
-    document = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
     assert document["readings"][0]["predicted_phase_deg"] is None
     assert document["readings"][0]["covariance"] is None
-    assert "std" not in comparison.answer.whole()
-
-
-def test_two_planes_and_two_sensors():
-    """3 % of the vibration before is explained by 2 % and 2°, 30 % is not; no weights are named for it."""
-    errors = ReadingErrors(0.02, np.deg2rad(2))
-    influence = estimate_influence(bruel_kjaer(errors=errors))
-    correction = correct(influence)
-    small, large = (
-        compare_check(
-            correction, job([[share * 7.2, share * 13.5]], np.zeros((1, 0)), errors=errors), influence
-        )
-        for share in (0.03, 0.3)
-    )
-    assert small.explained is True
-    assert small.verdict.startswith("the differences are explained by the errors (probability ")
-    assert large.explained is False
-    assert large.change is None  # two planes explain any two readings: that says nothing
-
-
-def test_json_and_table_in_the_units_of_the_job():
-    """Lag and against the rotation: phases, angles and covariances are mirrored; amplitudes in um_pp."""
-    rng = np.random.default_rng(82)
-    W, Y0, T = rotor(rng)
-    labels = Labels("um_pp", 2e6, "g", 1e3, "lag", "against rotation")
-    influence, correction = balanced(rng, W, Y0, T, labels=labels)
-    check = check_of(noisy(rng, Y0 + W @ correction.weights, ERRORS), errors=ERRORS, labels=labels)
-    comparison = compare_check(correction, check, influence)
-    document = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
-    row, z, V = document["readings"][5], comparison.achieved[0, 1, 1], comparison.covariance[0, 1, 1]
-    assert (row["speed_rpm"], row["sensor"]) == (pytest.approx(200 * 30 / np.pi), "s1")
-    assert row["achieved"] == pytest.approx(abs(z) * 2e6)
-    assert row["achieved_phase_deg"] == pytest.approx(np.degrees(-np.angle(z)) % 360)
-    assert np.allclose(row["covariance"], 4e12 * V * [[1, -1], [-1, 1]])
-    mounted = document["mounted"][0]["weights"][1]
-    assert mounted["angle_deg"] == pytest.approx(np.degrees(-np.angle(correction.weights[1])) % 360)
-    distances = [row["distance"] for row in document["readings"]]
-    assert distances == pytest.approx(comparison.distance.ravel())
-    assert comparison.answer.brief().startswith("As predicted: ")
-    assert document["improvement_achieved"] == pytest.approx(
-        np.linalg.norm(comparison.before) / np.linalg.norm(comparison.achieved)
-    )
-
-
-def test_repeats_of_the_check_run_that_scatter_more_count():
-    """Stated 2 %, but the check run scatters by 30 %: that is used, and told."""
-    rng = np.random.default_rng(84)
-    W, Y0, T = rotor(rng)
-    influence, correction = balanced(rng, W, Y0, T)
-    wild = ReadingErrors(0.3, 0.3)
-    check = check_of(noisy(rng, Y0 + W @ correction.weights, wild, (6, 1)), errors=ERRORS)
-    comparison = compare_check(correction, check, influence)
-    assert any("scatter" in w for w in comparison.warnings)
-    once = compare_check(correction, check_of(correction.after, errors=ERRORS), influence)
-    more = np.trace(comparison.covariance[0] - once.covariance[0], axis1=-2, axis2=-1) / 2
-    assert np.allclose(np.sqrt(more) / np.abs(comparison.achieved[0]), 0.3 / np.sqrt(6), rtol=0.1)
 
 
 # refined coefficients
@@ -252,32 +164,6 @@ def test_a_linear_rotor_keeps_its_coefficients():
     assert refined.remarks.warnings == ()
 
 
-def test_check_runs_are_runs_like_others():
-    rng = np.random.default_rng(4)
-    trials, W, Y0 = synthetic(rng)
-    trials = replace(
-        trials, readings=trials.readings * (1 + 0.02 * complex_normal(rng, trials.readings.shape))
-    )
-    weights = [[0.5 * GRAM, k * 1j * GRAM] for k in (1, 2)]
-    check = mounted(trials, W, Y0, weights, runs=("first", "second"), noise=0.02, rng=rng)
-    refined = refine(trials, check)
-    T = np.concatenate([each.weights for each in (trials, check)])
-    Y = np.concatenate([each.mean for each in (trials, check)])
-    together = estimate_influence(replace(trials, runs=tuple("12345"), weights=T, readings=Y))
-    assert np.array_equal(refined.W, together.W)
-    assert refined.reading.source == "residuals"
-
-
-def test_check_runs_make_coefficients_more_certain():
-    trials, W, Y0 = synthetic(np.random.default_rng(5), errors=ReadingErrors(0.02, 0.02))
-    check = mounted(trials, W, Y0, [[2 * GRAM, 1j * GRAM]])
-    old, new = (
-        np.trace(i.channels()[..., 2:, 2:], axis1=-2, axis2=-1)
-        for i in (estimate_influence(trials), refine(trials, check))
-    )
-    assert (new < old).all()
-
-
 def test_names_and_corrections_that_were_mounted():
     trials, W, Y0 = synthetic(np.random.default_rng(9))
     proposed = correct(estimate_influence(trials))
@@ -292,25 +178,16 @@ def test_names_and_corrections_that_were_mounted():
         refine(trials, silent)
 
 
-def test_trial_runs_that_need_the_check_runs():
-    trials, W, Y0 = synthetic(np.random.default_rng(10))
-    first = replace(trials, runs=trials.runs[:2], readings=trials.readings[:, :2], weights=trials.weights[:2])
-    refined = refine(first, mounted(trials, W, Y0, [[0, GRAM]]))
-    assert np.allclose(refined.W, W, rtol=1e-9)
-    with pytest.raises(UndeterminedError, match="plane 'B'"):
-        refine(first, mounted(trials, W, Y0, [[GRAM, 0]]))
-
-
 def test_check_runs_that_do_not_fit():
     trials, W, Y0 = synthetic(np.random.default_rng(10))
     check = mounted(trials, W, Y0, [[0, GRAM]])
-    some = replace(check, sensors=check.sensors[:2], readings=check.readings[..., :2])
-    with pytest.raises(ValueError, match="of 's0' and 's1', the trial runs of 's0'"):
-        refine(trials, some)
-    with pytest.raises(ValueError, match="give those of the same sensors"):
-        refine(trials, replace(check, sensors=("s0", "s1", "s2", "new")))
-    with pytest.raises(ValueError, match="there are no readings of the check run at 2864"):
-        refine(trials, replace(check, speeds=check.speeds[:2], readings=check.readings[:, :, :2]))
+    for changed, words in (
+        ({"sensors": check.sensors[:2], "readings": check.readings[..., :2]}, "the trial runs of 's0'"),
+        ({"sensors": ("s0", "s1", "s2", "new")}, "give those of the same sensors"),
+        ({"speeds": check.speeds[:2], "readings": check.readings[:, :, :2]}, "of the check run at 2864"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            refine(trials, replace(check, **changed))
     turned = replace(check, sensors=check.sensors[::-1], readings=check.readings[..., ::-1])
     assert np.array_equal(with_check_runs(trials, turned).readings, with_check_runs(trials, check).readings)
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from balancing_data import GRAM, complex_normal, job, noisy
 
-from balancing import Labels, ReadingErrors, convention_test, correct, estimate_influence
-from balancing.convention_test import assumptions
+from balancing import Labels, ReadingErrors, convention_test
 
 ERRORS = ReadingErrors(0.02, 0.02)
 SPREAD = np.array([[0, 0], [1, 0], [0, 1j], [1, 1], [1j, -1]]) * GRAM
@@ -38,28 +37,7 @@ def test_runs_confirm_what_is_right_and_contradict_what_is_not(errors):
     assert words.startswith("these runs contradict 'lead'")
 
 
-def test_chi_square_has_its_degrees_of_freedom():
-    sizes = [convention_test(drawn(SPREAD, seed=seed)).chi_square for seed in range(200)]
-    assert np.mean(sizes) == pytest.approx(12, abs=4 * np.sqrt(24 / 200))
-
-
 def test_runs_that_cannot_tell():
     assert convention_test(drawn(SPREAD[:3])).verdict == "no redundant run"
     line = np.array([[0, 0], [1, 0], [-0.5, 0], [0, 2], [0, 1]]) * GRAM
     assert convention_test(drawn(line)).verdict == "weights in line"
-
-
-def test_a_correction_of_contradicted_runs_mounts_nothing():
-    trials = drawn(SPREAD)
-    wrong = replace(trials, readings=np.conj(trials.readings))
-    c = replace(correct(estimate_influence(trials)), convention_test=convention_test(wrong))
-    assert not c.sound
-    assert c.answer.brief().startswith("Do not mount anything yet: these runs contradict 'lead'")
-
-
-def test_what_is_assumed_is_told_with_what_the_runs_say():
-    labels = Labels(assumed=("phase",))
-    first, answer = assumptions(labels, convention_test(drawn(SPREAD)), ())
-    assert "assumed" in first
-    assert answer.startswith("The runs themselves confirm 'lead'")
-    assert assumptions(Labels(), None, ()) == ()

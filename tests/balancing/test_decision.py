@@ -4,13 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from balancing_data import GRAM, complex_normal, job, rms, stored
+from balancing_data import GRAM, complex_normal, job, stored
 from cases import each_of
 
-from balancing import Limits, ReadingErrors, UndeterminedError, correct, estimate_influence
-from balancing.decision import Case, remedies
-from balancing.planes import error_form
-from rotorid.regression import stretch
+from balancing import Limits, ReadingErrors, correct, estimate_influence
 
 ERRORS = ReadingErrors(0.02, 0.02)
 
@@ -74,22 +71,6 @@ def test_where_weights_fight_what_is_proposed_is_better():
     assert np.max(np.subtract(ours, theirs)) < 0.2
 
 
-def test_weak_trial_weights_are_told_from_good_ones():
-    rng = np.random.default_rng(3)
-    found = {"mount": [], "do not mount": []}
-    for i in range(72):
-        trials, W, Y0 = simulated(rng, trial=(0.01, 0.03, 0.1, 0.3)[i % 4])
-        try:
-            c = correct(estimate_influence(trials), method="least-squares")
-        except UndeterminedError:
-            continue
-        word = "mount" if c.decision.word == "determined in part" else c.decision.word
-        found[word].append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
-    assert min(len(each) for each in found.values()) > 11
-    assert np.mean(np.array(found["mount"]) < 1) == 1
-    assert np.median(found["do not mount"]) > 2 * np.median(found["mount"])
-
-
 def alike(errors=None, speeds=(100.0,), trial=1.0, separate=0.02):
     """Two planes that act alike at the first speed, and not at a second one."""
     rng = np.random.default_rng(5)
@@ -100,21 +81,6 @@ def alike(errors=None, speeds=(100.0,), trial=1.0, separate=0.02):
     Y = Y0 + np.einsum("scp,rp->rsc", W, T)
     noise = 1 + 0.01 * (rng.normal(size=Y.shape) + 1j * rng.normal(size=Y.shape))
     return job(Y * noise, T, errors=errors, speeds=speeds)
-
-
-def test_limits_leave_choices_and_trial_weights_out():
-    trials = alike(trial=0.02, separate=1.0)
-    known = estimate_influence(trials)
-    inputs = Case(known, known, None, None)
-    free = remedies(inputs)
-    assert any("repeat the trial run of plane 'A' with" in w for w in free)
-    limits = Limits(np.array([0.05, 0.05]) * GRAM, np.full((1, 5), np.inf), ((), ()))
-    bound = replace(inputs, limits=limits)
-    assert not bound.fewer
-    assert any(
-        "leave plane 'A' out: a clear trial weight would be larger than its largest" in w
-        for w in remedies(bound)
-    )
 
 
 def test_runs_that_disagree_ask_for_measuring_again():
@@ -132,37 +98,16 @@ def test_runs_that_disagree_ask_for_measuring_again():
     assert c.answer.brief().startswith("Measure again: the runs disagree by")
 
 
-def test_the_form_of_the_errors_against_their_covariances():
-    rng = np.random.default_rng(4)
-    root = rng.normal(size=(5, 6, 6))
-    covariance = root @ np.swapaxes(root, 1, 2)
-    w, z = rng.uniform(0.5, 2, 5), np.concatenate(([1.0], complex_normal(rng, 2)))
-    B = stretch([z])
-    expected = np.sum(w**2 * np.trace(B @ covariance @ B.T, axis1=1, axis2=2))
-    assert np.vdot(z, error_form(covariance, w) @ z) == pytest.approx(expected)
-
-
-@each_of("turn, word", [(1.0, "mount"), (1.01, "do not mount")])
+@each_of("turn, word", [(-1.0, "mount"), (1.01, "do not mount")])
 def test_weights_that_fight_without_known_errors(turn, word):
     W = np.array([[1, 1], [1, turn], [1, 1]], dtype=complex)[None]
-    if word == "mount":
-        W[0, 1, 1] = -1
     c = correct(stored(W, [[1, 1.05, 1]]))
     assert not c.errors_known
-    assert c.decision.word == word
+    assert c.decision.word == c.to_dict()["judgement"]["word"] == word
     if word != "mount":
         assert c.decision.cause.startswith("planes 'A' and 'B' act alike, and their weights fight each other")
         assert c.decision.instead[0].startswith("Instead: plane ")
         assert c.to_dict()["judgement"]["fewer_planes"][0]["rms_after"] < 0.1
-
-
-def test_a_good_correction_says_nothing():
-    trials, *_ = simulated(np.random.default_rng(6))
-    c = correct(estimate_influence(trials))
-    assert c.decision.lines() == ()
-    assert c.to_dict()["judgement"]["word"] == "mount"
-    assert c.to_dict()["judgement"]["cause"] is None
-    assert "Do not mount" not in c.answer.brief()
 
 
 def softening(size, least=0.04):
@@ -184,34 +129,3 @@ def test_a_run_that_reads_less_than_is_promised_stays(least):
     limits = Limits(np.array([30 * GRAM]), np.full((1, 1), np.inf), ((),))
     bound = correct(estimate_influence(softening(3.0, least)), limits=limits)
     assert "leave those of run '5'" not in bound.decision.cause  # it has 40 g
-
-
-def test_weights_that_hardly_help_by_their_bound_are_not_mounted():
-    """Unbalance outside the plane: the weights take away a tenth, and check runs scatter by more."""
-    rng = np.random.default_rng(9)
-    W = complex_normal(rng, (1, 6, 1))
-    Y0 = -W[..., 0] + 3.0 * complex_normal(rng, (1, 6))
-    c = correct(estimate_influence(job(np.stack((Y0, Y0 + 2 * W[..., 0])), np.array([[0], [2 * GRAM]]))))
-    before = rms(c.before)
-    assert c.check_rms > 0.9 * before
-    assert c.decision.word == "do not mount"
-
-
-def test_no_answer_calls_planes_not_determined_and_mounts_their_weights():
-    rng = np.random.default_rng(10)
-    words = []
-    for i in range(60):
-        trials, W, _ = simulated(rng, alike=(0.05, 0.1, 0.3)[i % 3])
-        if W.shape[-1] > 1:
-            c = correct(estimate_influence(trials), refuse=False)
-            assert not any("act alike" in w for w in c.warnings), "the judgement says it"
-            if c.decision.word == "mount":
-                assert "not determined" not in c.sentence()
-                assert not c.combination
-            elif c.decision.word == "determined in part":
-                assert "Mount" not in c.sentence()
-                assert c.decision.instead
-                assert c.sentence().index("With these weights: rms ") < c.sentence().index("Instead: ")
-                assert c.check_rms < 0.9 * rms(c.before)
-            words.append(c.decision.word)
-    assert set(words) == {"mount", "determined in part", "do not mount"}

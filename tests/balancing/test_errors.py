@@ -8,25 +8,13 @@ from balancing_data import complex_normal, job, noisy, synthetic
 
 from balancing.errors import (
     ASSUMED,
-    RunErrors,
-    blocks,
-    job_columns,
     reading_covariance,
     reading_of,
     run_errors,
 )
-from balancing.trials import Placement, ReadingErrors, RunScatter
+from balancing.trials import ReadingErrors, RunScatter
 
 T = np.diag([0.001, 0.001])
-
-
-def repeated(rng, scatter, errors=None):
-    """Five readings of each of four runs, two sensors."""
-    Y = complex_normal(rng, (4, 1, 2))
-    Y = Y * (
-        1 + scatter * rng.standard_normal((5, *Y.shape)) + 1j * scatter * rng.standard_normal((5, *Y.shape))
-    )
-    return job(Y, np.vstack((np.zeros((2, 2)), T)), errors=errors)
 
 
 def many(scatter, errors=None, repeats=30, across=None):
@@ -68,20 +56,6 @@ def test_stated_errors_hold_unless_repeats_contradict_them(factor, enlarged):
         assert reading == (stated, "stated", (), np.inf)
 
 
-def test_an_error_that_was_not_stated_is_taken_from_the_repeats():
-    reading = reading_of(many(0.01, ReadingErrors(amplitude=0.01), 9, across=0.02))
-    assert reading.errors.amplitude == 0.01
-    assert reading.errors.phase == pytest.approx(0.02, rel=0.1)
-    assert reading.source == "stated, enlarged by repeats"
-
-
-def test_equal_repeats_say_nothing_about_the_errors():
-    exact, _, _ = synthetic(np.random.default_rng(1))
-    reading = reading_of(job(np.repeat(exact.readings, 3, axis=0), exact.weights, speeds=exact.speeds))
-    assert reading.errors == ASSUMED
-    assert "equal to the last digit" in reading.warnings[0]
-
-
 def test_errors_that_an_instrument_measured():
     trials = many(0.1, repeats=4)
     each = np.tile(0.03**2 * np.eye(2)[..., None, None, None, None], trials.readings.shape)
@@ -97,29 +71,6 @@ def test_errors_that_an_instrument_measured():
     steps = np.stack((np.full(one.readings.shape, step), step / np.abs(one.readings)))
     rounded = replace(one, steps=steps)
     assert np.allclose(reading_of(rounded).covariance(rounded), (0.03**2 + 0.02**2) * np.eye(2))
-    # repeats that scatter more are added
-    wild = reading_of(replace(trials, covariance=each / 100))
-    assert wild.source == "repeats"
-    assert "times as much as the measured standard deviations" in wild.warnings[0]
-
-
-def test_scales_of_estimated_errors_have_the_spread_of_their_degrees_of_freedom():
-    reading = reading_of(repeated(np.random.default_rng(1), 0.02))
-    squares = reading.scales(np.random.default_rng(2), 20_000) ** -2
-    assert np.mean(squares) == pytest.approx(1.0, abs=0.01)
-    assert np.var(squares) == pytest.approx(2 / reading.dof, rel=0.05)
-
-
-def test_covariance_along_and_across():
-    covariance = reading_covariance([2j], ReadingErrors(0.1, 0.3, 0.01))[0]
-    assert np.allclose(covariance, np.diag([0.36 + 1e-4, 0.04 + 1e-4]))
-
-
-def test_a_weight_that_stays_has_one_error():
-    trials = job(np.ones((4, 2)), [[0, 0], [1, 0], [1, 2], [0, 2]])
-    trials = replace(trials, placement=Placement(0.1, 0.0), drift=0.0)
-    columns = job_columns(trials, np.ones((1, 2, 2)))
-    assert np.allclose(columns[:, :, 0, 0], [[0, 0.1, 0.1, 0], [0, 0, 0.2, 0.2]])
 
 
 def drawn(rng, own, common, further, spare=12):
@@ -150,13 +101,6 @@ def test_spare_runs_tell_the_parts(sizes):
     assert np.allclose(np.mean(found, axis=0)[[0, 1, 3]], sizes, atol=0.15 * max(sizes) + 0.1 * max(sizes))
 
 
-def test_blocks_of_spare_runs_hold_no_coefficient():
-    trials, theta = drawn(np.random.default_rng(4), 0.0, 0.0, 0.0)
-    found = blocks(trials, theta, np.zeros((*trials.mean.shape, 2, 2)))
-    assert sum(block.spare for block in found) == 12
-    assert all(np.abs(block.e).max() < 1e-12 for block in found if block.spare)
-
-
 def test_stated_run_errors_are_fixed_in_all_unless_contradicted():
     trials, theta = drawn(np.random.default_rng(5), 0.02, 0.0, 0.0)
     reading = reading_of(trials)
@@ -177,8 +121,3 @@ def test_assumed_where_nothing_tells():
     run = run_errors(trials, theta, reading.covariance(trials), reading)
     assert run.origin == "assumed"
     assert np.allclose(run.typical, [0.02, 0.02, 0.0, 0.02])
-
-
-def test_draws_of_sizes_follow_their_probabilities():
-    run = RunErrors(np.array([[0.0, 0, 0], [0.1, 0, 0]]), np.array([0.25, 0.75]), "estimated")
-    assert np.mean(run.draw(np.random.default_rng(7), 4000)[:, 0]) == pytest.approx(0.075, abs=0.003)

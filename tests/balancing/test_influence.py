@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from balancing_data import bruel_kjaer, feese_grazier, job, polar, synthetic
 
-from balancing import noise
 from balancing.conditioning import UndeterminedError
 from balancing.conventions import Labels
-from balancing.errors import NO_RUN_ERRORS, Reading
-from balancing.influence import Gaussian, Influence, estimate_influence
+from balancing.influence import estimate_influence
 from balancing.trials import Placement, ReadingErrors, RunScatter
 
 STATED = ReadingErrors(0.01, 0.02)
@@ -55,39 +53,6 @@ def test_draws_have_the_covariance_of_channels():
     assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
 
 
-def test_draws_do_not_depend_on_blocks(monkeypatch):
-    influence = every_error()
-    one = np.concatenate([W for _, W in influence.draws(20)])
-    monkeypatch.setattr(noise, "BLOCK", 3 * influence.baseline.size)
-    blocks = [W for _, W in influence.draws(20)]
-    assert [len(block) for block in blocks] == [3, 3, 3, 3, 3, 3, 2]
-    many = np.concatenate(blocks)
-    assert np.allclose(one, many, rtol=1e-12)
-
-
-def test_columns_are_what_readings_have_in_common():
-    influence = every_error()
-    columns = influence.columns()
-    # a drift is a factor of all readings: with runs in order 0, ½, 1 the coefficients err by their share
-    sizes = np.linalg.norm(columns.reshape(len(columns), -1), axis=1)
-    assert columns.shape[1:] == (3, 4, 3)
-    assert (sizes[-2:] > 0).all()
-    assert np.allclose(columns[-1], 1j * columns[-2])
-
-
-def test_a_part_errs_as_the_whole_does():
-    influence = every_error()
-    part = influence.part([2, 0], [1], [1])
-    assert part.W[0, 0, 0] == influence.W[2, 1, 1]
-    keep = [0, 1, 4, 5]
-    assert np.allclose(part.channels()[1, 0], influence.channels()[0, 1][np.ix_(keep, keep)])
-
-
-def test_rebased_on_its_own_baseline_is_the_same():
-    influence = every_error()
-    assert np.allclose(influence.rebased(influence.baseline).channels(), influence.channels())
-
-
 def test_rebased_on_new_runs():
     influence = every_error()
     trials = influence.trials
@@ -117,17 +82,6 @@ def test_runs_without_weights_that_differ():
         influence.rebased(replace(trials, weights=np.zeros((3, 2))))
 
 
-def test_stored_coefficients_without_errors_have_no_draws():
-    zero = np.zeros((1, 2, 4, 4))
-    errors = Gaussian(zero, np.zeros((0, 1, 2, 2), dtype=complex), Reading(), NO_RUN_ERRORS)
-    stored = Influence(
-        np.array([100.0]), ("a", "b"), ("P",), np.ones((1, 2, 1)), np.full((1, 2), np.nan), errors
-    )
-    assert not stored.known_errors
-    assert not stored.has_baseline
-    assert list(stored.draws()) == []
-
-
 def test_a_trial_weight_without_effect():
     with pytest.raises(UndeterminedError, match="changed no reading"):
         estimate_influence(job(np.ones((2, 3)), [[0], [1e-3]]))
@@ -141,8 +95,3 @@ def test_runs_that_disagree():
     remarks = estimate_influence(job(readings, [[0], [0], [1e-3]])).remarks
     assert "is missing in the weights table" in remarks.contradictions[0]
     assert remarks.contradictions == remarks.warnings
-
-
-def test_no_planes():
-    with pytest.raises(UndeterminedError, match="no planes"):
-        estimate_influence(job(np.ones((1, 2)), np.zeros((1, 0))))

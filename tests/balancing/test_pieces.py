@@ -4,9 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
+from balancing_data import complex_normal
 
 from balancing.holes import equal_holes, from_list, lightest
-from balancing.pieces import HEAVIER, PlaneVectors, solve_discrete
+from balancing.pieces import HEAVIER, solve_discrete
 from balancing.trials import Limits
 
 METHODS = ("least-squares", "minmax")
@@ -33,8 +34,8 @@ def case(seed):
     rng = np.random.default_rng(seed)
     P = int(rng.integers(1, 4))
     N = int(rng.integers(P, 9))
-    W = rng.standard_normal((N, P)) + 1j * rng.standard_normal((N, P))
-    Y = (rng.standard_normal(N) + 1j * rng.standard_normal(N)) * 10 ** rng.uniform(-0.3, 1)
+    W = complex_normal(rng, (N, P))
+    Y = complex_normal(rng, N) * 10 ** rng.uniform(-0.3, 1)
     planes = []
     for _ in range(P):
         H, K = int(rng.integers(2, 6 if P < 3 else 4)), int(rng.integers(1, 3))
@@ -76,7 +77,7 @@ def kept(planes, found):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_equals_exhaustive_enumeration(seed, method):
     W, Y, planes, w = case(seed)
     D = grid([everything(holes)[0] for holes in planes])
@@ -91,7 +92,7 @@ def test_equals_exhaustive_enumeration(seed, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
     W, Y, planes, w = case(3000 + seed)
     wanted = -np.linalg.lstsq(W, Y, rcond=None)[0]
@@ -124,7 +125,7 @@ def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_limits_of_amplitudes_equal_enumeration(seed, method):
     W, Y, planes, w = case(1000 + seed)
     D = grid([everything(holes)[0] for holes in planes])
@@ -144,40 +145,19 @@ def test_limits_of_amplitudes_equal_enumeration(seed, method):
         solve_discrete(W, Y, planes, method=method, row_weights=w, limits=tight)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_plane_of_any_weight_follows_the_others(seed):
     rng = np.random.default_rng(seed)
-    W = rng.standard_normal((6, 2)) + 1j * rng.standard_normal((6, 2))
-    Y = rng.standard_normal(6) + 1j * rng.standard_normal(6)
+    W, Y = complex_normal(rng, (6, 2)), complex_normal(rng, 6)
     holes = from_list(equal_holes(5, 0.2), [0.3])
     left = [Y + W[:, 1] * d for d in everything(holes)[0]]
-    rests = [y + W[:, 0] * np.linalg.lstsq(W[:, :1], -y, rcond=None)[0] for y in left]
-    found = solve_discrete(W, Y, [None, holes])
-    assert found.objective == pytest.approx(min(map(np.linalg.norm, rests)), rel=1e-7)
-    assert found.mountings[0] is None
+    rests = [y - W[:, 0] * np.vdot(W[:, 0], y) / np.vdot(W[:, 0], W[:, 0]) for y in left]
     # holes all around that take any amount are the same as no holes
-    same = solve_discrete(W, Y, [from_list(equal_holes(4)), holes])
-    assert same.objective == pytest.approx(found.objective, rel=1e-9)
-    assert same.mountings[0].vector == pytest.approx(same.weights[0], abs=1e-7)
-    assert np.count_nonzero(same.mountings[0].amounts > 1e-6) <= 2
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_steps_of_free_amounts_equal_enumeration(method):
-    rng = np.random.default_rng(5)
-    W = rng.standard_normal((5, 2)) + 1j * rng.standard_normal((5, 2))
-    Y = rng.standard_normal(5) + 1j * rng.standard_normal(5)
-    planes = [from_list(equal_holes(4, 0.3), step=0.2), from_list([0.1, 1.0], step=0.25, max_weight=1.0)]
-    steps, lists = np.arange(30), []
-    for holes, pairs in zip(planes, ([(0, 1), (1, 2), (2, 3), (3, 0)], [(0, 1)]), strict=True):
-        e = np.exp(1j * holes.angles) * holes.step
-        all_of = np.concatenate([(steps[:, None] * e[p] + steps * e[q]).ravel() for p, q in pairs])
-        lists.append(all_of[holes.allows(all_of)])
-    found = solve_discrete(W, Y, planes, method=method)
-    best = objectives(method, W, Y, np.ones(5), grid(lists)).min()
-    assert found.objective == pytest.approx(best, rel=1e-8)
-    for holes, mounting in zip(planes, found.mountings, strict=True):
-        assert np.allclose(mounting.amounts / holes.step, np.rint(mounting.amounts / holes.step))
+    for first in (None, from_list(equal_holes(4))):
+        found = solve_discrete(W, Y, [first, holes])
+        assert found.objective == pytest.approx(min(map(np.linalg.norm, rests)), rel=1e-7)
+    assert found.mountings[0].vector == pytest.approx(found.weights[0], abs=1e-7)
+    assert np.count_nonzero(found.mountings[0].amounts > 1e-6) <= 2
 
 
 BEST = {"least-squares": 4.6265944, "minmax": 1.2215956}
@@ -187,10 +167,10 @@ BEST = {"least-squares": 4.6265944, "minmax": 1.2215956}
 def three_planes():
     """24 holes, two sizes, 60 readings, coefficients of condition 10."""
     rng = np.random.default_rng(7)
-    U, _ = np.linalg.qr(rng.standard_normal((60, 3)) + 1j * rng.standard_normal((60, 3)))
-    V, _ = np.linalg.qr(rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3)))
+    U, _ = np.linalg.qr(complex_normal(rng, (60, 3)))
+    V, _ = np.linalg.qr(complex_normal(rng, (3, 3)))
     W = U * [10.0, 3.0, 1.0] @ V.conj().T
-    noise = 0.3 * (rng.standard_normal(60) + 1j * rng.standard_normal(60)) / np.sqrt(60)
+    noise = 0.3 * complex_normal(rng, 60) / np.sqrt(60)
     wanted = np.array([23.0, 17.0, 14.0]) * np.exp(1j * np.array([0.3, 2.0, 4.0]))
     return W, noise - W @ wanted, [from_list(equal_holes(24, 0.1 * p), [5.0, 10.0]) for p in range(3)]
 
@@ -207,86 +187,39 @@ def test_three_planes_of_24_holes(method):
             assert mounting.counts.sum() <= 2 or mounting.amounts.sum() <= HEAVIER * least * 1.05
 
 
-def test_the_least_sum_that_makes_a_weight():
-    holes, size = from_list(equal_holes(12), [10.0]), 10.0
-    assert lightest(holes, holes.free, 8.0 + 0j, size).sum() == pytest.approx(8, rel=1e-6)
-    between = 8.0 * np.exp(1j * np.radians(15))
-    assert lightest(holes, holes.free, between, size).sum() == pytest.approx(
-        8 / np.cos(np.radians(15)), rel=1e-6
-    )
-    # three holes at ±30° full, the rest in the next ones
-    full = 10 * (1 + 2 * np.cos(np.radians(30)))
-    assert lightest(holes, holes.free, full + 0j, size).sum() == pytest.approx(30, rel=1e-6)
-    more = lightest(holes, holes.free, full + 5 + 0j, size)
-    assert more @ np.exp(1j * holes.angles) == pytest.approx(full + 5, rel=1e-6)
-    assert more.sum() == pytest.approx(40, rel=1e-6)
-
-
-def test_two_pieces_may_always_weigh_more():
-    """A weight below the lightest piece: two that act against each other, but not three."""
-    W, Y = np.eye(1), np.array([-0.3 + 0j])
-    holes = from_list(equal_holes(24), [1.0])
-    found = solve_discrete(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 0.06)
-    assert (found.pieces, found.enough) == (2, True)
-    finer = solve_discrete(W, Y, [holes], lambda d: abs(d[0] - 0.3) < 1e-3)
-    assert finer.pieces <= 2
-    assert not finer.enough
-
-
-def test_forbidden_arcs_and_largest_weights():
+@pytest.mark.parametrize(("most", "arc"), [(np.inf, ((-0.1, 0.2),)), (0.45, ()), (np.inf, ())])
+def test_forbidden_arcs_and_largest_weights(most, arc):
     holes = from_list(equal_holes(8), [0.5])
-    arcs = Limits(np.array([np.inf]), np.full((1, 1), np.inf), (((-0.1, 0.2),),))
-    found = solve_discrete([[1.0]], [-0.5], [holes], limits=arcs)
-    assert found.mountings[0].counts[0].sum() == 0
-    assert solve_discrete([[1.0]], [-0.5], [holes]).objective == pytest.approx(0, abs=1e-12)
-    small = Limits(np.array([0.45]), np.full((1, 1), np.inf), ((),))
-    vector = solve_discrete([[1.0]], [-0.5], [holes], limits=small).weights[0]
-    every = everything(holes)[0]
-    best = np.abs(every[np.abs(every) <= 0.45] - 0.5).min()
-    assert abs(vector - 0.5) == pytest.approx(best, rel=1e-9)
-    limited = solve_discrete([[1.0]], [-0.5], [None], limits=small)
-    assert limited.weights[0] == pytest.approx(0.45, abs=1e-3)
+    limits = Limits(np.array([most]), np.full((1, 1), np.inf), (arc,))
+    found = solve_discrete([[1.0]], [-0.5], [holes], limits=limits)
+    every = everything(from_list(equal_holes(8), [0.5], taken=[1.0 if arc else 0.0, *[0.0] * 7]))[0]
+    assert found.objective == pytest.approx(np.abs(every[np.abs(every) <= most] - 0.5).min(), abs=1e-9)
+    if not arc:
+        plain = solve_discrete([[1.0]], [-0.5], [None], limits=limits)
+        assert plain.weights[0] == pytest.approx(min(most, 0.5), abs=1e-3)
 
 
-def test_many_holes_at_odd_angles_are_answered_within_seconds():
-    angles = np.sort(np.random.default_rng(5).uniform(0, 2 * np.pi, 40))
-    holes = from_list(angles[:28], [0.01, 0.02, 0.03], stock=[9, 9, 9])
-    plane = PlaneVectors(holes, 0.05j, most=np.inf)
-    near = plane.near(0.05j, 1)
-    assert abs(near.d[0] - 0.05j) < 2e-3 * 0.05
-    scarce = from_list(equal_holes(36), [1.5, 7.5], stock=[8, 2])
-    z = complex([42.63, -9.0, -6.0] @ np.exp(1j * np.radians([20.0, 292.0, 200.0])))
-    far = PlaneVectors(scarce, z, most=np.inf).near(z, 1)
-    assert abs(far.d[0] - z) < 24.3  # all ten pieces, side by side
+LIMITS = [
+    Limits(np.array([np.inf]), np.full((1, 2), np.inf), ((arc,),)) for arc in ((0.0, 2 * np.pi), (-0.1, 6.2))
+]
+FOUR = from_list(equal_holes(4), [1.0])
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_no_pieces_where_nothing_vibrates(method):
-    planes = [from_list(equal_holes(12, 0.1), [0.01, 0.02])]
-    found = solve_discrete(np.ones((3, 1)), np.zeros(3), planes, method=method)
-    assert found.objective == 0
-    assert not found.mountings[0].counts.any()
-
-
-def test_planes_that_act_alike_are_answered():
-    W, Y = np.array([[1.0, 1.0], [2.0, 2.0]]), np.array([-1.0, -2.0])
-    found = solve_discrete(W, Y, [from_list(equal_holes(6), [0.5, 1.0])] * 2, lambda _: False)
-    assert found.objective == pytest.approx(0, abs=1e-9)
-
-
-def test_bad_input():
-    holes = from_list(equal_holes(4), [1.0])
-    W, Y = np.ones((2, 1)), np.ones(2)
-    with pytest.raises(ValueError, match="for each of the 1 planes"):
-        solve_discrete(W, Y, [holes, holes])
-    with pytest.raises(ValueError, match="finite"):
-        solve_discrete(W, [np.nan, 1], [holes])
-    arcs = Limits(np.array([np.inf]), np.full((1, 2), np.inf), (((0.0, 2 * np.pi),),))
-    with pytest.raises(ValueError, match="has forbidden angles but no holes"):
-        solve_discrete(W, Y, {"DE": None}, limits=arcs)
-    most = Limits(np.array([np.inf]), np.full((1, 2), np.inf), (((-0.1, 6.2),),))
-    with pytest.raises(ValueError, match="plane DE: every hole is taken"):
-        solve_discrete(W, Y, {"DE": from_list([0.5], [1.0])}, limits=most)
-    heavy = from_list([0.0, 0.2], [0.005], taken=[0.02, 0], max_weight=0.015)
-    with pytest.raises(ValueError, match="no admissible weight at all"):
-        solve_discrete(W, Y, [heavy])
+@pytest.mark.parametrize(
+    ("Y", "planes", "limits", "words"),
+    [
+        ([1, 1], [FOUR, FOUR], None, "for each of the 1 planes"),
+        ([np.nan, 1], [FOUR], None, "finite"),
+        ([1, 1], {"DE": None}, LIMITS[0], "has forbidden angles but no holes"),
+        ([1, 1], {"DE": from_list([0.5], [1.0])}, LIMITS[1], "plane DE: every hole is taken"),
+        (
+            [1, 1],
+            [from_list([0.0, 0.2], [0.005], taken=[0.02, 0], max_weight=0.015)],
+            None,
+            "no admissible weight at all",
+        ),
+    ],
+)
+def test_bad_input(Y, planes, limits, words):
+    with pytest.raises(ValueError, match=words):
+        solve_discrete(np.ones((2, 1)), Y, planes, limits=limits)

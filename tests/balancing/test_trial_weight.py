@@ -6,6 +6,7 @@ from math import degrees, inf, pi, radians
 import numpy as np
 import pytest
 from balancing_data import stored
+from fem_rotors import rotor23
 
 from balancing import Labels
 from balancing.computed import model_influence
@@ -17,8 +18,6 @@ from balancing.trial_weight import (
     trial_from_coefficients,
     trial_from_force,
 )
-from rotorid.files import read_rotor
-from rotorid.samples import sample_data
 
 RPM3000 = 100 * pi
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
@@ -74,36 +73,41 @@ def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(quantity, eta):
         assert abs(np.exp(1j * angle) + np.exp(1j * heavy)) < 1e-9
 
 
-def test_lags():
-    below, at, above = (expected_lag(word) for word in ("below", "at", "above"))
-    assert [degrees(x.reach) for x in (below, at, above)] == pytest.approx([45, 0, 45])
-    assert [degrees(x.expected) for x in (below, at, above)] == pytest.approx([45, 90, 135])
-    assert degrees(expected_lag(degrees=37).expected) == pytest.approx(37)
-    assert degrees(expected_lag(ratio=1.0).expected) == pytest.approx(90)
-    for ratio, low, high in ((0.5, 0, 90), (0.97, 0, 90), (1.03, 90, 180), (3.0, 90, 180)):
-        lag = expected_lag(ratio=ratio)
-        ends = lag.expected - radians(low), radians(high) - lag.expected
-        assert lag.reach == pytest.approx(max(ends))
-    # 2·0.05·0.5 / (1 − 0.25) = 0.0666…
-    assert np.tan(expected_lag(ratio=0.5).expected) == pytest.approx(0.05 / 0.75)
-    assert degrees(expected_lag(ratio=20.0).expected) == pytest.approx(180, abs=0.5)
-    for wrong in ({}, {"degrees": 400}, {"ratio": 0}, {"where": "near"}):
-        with pytest.raises(ValueError, match=r"critical speed|lag"):
-            expected_lag(**wrong)
+@pytest.mark.parametrize(
+    ("options", "expected", "reach"),
+    [
+        ({"where": "below"}, 45, 45),
+        ({"where": "at"}, 90, 0),
+        ({"where": "above"}, 135, 45),
+        ({"degrees": 37}, 37, None),
+        ({"ratio": 1.0}, 90, None),
+        # tan = 2·0.05·0.5 / (1 − 0.25), somewhere between 0 and 90°
+        ({"ratio": 0.5}, degrees(np.arctan(0.05 / 0.75)), 90 - degrees(np.arctan(0.05 / 0.75))),
+        ({"ratio": 3.0}, 180 - degrees(np.arctan(0.3 / 8)), 90 - degrees(np.arctan(0.3 / 8))),
+    ],
+)
+def test_lags(options, expected, reach):
+    lag = expected_lag(**options)
+    assert degrees(lag.expected) == pytest.approx(expected)
+    assert reach is None or degrees(lag.reach) == pytest.approx(reach)
 
 
-def test_angle_by_the_model_and_by_the_lag_agree_below_the_critical_speed():
-    rotor = read_rotor(sample_data() / "rotor23.csv")
-    for angle, key in ((0.0, 0.0), (50.0, 0.0), (-30.0, 70.0)):
-        influence = model_influence(rotor, {"mid": 12}, {"s": (12, angle)}, [60.0], key_phasor=key)
-        heavy = 2.0 * np.exp(1j * radians(130))
-        Y = influence.W[..., 0] * heavy
-        found = trial_from_coefficients(influence.rebased(Y), "mid", share=0.5)
-        assert np.exp(1j * found.angle) == pytest.approx(np.exp(1j * radians(310)), abs=1e-9)
-        assert found.amount == pytest.approx(1.0)  # half of the unbalance halves the reading
-        assert found.expected == pytest.approx(Y / 2)
-        guessed = opposing_angle(np.angle(Y[0, 0]), 0.0, sensor_angle=radians(angle), key_phasor=radians(key))
-        assert np.exp(1j * guessed) == pytest.approx(np.exp(1j * found.angle), abs=1e-6)
+@pytest.mark.parametrize("wrong", [{}, {"degrees": 400}, {"ratio": 0}, {"where": "near"}])
+def test_lags_that_are_none(wrong):
+    with pytest.raises(ValueError, match=r"critical speed|lag"):
+        expected_lag(**wrong)
+
+
+@pytest.mark.parametrize(("angle", "key"), [(0.0, 0.0), (50.0, 0.0), (-30.0, 70.0)])
+def test_angle_by_the_model_and_by_the_lag_agree_below_the_critical_speed(angle, key):
+    known = model_influence(rotor23(), {"mid": 12}, {"s": (12, angle)}, [60.0], key_phasor=key)
+    Y = known.W[..., 0] * 2.0 * np.exp(1j * radians(130))
+    found = trial_from_coefficients(known.rebased(Y), "mid", share=0.5)
+    assert degrees(found.angle) == pytest.approx(310)
+    assert found.amount == pytest.approx(1.0)  # half of the unbalance halves the reading
+    assert found.expected == pytest.approx(Y / 2)
+    guessed = opposing_angle(np.angle(Y[0, 0]), 0.0, sensor_angle=radians(angle), key_phasor=radians(key))
+    assert degrees(guessed) == pytest.approx(310)
 
 
 def influence(W, **options):
@@ -138,6 +142,28 @@ def test_no_reading_changes_by_more_than_the_share_of_the_largest():
     assert "changes sensor 'b' at 3000 rpm by 40 % of the largest reading" in found.basis
 
 
+def test_a_trial_radius_of_its_own():
+    W = influence(COEFFICIENTS)
+    usual = trial_from_coefficients(W, "left", radius=0.2)
+    outside = trial_from_coefficients(W, "left", radius=0.2, trial_radius=0.25)
+    assert (outside.amount, outside.force) == pytest.approx((0.8 * usual.amount, usual.force))
+    assert outside.expected == pytest.approx(usual.expected)
+    with pytest.raises(ValueError, match=r"5 g is larger .* 4.8 g"):
+        trial_from_coefficients(W, "left", amount=0.005, limit=0.006, radius=0.2, trial_radius=0.25)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"amount": 1e-3}, "changes no reading by 30 % or 30°"),
+        ({"amount": 0.1}, "would read more than the largest reading"),
+        ({"radius": 0.2, "load": 100.0}, "% of the load, more than 25 %"),
+    ],
+)
+def test_weights_too_small_or_too_large_are_named(options, words):
+    assert words in trial_from_coefficients(influence(COEFFICIENTS), "left", **options).warnings[0]
+
+
 def test_limit_cuts_what_follows_from_the_share_and_refuses_what_is_stated():
     W = influence(COEFFICIENTS)
     cut = trial_from_coefficients(W, "left", limit=0.006)
@@ -150,78 +176,38 @@ def test_limit_cuts_what_follows_from_the_share_and_refuses_what_is_stated():
         trial_from_force("A", RPM3000, 0.2, 500 * GRAVITY, limit=0.02, labels=GRAMS)
 
 
-def test_weights_too_small_or_too_large_are_named():
-    W = influence(COEFFICIENTS)
-    small = trial_from_coefficients(W, "left", amount=1e-3)
-    assert "changes no reading by 30 % or 30°" in small.warnings[0]
-    large = trial_from_coefficients(W, "left", amount=0.1)
-    assert "would read more than the largest reading" in large.warnings[0]
-    heavy = trial_from_coefficients(W, "left", radius=0.2, load=100.0)
-    assert heavy.force == pytest.approx(heavy.amount * 0.2 * RPM3000**2)
-    assert "% of the load, more than 25 %" in heavy.warnings[0]
-    assert trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, fraction=0.25).warnings == ()
-    assert "26 % of the load" in trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, fraction=0.26).warnings[0]
-
-
-def test_trial_radius_different_from_that_of_the_coefficients():
-    W = influence(COEFFICIENTS)
-    usual = trial_from_coefficients(W, "left", radius=0.2)
-    outside = trial_from_coefficients(W, "left", radius=0.2, trial_radius=0.25)
-    assert outside.amount == pytest.approx(0.8 * usual.amount)
-    assert outside.expected == pytest.approx(usual.expected)
-    assert outside.force == pytest.approx(usual.force)
-    stated = trial_from_coefficients(W, "left", amount=outside.amount, radius=0.2, trial_radius=0.25)
-    assert stated.amount == pytest.approx(outside.amount)
-    assert stated.expected == pytest.approx(usual.expected)
-    with pytest.raises(ValueError, match=r"5 g is larger .* 4.8 g"):
-        trial_from_coefficients(W, "left", amount=0.005, limit=0.006, radius=0.2, trial_radius=0.25)
-
-
-def test_what_cannot_be_is_refused():
-    W = influence(COEFFICIENTS)
-    for options, words in (
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
         ({"plane": "middle"}, "no plane 'middle'; the planes are 'left', 'right'"),
         ({"influence": influence(COEFFICIENTS, baseline=np.full((1, 2), np.nan))}, "readings are lacking"),
         ({"influence": influence(COEFFICIENTS, baseline=0 * READINGS)}, "lacking or all zero"),
         ({"share": 0.0}, "share of the largest reading"),
         ({"amount": -1.0}, "trial weight must be"),
         ({"limit": 0.0}, "largest weight of the plane must be"),
-    ):
-        arguments = {"influence": W, "plane": "left", **options}
-        with pytest.raises(ValueError, match=words):
-            trial_from_coefficients(**arguments)
-    with pytest.raises(ValueError, match="plane 'left' acts on no reading"):
-        trial_from_coefficients(influence([[[0.0, 1.0], [0.0, 1.0]]]), "left")
-    with pytest.raises(ValueError, match="needs both the phase"):
-        trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, phase=1.0)
+        ({"influence": influence([[[0.0, 1.0], [0.0, 1.0]]])}, "plane 'left' acts on no reading"),
+    ],
+)
+def test_what_cannot_be_is_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        trial_from_coefficients(**{"influence": influence(COEFFICIENTS), "plane": "left", **options})
 
 
 def test_force_with_an_angle_in_the_conventions_of_the_job():
     labels = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
-    found = trial_from_force(
-        "A",
-        RPM3000,
-        0.2,
-        500 * GRAVITY,
-        phase=radians(30),
-        lag=expected_lag("below"),
-        labels=labels,
-    )
+    options = {"phase": radians(30), "lag": expected_lag("below")}
+    found = trial_from_force("A", RPM3000, 0.2, 500 * GRAVITY, labels=labels, **options)
     assert degrees(found.angle) == pytest.approx(255)  # 30 + 45 + 180
-    assert found.to_dict()["angle_deg"] == pytest.approx(105)
-    assert found.to_dict()["angle_reach_deg"] == pytest.approx(45)
-    assert found.to_dict()["force_percent"] == pytest.approx(10)
-    text = found.summary()
-    assert "24.84 g" in text
-    assert "105° against rotation (± 45°)" in " ".join(text.split())
-    assert max(len(line) for line in text.splitlines()) <= 100
-    frame = found.to_frame()
-    assert frame.mass[0] == pytest.approx(24.84, abs=0.005)
+    document = found.to_dict()
+    assert [document[key] for key in ("angle_deg", "angle_reach_deg", "force_percent")] == pytest.approx(
+        [105, 45, 10]
+    )
+    assert found.to_frame().mass[0] == pytest.approx(24.84, abs=0.005)
     arrow = plot(found).lines[0]
-    assert arrow.get_xdata()[1] == pytest.approx(radians(105))
-    assert arrow.get_ydata()[1] == pytest.approx(24.84, abs=0.005)
+    assert (arrow.get_xdata()[1], arrow.get_ydata()[1]) == pytest.approx((radians(105), 24.84), abs=0.005)
     without = trial_from_force("A", RPM3000, 0.2, 500 * GRAVITY, labels=labels)
     assert without.to_dict()["angle_deg"] is None
-    assert "any angle" in without.summary()
     with pytest.raises(ValueError, match="has no angle to draw"):
         plot(without)
+    with pytest.raises(ValueError, match="needs both the phase"):
+        trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, phase=1.0)

@@ -44,31 +44,22 @@ def test_a_trim_makes_it_better(seed):
     document = left.to_dict()
     assert [row["mass"] for row in document["add"]] == pytest.approx(np.abs(left.trim) * 1e3)
     assert left.answer.judgement.startswith("Trim; rms ")
-    assert left.answer.found.count(" add ") == 2
+    assert left.answer.numbers.count(" add ") == 2
 
 
-def test_limits_decide_where_there_are_some():
-    assert checked(0, 0.6, judged="pass")[-1].word == "done"
-    assert checked(0, 0.6, judged="fail")[-1].word == "trim"
-
-
-def test_weights_that_made_it_worse_come_off():
-    left = checked(0, -1.0, explained=False)[-1]
-    assert left.word == "take off what is mounted"
-    assert "check what was mounted" in left.why
-
-
-def test_what_speaks_against_it_stops_a_trim():
-    left = checked(0, 0.6, stop="the runs contradict their conventions")[-1]
-    assert (left.word, left.why) == ("add nothing yet", "the runs contradict their conventions")
-
-
-def test_a_difference_that_is_not_explained_is_not_done():
-    left = checked(1, 1.0, errors=FLOOR, explained=False)[-1]
-    assert left.word == "add nothing yet"
-
-
-def test_the_comparison_of_a_trim_is_that_of_its_total():
-    """What is added and what is there are the total that the correction proposes."""
-    *_, left = checked(2, 0.6)
-    assert np.allclose(left.there + left.trim, left.correction.weights)
+@pytest.mark.parametrize(
+    ("factor", "options", "word"),
+    [
+        (0.6, {"judged": "pass"}, "done"),  # limits decide where there are some
+        (0.6, {"judged": "fail"}, "trim"),
+        (-1.0, {"explained": False}, "take off what is mounted"),
+        (0.6, {"stop": "the runs contradict their conventions"}, "add nothing yet"),
+        (1.0, {"explained": False, "errors": FLOOR}, "add nothing yet"),
+    ],
+)
+def test_what_decides(factor, options, word):
+    left = checked(0, factor, **options)[-1]
+    assert left.word == word
+    assert left.why == options.get("stop", left.why)
+    # what is added and what is there are the total that the correction proposes
+    assert word != "trim" or np.allclose(left.there + left.trim, left.correction.weights)

@@ -26,7 +26,7 @@ from balancing import (
 )
 from balancing.regions import NORMAL_RADIUS
 from rotorid.fleet import MachineRecord, MachineType, fit_type, update
-from rotorid.fleet.type_coefficients import LEVEL
+from rotorid.fleet.posterior import LEVEL
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
@@ -81,7 +81,7 @@ def draw(rng: np.random.Generator, kind: str, machines: int = MACHINES) -> Type:
 
 def record(m: int, W: ComplexArray) -> MachineRecord:
     """Coefficients as they were measured, and their covariance."""
-    return MachineRecord(f"M{m + 1}", str(m), W, (RUN * np.abs(W))[..., None, None] ** 2 * np.eye(2))
+    return MachineRecord(f"M{m + 1}", str(m), W, RUN * np.abs(W))
 
 
 def shots(rng: np.random.Generator, drawn: Type, kind: MachineType, m: int) -> list[Shot | None]:

@@ -8,7 +8,7 @@ from balancing_data import synthetic
 from repetitions import highest_share, lowest_share, repetitions
 
 from balancing import RunScatter, correct, estimate_influence
-from rotorid.base.complex_numbers import turned
+from rotorid.base.arrays import turned
 
 STEADY = RunScatter(0.0, 1e-9)
 """Runs that differ by hardly anything but their readings."""

@@ -7,14 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from fem_rotors import machines
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import fem
 from fem import state_space
-from fem.assembly import WholeBand, assemble, both_planes, project, supported
+from fem.assembly import assemble, supported
 from fem.forces import law, tables
 from rotorid.files import read_rotor
 from rotorid.samples import sample_data
@@ -35,19 +32,6 @@ def test_one_plane_has_the_rotor_s_frequencies(rotor23):
     assert not motion.C.any()
 
 
-def test_both_planes_have_the_whirl_modes_of_bearings_seals_and_discs():
-    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
-    speed = 700.0
-    motion = fem.equations_of_motion(rotor, speed=speed)
-    n = len(motion.coordinates)
-    # u = λ (−K⁻¹ C u − K⁻¹ M λu): the form that keeps the digits of the low modes
-    small = np.linalg.solve(motion.K, np.hstack((motion.C, motion.M)))
-    mine = 1 / np.linalg.eigvals(np.vstack((-small, np.eye(n, 2 * n))))
-    theirs = fem.whirl_modes(rotor, speed, 4).eigenvalues
-    for value in theirs:
-        assert np.abs(mine - value).min() < 1e-8 * abs(value)
-
-
 def test_pedestals_are_unknowns():
     stand = fem.Pedestal(10.0, 1e8)
     rotor = fem.Rotor(
@@ -63,52 +47,21 @@ def test_pedestals_are_unknowns():
     assert motion.K[foot, motion.index("x1")] == -1e7
 
 
-def test_what_cannot_be():
-    coupled = fem.Rotor(
-        length=[1.0],
-        outer_diameter=0.05,
-        supports=[fem.Support(1, [[1e7, 1e5], [-1e5, 1e7]]), fem.Support(2, 1e7)],
-    )
-    with pytest.raises(ValueError, match="coupled: take both"):
-        fem.equations_of_motion(coupled, plane="x")
-    with pytest.raises(ValueError, match="no plane 'z'"):
-        fem.equations_of_motion(coupled, plane="z")
-    with pytest.raises(ValueError, match="not negative"):
-        fem.equations_of_motion(coupled, speed=-1.0)
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"plane": "x"}, "coupled: take both"),
+        ({"plane": "z"}, "no plane 'z'"),
+        ({"speed": -1.0}, "not negative"),
+    ],
+)
+def test_what_cannot_be(options, words):
+    supports = [fem.Support(1, [[1e7, 1e5], [-1e5, 1e7]]), fem.Support(2, 1e7)]
+    coupled = fem.Rotor([1.0], 0.05, supports=supports)
+    with pytest.raises(ValueError, match=words):
+        fem.equations_of_motion(coupled, **options)
     with pytest.raises(ValueError, match="no unknown 'x9'"):
         fem.equations_of_motion(coupled).index("x9")
-
-
-@given(machines(elements=(2, 10)), st.booleans())
-@settings(max_examples=30, deadline=None)
-def test_whole_band_and_basis_are_the_equations(rotor, damped):
-    """At any λ the band solves λ² M + λ C + K of both planes; a full basis is the same."""
-    if damped:
-        rotor = dataclasses.replace(rotor, forces=[fem.InternalDamping(2, "", 3e3)])
-    speed, value = 200.0, -7.0 + 310.0j
-    motion = fem.equations_of_motion(rotor, speed=speed)
-    n = assemble(rotor).size
-    T = value**2 * motion.M + value * motion.C + motion.K
-    rng = np.random.default_rng(1)
-    load = rng.normal(size=(3, 2, n)) + 1j * rng.normal(size=(3, 2, n))
-    full = np.zeros((len(T), 3), dtype=complex)
-    full[: 2 * n] = load.reshape(3, -1).T
-    for planes in {2, 1 if rotor.symmetric else 2}:
-        P = both_planes(rotor, complex_coordinate=planes == 1)
-        band = WholeBand(P)
-        factors = band.factor(value, speed)
-        loads = load if planes == 2 else load[:, :1] + 1j * load[:, 1:]
-        X = band.planes(factors(band.interleaved(loads).T).T)
-        x = np.linalg.solve(T, full)[: 2 * n].T.reshape(3, 2, n)
-        x = x if planes == 2 else x[:, :1] + 1j * x[:, 1:]
-        np.testing.assert_allclose(X, x, rtol=0, atol=1e-8 * np.abs(x).max())
-    basis = np.linalg.qr(rng.normal(size=(n, 4)))[0]
-    reduced = project(both_planes(rotor, complex_coordinate=False), basis)
-    D, K = (matrix[0] for matrix in reduced.at(np.array([speed])))
-    vectors = np.eye(reduced.size)
-    whole = np.hstack((reduced.expand(vectors).reshape(-1, 2 * n), vectors[:, 8:]))
-    for small, large in ((reduced.M, motion.M), (D, motion.C), (K, motion.K)):
-        np.testing.assert_allclose(small, whole @ large @ whole.T, atol=1e-9 * np.abs(large).max())
 
 
 def jeffcott(inner, outer):

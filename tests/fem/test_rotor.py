@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import each_of
-from fem_rotors import rotor23
 
 import fem
 
@@ -47,23 +46,27 @@ def test_mass_and_sections_of_a_tube():
 
 
 def test_equal_by_value_and_copied():
-    rotor = fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(1, 2)], stations={"A": 2})
-    same = fem.Rotor(
-        np.array([0.1, 0.2]), [0.05, 0.05], discs=(fem.Disc(1, 2.0),), stations={"A": np.int64(2)}
+    options = {"discs": [fem.Disc(1, 2)], "supports": [TABLE], "stations": {"A": 2}, "calibration": FOUND}
+    rotor = fem.Rotor([0.1, 0.2], 0.05, **options)
+    assert rotor == fem.Rotor(
+        np.array([0.1, 0.2]), [0.05, 0.05], **options | {"stations": {"A": np.int64(2)}}
     )
-    assert rotor == same
-    assert rotor != fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(2, 2)], stations={"A": 2})
-    assert rotor != fem.Rotor([0.1, 0.2], 0.05, discs=[fem.Disc(1, 2)])
-    assert rotor != fem.Rotor([0.1, 0.2, 0.3], 0.05)
-    assert rotor != "rotor"
-    assert pickle.loads(pickle.dumps(rotor)) == rotor
-    assert copy.deepcopy(rotor) == rotor
+    for change in (
+        {"discs": [fem.Disc(2, 2)]},
+        {"stations": {}},
+        {"length": [0.1, 0.3]},
+        {"model": fem.Model(shear=True)},
+        {"poisson_ratio": 0.25},
+        {"material_damping": [0, 1e-5]},
+        {"forces": [fem.Stop(2, stiffness=1.0)]},
+    ):
+        assert replace(rotor, **change) != rotor
+    for copied in (pickle.loads(pickle.dumps(rotor)), copy.deepcopy(rotor)):
+        assert copied == rotor
+        np.testing.assert_array_equal(copied.calibration.covariance, FOUND.covariance)
+    assert replace(rotor, calibration=None) == rotor
     with pytest.raises(TypeError, match="unhashable"):
         hash(rotor)
-
-
-def test_repr_is_short():
-    assert repr(rotor23()) == "Rotor(23 elements, 3.243 m, 558.5 kg, 12 discs, 2 supports)"
 
 
 def test_stations_and_numbers_name_nodes():
@@ -84,24 +87,19 @@ def test_stations_and_numbers_name_nodes():
     ("arguments", "message"),
     [
         ({"length": [0.1, -0.2]}, "element 2: length must be finite and greater than zero, not -0.2"),
-        ({"length": [0.1, 0.0]}, "element 2: length"),
-        ({"length": [0.1, float("nan")]}, "element 2: length must be finite"),
         ({"length": []}, "length must be a number, or one for each of 1 elements"),
         ({"length": "long"}, "length must be a number"),
         ({"outer_diameter": [0.1, 0.1, 0.1]}, "length must be a number, or one for each of 3 elements"),
-        ({"outer_diameter": float("inf")}, "element 1: outer_diameter"),
         (
             {"inner_diameter": [0, 0.05]},
             "element 2: inner_diameter must be smaller than outer_diameter, not 0.05",
         ),
         ({"inner_diameter": -0.01}, "element 1: inner_diameter must be finite and not negative"),
         ({"youngs_modulus": 0.0}, "youngs_modulus must be finite and greater than zero"),
-        ({"density": -1.0}, "density must be finite and not negative"),
         ({"discs": [fem.Disc(4, 1)]}, "disc 1: node 4 does not exist: the rotor has nodes 1 to 3"),
         ({"supports": [fem.Support(1, 1), fem.Support(9, 1)]}, "support 2: node 9 does not exist"),
         ({"discs": [fem.Support(1, 1)]}, "disc 1 must be a Disc"),
         ({"stations": {"A": 4}}, "station 'A': node 4 does not exist"),
-        ({"stations": {"A": 1.5}}, "station 'A': a node number must be a whole number"),
     ],
 )
 def test_an_impossible_rotor_is_refused(arguments, message):
@@ -118,12 +116,9 @@ def test_an_impossible_rotor_is_refused(arguments, message):
             lambda: fem.Disc(2, -1.0, name="wheel"),
             "disc 'wheel' at node 2: mass must be finite and not negative",
         ),
-        (lambda: fem.Disc(2, 1.0, polar_inertia=float("nan")), "polar_inertia must be finite"),
-        (lambda: fem.Disc(2, 1.0, diametral_inertia=-1), "diametral_inertia must be finite and not negative"),
         (lambda: fem.Disc(2, "heavy"), "mass must be a number, not 'heavy'"),
         (lambda: fem.Support(1.0, 1e8), "the node of support must be a whole number, not 1.0"),
         (lambda: fem.Support(1, -1e8), "support at node 1: stiffness must be finite and not negative"),
-        (lambda: fem.Support(1, 1e8, float("inf")), "damping must be finite"),
     ],
 )
 def test_an_impossible_disc_or_support_is_refused(make, message):
@@ -137,34 +132,35 @@ def test_the_example_of_the_package_is_true():
 
 def test_equal_bearings_compare_equal_however_they_are_written():
     assert fem.Support(1, [[2e7, 0], [0, 2e7]], np.eye(2) * 5) == fem.Support(1, 2e7, 5.0)
-    assert fem.Support(1, np.array([[1.0, 2], [3, 4]])) == fem.Support(1, ((1, 2), (3, 4)))
-    assert fem.Support(1, [1e7, 2e7], 3.0, speeds=np.array([0, 9.0])) == fem.Support(
-        1, (1e7, [[2e7, 0], [0, 2e7]]), (3.0, 3.0), speeds=(0, 9)
-    )
+    one, other = fem.Support(1, np.array([[1.0, 2], [3, 4]])), fem.Support(1, ((1, 2), (3, 4)))
+    assert (one, hash(one)) == (other, hash(other))
+    tables = [1e7, 2e7], (1e7, [[2e7, 0], [0, 2e7]])
+    assert len({fem.Support(1, k, (3.0, 3.0), speeds=(0, 9)) for k in tables}) == 1
     assert fem.Support(3, 1e7) != TABLE
-    assert hash(fem.Support(1, ((1, 2), (3, 4)))) == hash(fem.Support(1, [[1, 2], [3, 4]]))
-    assert pickle.loads(pickle.dumps(TABLE)) == copy.deepcopy(TABLE) == TABLE
     assert fem.Pedestal(5.0, (1e8, 1e8)) == fem.Pedestal(5.0, 1e8)
 
 
-def test_what_kind_of_support_it_is():
-    plain = fem.Support(1, 1e7, 10.0)
-    assert (plain.plain, plain.symmetric, plain.constant, plain.damped) == (True, True, True, True)
-    swirl = fem.Support(1, ((1e7, 5e5), (-5e5, 1e7)))
-    assert (swirl.plain, swirl.symmetric, swirl.constant, swirl.damped) == (False, True, True, False)
-    assert not fem.Support(1, ((1e7, 5e5), (5e5, 1e7))).symmetric
-    assert not TABLE.symmetric
-    assert not TABLE.constant
-    on_stand = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8, 3.0))
-    assert (on_stand.plain, on_stand.symmetric, on_stand.damped) == (False, True, True)
-    assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8))).symmetric
-    hardly = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8), (0.0, 1e-6)))
-    assert hardly.damped, "however little it is, in however few directions"
-    assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8)).damped
-    rotor = fem.Rotor([0.1, 0.1], 0.05, supports=[plain, TABLE])
-    assert not rotor.symmetric
-    assert not rotor.constant
-    assert fem.Rotor([0.1], 0.05, supports=[plain, swirl]).symmetric
+OVAL = ((1e7, 5e5), (5e5, 1e7))
+
+
+@each_of(
+    "support, plain, symmetric, damped",
+    [
+        (fem.Support(1, 1e7, 10.0), True, True, True),
+        (fem.Support(1, ((1e7, 5e5), (-5e5, 1e7))), False, True, False),
+        (fem.Support(1, OVAL), False, False, False),
+        (TABLE, False, False, True),
+        (fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8, 3.0)), False, True, True),
+        (fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8)), False, True, False),
+        # damped, however little it is, in however few directions
+        (fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8), (0.0, 1e-6))), False, False, True),
+    ],
+)
+def test_what_kind_of_support_it_is(support, plain, symmetric, damped):
+    assert (support.plain, support.symmetric, support.damped) == (plain, symmetric, damped)
+    assert support.constant == (support is not TABLE)
+    rotor = fem.Rotor([0.1, 0.1], 0.05, supports=[fem.Support(2, 1e7), support])
+    assert (rotor.symmetric, rotor.constant) == (symmetric, support.constant)
 
 
 def test_a_table_is_interpolated_and_never_extrapolated():
@@ -202,21 +198,6 @@ def test_a_disc_from_its_sizes():
     assert (disc.node, disc.name) == (2, "wheel")
 
 
-def test_a_rotor_with_everything_survives_copying():
-    rotor = fem.Rotor(
-        [0.1, 0.1],
-        0.05,
-        supports=[TABLE],
-        stations={"A": 1},
-        poisson_ratio=0.25,
-        material_damping=[0, 1e-5],
-        model=fem.Model(shear=True),
-    )
-    assert pickle.loads(pickle.dumps(rotor)) == copy.deepcopy(rotor) == rotor
-    for change in ({"model": fem.Model()}, {"poisson_ratio": 0.3}, {"material_damping": 0.0}):
-        assert replace(rotor, **change) != rotor
-
-
 @each_of(
     ("make", "message"),
     [
@@ -241,14 +222,11 @@ def test_a_rotor_with_everything_survives_copying():
         (lambda: fem.Pedestal(1.0), "pedestal: stiffness must be above 0 in x and y"),
         (lambda: fem.Pedestal(1.0, (1e8, -1)), "pedestal: stiffness must be finite and not negative, not -1"),
         (lambda: fem.Pedestal(1.0, (1, 2, 3)), r"a number or of the shape \(2,\)"),
-        (lambda: fem.Pedestal(-1.0, 1e8), "pedestal: mass must be finite and not negative"),
         (lambda: fem.Disc.from_geometry(1, 0.1, 0.2, 0.2), "inner diameter, 0.2 m, must be smaller"),
-        (lambda: fem.Disc.from_geometry(1, -0.1, 0.2), "mass must be finite and not negative"),
         (
             lambda: fem.Rotor([1.0], 0.1, poisson_ratio=0.6),
             "element 1: poisson_ratio must be finite and above",
         ),
-        (lambda: fem.Rotor([1.0], 0.1, material_damping=-1), "material_damping must be finite and not neg"),
         (lambda: fem.Sensor(1, math.inf), "sensor at 1: angle must be finite"),
     ],
 )
@@ -258,23 +236,12 @@ def test_impossible_data_are_refused(make, message):
 
 
 def test_a_seal_may_push():
-    seal = fem.Support(1, -1e5, kind="seal")
-    assert seal.stiffness == -1e5
-    rotor = fem.Rotor(
-        [0.5, 0.5],
-        0.05,
-        supports=[fem.Support(1, 1e7), fem.Support(3, 1e7), fem.Support(2, -1e5, kind="seal")],
+    ends = [fem.Support(1, 1e7), fem.Support(3, 1e7)]
+    held, pushed, unstable = (
+        fem.Rotor([0.5, 0.5], 0.05, supports=[*ends, *seals])
+        for seals in ([], [fem.Support(2, -1e5, kind="seal")], [fem.Support(2, -1e9, kind="seal")])
     )
-    softer = fem.critical_speeds(rotor, 1).frequencies[0]
-    assert (
-        softer
-        < fem.critical_speeds(fem.Rotor([0.5, 0.5], 0.05, supports=rotor.supports[:2]), 1).frequencies[0]
-    )
-    unstable = fem.Rotor(
-        [0.5, 0.5],
-        0.05,
-        supports=[fem.Support(1, 1e3), fem.Support(3, 1e3), fem.Support(2, -1e7, kind="seal")],
-    )
+    assert fem.critical_speeds(pushed, 1).frequencies[0] < fem.critical_speeds(held, 1).frequencies[0]
     with pytest.raises(ValueError, match="statically unstable"):
         fem.critical_speeds(unstable, 1)
 
@@ -291,26 +258,13 @@ def test_principal_columns_give_the_covariance_in_as_many_directions_as_it_has()
     assert replace(FOUND, covariance=np.zeros((3, 3))).columns().shape == (3, 0)
 
 
-def test_a_rotor_keeps_its_calibration_and_stays_equal():
-    rotor = fem.Rotor([0.1], 0.05, supports=[fem.Support(1, 1e7)], stations={"DE": 1})
-    calibrated = replace(rotor, calibration=FOUND)
-    assert calibrated == rotor
-    assert replace(calibrated, supports=()).calibration is FOUND
-    for copied in (pickle.loads(pickle.dumps(calibrated)), copy.deepcopy(calibrated)):
-        assert copied == rotor
-        np.testing.assert_array_equal(copied.calibration.covariance, FOUND.covariance)
-
-
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
         ({"values": [1.0]}, r"values must be finite and of the shape \(3,\)"),
         ({"covariance": np.eye(2)}, r"covariance must be finite and of the shape \(3, 3\)"),
         ({"lack_of_fit": np.nan}, "lack_of_fit finite"),
-        ({"lack_of_fit": -0.1}, "not negative"),
-        ({"values": [1.0, np.nan, 1.0]}, "values must be finite"),
         ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
-        ({"covariance": np.diag([1.0, -1.0, 1.0])}, "negative in any direction"),
         ({"covariance": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "negative in any direction"),
         ({"names": ("disc.scale",) * 3}, "one of its names comes twice"),
     ],

@@ -12,7 +12,7 @@ from repetitions import FULL
 from whirl_rotors import machine
 
 import fem
-from fem.stability import growth_bound, judge, within
+from fem.stability import judge, within
 
 MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
 STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3
@@ -45,17 +45,6 @@ def test_internal_damping(ratio):
     assert found.direction == 1
 
 
-def test_internal_damping_on_flexible_bearings():
-    """Only the shaft's share of the deflection is damped inside: k_s (1 + iβ(ω − Ω)) in series with 2 k_b."""
-    material, bearing, external = 2e-4, 0.7 * STIFFNESS, 60.0
-    rotor = jeffcott(fem.Support(2, 0.0, external), bearing=bearing, material=material)
-    found = fem.stability_threshold(rotor, 3000.0)
-    shaft = STIFFNESS * (1 + 1j * material * (found.frequency - found.threshold))
-    dynamic = shaft * 2 * bearing / (shaft + 2 * bearing)
-    balance = dynamic - MASS * found.frequency**2 + 1j * external * found.frequency
-    assert abs(balance) < 1e-8 * STIFFNESS
-
-
 @pytest.mark.parametrize(("factor", "status"), [(1 - 1e-6, "stable"), (1 + 1e-6, "unstable")])
 def test_cross_coupling_at_the_limit(factor, status):
     """q = b ω0 is the limit."""
@@ -75,34 +64,6 @@ def test_cross_coupling_that_grows_with_speed():
     found = fem.stability_threshold(jeffcott(seal), top)
     assert found.threshold == pytest.approx(2 * CRITICAL, rel=1e-7)
     assert found.whirl_ratio == pytest.approx(0.5, rel=1e-8)
-    assert found.mode in (1, 2)
-    assert "0.5 × speed" in found.sentence()
-
-
-def test_anisotropic_bearings_shift_the_limit():
-    """Two planes: the eigenvalue at the threshold lies on the axis, on both sides of it off it."""
-    # Split stiffness and damping outside balance material damping for a while.
-    rotor = dataclasses.replace(machine(cross=False), material_damping=np.full(23, 2e-4))
-    found = fem.stability_threshold(rotor, 3000.0, n=4)
-    assert found.status == "threshold"
-    at = fem.whirl_modes(rotor, found.threshold, 4)
-    k = int(np.argmin(np.abs(at.frequencies - found.frequency)))
-    assert abs(at.eigenvalues[k].real) < 1e-7 * at.frequencies[k]
-    before = fem.whirl_modes(rotor, 0.999 * found.threshold, 4)
-    after = fem.whirl_modes(rotor, 1.001 * found.threshold, 4)
-    assert before.eigenvalues.real.max() < 0 < after.eigenvalues.real.max()
-
-
-def test_stable_is_said():
-    rotor = dataclasses.replace(
-        rotor23(), supports=[fem.Support(s.node, 1e8, 2e4) for s in rotor23().supports]
-    )
-    found = fem.stability_threshold(rotor, 1000.0)
-    assert found.status == "stable"
-    assert found.threshold is None
-    assert found.whirl_ratio is None
-    assert found.margin > 0
-    assert "stable from 0 to 1000" in found.summary()
 
 
 def test_the_margin_is_the_least_decrement_of_the_range():
@@ -117,38 +78,29 @@ def test_the_margin_is_the_least_decrement_of_the_range():
     assert found.margin < 0.6 * fem.stability_threshold(rotor, CRITICAL).margin
 
 
-def test_undamped_is_not_unstable():
-    assert fem.stability_threshold(rotor23(), 1000.0).status == "stable"
-
-
-def test_unstable_from_the_start():
-    q = 1e6
-    found = fem.stability_threshold(jeffcott(fem.Support(2, ((0, q), (-q, 0)), 10.0, kind="seal")), 500.0)
-    assert found.status == "unstable"
-    assert found.direction == 1
-    assert "unstable already at 0" in found.summary()
-    assert found.to_dict()["threshold_rad_s"] is None
-
-
-def test_running_away_is_said():
-    rotor = jeffcott(fem.Support(2, -2 * STIFFNESS, 10.0, kind="seal"))
-    found = fem.stability_threshold(rotor, 500.0, n=1)
-    assert found.status == "unstable"
+def test_stable_and_unstable_from_the_start():
+    seal = fem.Support(2, ((0, 1e6), (-1e6, 0)), 10.0, kind="seal")
+    driven = fem.stability_threshold(jeffcott(seal), 500.0)
+    assert (driven.status, driven.direction) == ("unstable", 1)
+    assert driven.to_dict()["threshold_rad_s"] is None
+    pushed = jeffcott(fem.Support(2, -2 * STIFFNESS, 10.0, kind="seal"))
+    assert fem.stability_threshold(pushed, 500.0, n=1).status == "unstable"
+    still = fem.stability_threshold(rotor23(), 1000.0)
+    assert (still.status, still.threshold, still.whirl_ratio) == ("stable", None, None)
 
 
 @pytest.mark.parametrize(
     ("highest", "options", "message"),
-    [(10.0, {"lowest": 20.0}, "range of speeds is empty"), (10.0, {"lowest": -5.0}, "not negative")],
+    [
+        (10.0, {"lowest": 20.0}, "range of speeds is empty"),
+        (10.0, {"lowest": -5.0}, "not negative"),
+        (150.0, {}, "support 'seal' at node 2: its table holds 100 to 200"),
+    ],
 )
 def test_bad_input(highest, options, message):
-    with pytest.raises(ValueError, match=message):
-        fem.stability_threshold(rotor23(), highest, **options)
-
-
-def test_tables_are_not_left():
     rotor = jeffcott(fem.Support(2, [1e3, 1e3], [1.0, 1.0], speeds=(100.0, 200.0), name="seal"))
-    with pytest.raises(ValueError, match="seal"):
-        fem.stability_threshold(rotor, 150.0)
+    with pytest.raises(ValueError, match=message):
+        fem.stability_threshold(rotor, highest, **options)
     assert fem.stability_threshold(rotor, 200.0, lowest=100.0).status == "stable"
 
 
@@ -188,33 +140,6 @@ def veering():
     )
 
 
-def sealed(seed):
-    """A rotor with seals whose cross-coupling grows with speed, and some with internal damping."""
-    rng = np.random.default_rng(seed)
-    n = int(rng.integers(4, 9))
-
-    def bearing(node):
-        k, ratio, cross = 10 ** rng.uniform(7, 8.5), rng.uniform(0.5, 2), rng.uniform(-0.2, 0.2)
-        return fem.Support(node, ((k, cross * k), (-cross * k, ratio * k)), 10 ** rng.uniform(2, 4.5))
-
-    k, q = 10 ** rng.uniform(5, 7.5), 10 ** rng.uniform(5, 7.5)
-    seal = fem.Support(
-        int(rng.integers(2, n + 1)),
-        [((k, 0), (0, k)), ((k, q), (-q, k))],
-        [10 ** rng.uniform(1, 3)] * 2,
-        speeds=(0.0, 1000.0),
-        kind="seal",
-    )
-    return fem.Rotor(
-        rng.uniform(0.05, 0.3, n),
-        rng.uniform(0.04, 0.16, n),
-        material_damping=rng.choice([0.0, 1e-6, 1e-4]) * rng.random(n),
-        discs=[fem.Disc(int(rng.integers(1, n + 2)), rng.uniform(1, 60), 0.5, 0.3)],
-        supports=[bearing(1), bearing(n + 1), seal],
-        model=fem.Model(False, True, True),
-    )
-
-
 def grows_only_above(rotor, speed):
     """Judged by the full model's eigenvalues on both sides."""
     before, after = (
@@ -225,44 +150,17 @@ def grows_only_above(rotor, speed):
 
 def test_a_veering_does_not_exchange_the_mode():
     rotor = veering()
-    found = [fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 80, 160)]
-    for one in found:
+    thresholds = [fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 160)]
+    for one in thresholds:
         assert one.threshold == pytest.approx(213.8314, rel=1e-5)
-        assert one.threshold == pytest.approx(found[0].threshold, rel=1e-8)
-        assert one.frequency == pytest.approx(found[0].frequency, rel=1e-8)
-        assert one.mode == 4
-        assert one.warnings == ()
-    assert grows_only_above(rotor, found[0].threshold)
+        assert (one.mode, one.warnings) == (4, ())
+    assert grows_only_above(rotor, thresholds[0].threshold)
     # The Campbell diagram finds growth on the mode itself: the same speed.
     growing = fem.campbell(rotor, np.linspace(0.0, 1000.0, 41), 4).unstable
-    assert growing[0].first == pytest.approx(found[0].threshold, rel=1e-7)
+    assert growing[0].first == pytest.approx(thresholds[0].threshold, rel=1e-7)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_the_threshold_does_not_depend_on_the_steps(seed):
-    rotor = sealed(seed)
-    few, many = (fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 160))
-    assert few.status == many.status
-    assert few.warnings == many.warnings == ()
-    if few.threshold is not None:
-        assert few.threshold == pytest.approx(many.threshold, rel=1e-6)
-        assert few.frequency == pytest.approx(many.frequency, rel=1e-6)
-        assert grows_only_above(rotor, few.threshold)
-
-
-@pytest.mark.parametrize("seed", [0, 2, 3, 4])
-def test_damped_critical_speeds_do_not_depend_on_the_steps(seed):
-    rotor = sealed(seed)
-    few, many = (fem.campbell(rotor, np.linspace(0.0, 1000.0, steps + 1), 6) for steps in (20, 80))
-    assert few.critical_speeds.size
-    np.testing.assert_allclose(few.critical_speeds, many.critical_speeds, rtol=1e-8)
-    for speed in few.critical_speeds:
-        omega = whirl_exactly(rotor, speed, 8).frequencies
-        assert np.abs(omega - speed).min() < 1e-8 * speed
-
-
-@pytest.mark.parametrize("highest", [700.0, 1000.0, 5000.0])
-@pytest.mark.parametrize("loss", [1e-13, 1e-10, 1e-7])
+@pytest.mark.parametrize(("loss", "highest"), [(1e-13, 5000.0), (1e-10, 700.0), (1e-7, 1000.0)])
 def test_a_threshold_does_not_depend_on_the_size_of_tiny_losses(loss, highest):
     # internal damping alone: stable up to the critical speed, whatever its size
     ends = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
@@ -290,57 +188,20 @@ def inner(material):
     )
 
 
-def test_growth_is_said_with_its_threshold():
-    rotor = inner(2e-4)
+def test_growth_is_told_with_its_threshold():
+    rotor, speeds = inner(2e-4), SPEEDS[::6]
     threshold = fem.stability_threshold(rotor, 1500.0).threshold
     for result in (
-        fem.unbalance_response(rotor, {5: 1e-4}, SPEEDS),
-        fem.unbalance_response(rotor, {5: 1e-4}, SPEEDS[::-1]),
-        fem.influence(rotor, [5], [7], SPEEDS),
+        fem.unbalance_response(rotor, {5: 1e-4}, speeds[::-1]),
+        fem.influence(rotor, [5], [7], speeds),
     ):
         assert f"does not exist above {threshold:.6g} rad/s" in result.warnings[-1]
-        assert f"up to the last speed, {SPEEDS[-1]:.6g} rad/s" in result.warnings[-1]
+        assert f"up to the last speed, {speeds[-1]:.6g} rad/s" in result.warnings[-1]
         assert "mode 2 (forward whirl" in result.warnings[-1]
-
-
-def test_one_speed():
-    rotor = inner(2e-4)
-    threshold = fem.stability_threshold(rotor, 1500.0).threshold
     above = fem.unbalance_response(rotor, {5: 1e-4}, 1.05 * threshold)
     assert f"does not exist at {1.05 * threshold:.6g} rad/s" in above.warnings[-1]
     assert fem.unbalance_response(rotor, {5: 1e-4}, 0.95 * threshold).warnings == ()
-
-
-def test_a_stable_rotor_with_material_damping_is_not_suspected():
-    assert (growth_bound(inner(1e-7), SPEEDS) > 0).all()
     assert fem.unbalance_response(inner(1e-7), {5: 1e-4}, SPEEDS).warnings == ()
-
-
-def test_a_rotor_that_is_pushed_aside():
-    rotor = machine()
-    pushed = dataclasses.replace(rotor, supports=[*rotor.supports, fem.Support(12, -1e9, kind="seal")])
-    with pytest.raises(ValueError, match="statically unstable"):
-        fem.unbalance_response(pushed, {5: 1e-4}, SPEEDS)
-
-
-@pytest.mark.parametrize(
-    ("stiffness", "damping", "sure"),
-    [
-        (1e8, 1e3, True),
-        (((1e8, 0), (0, 2e8)), ((1e3, 0), (0, 5e2)), True),
-        (((1e8, 3e7), (3e7, 2e8)), 1e3, True),
-        (((1e8, 3e7), (-3e7, 1e8)), 1e3, False),
-        (((1e8, 2e8), (2e8, 1e8)), 1e3, False),
-        (1e8, ((1e3, 2e3), (2e3, 1e3)), False),
-        (1e8, ((1e3, 2e3), (-2e3, 1e3)), True),
-    ],
-)
-def test_what_is_surely_stable(stiffness, damping, sure):
-    base = rotor23()
-    rotor = dataclasses.replace(
-        base, supports=[fem.Support(s.node, stiffness, damping) for s in base.supports]
-    )
-    assert (growth_bound(rotor, np.array([0.0, 100.0])) == 0).all() == sure
 
 
 def drawn(rng):
@@ -455,52 +316,6 @@ def test_a_rotor_that_is_pushed_aside_at_rest(speeds):
         unstable_windows(rotor, np.array([0.0]))
 
 
-def of_many_elements(rng):
-    """More unknowns than the whole space is taken for; seals, and material damping here and there."""
-    n = int(rng.integers(22, 28))
-    kinds = rng.permutation(["cross", "push", "none"])
-    stiff = 10 ** rng.uniform(6, 8.5, 3)
-    supports = [
-        fem.Support(int(node), ((k, 0.0), (0.0, k * rng.uniform(0.5, 2))), 10 ** rng.uniform(1.5, 4.5))
-        for node, k in zip(rng.choice(np.arange(1, n + 2), 3, replace=False), stiff, strict=True)
-    ]
-    knots = np.unique(np.concatenate(([0.0, 1500.0], rng.uniform(0, 1500, 4))))
-    for kind in kinds[:2]:
-        q = np.where(rng.random(knots.size) < 0.5, 0.0, 10 ** rng.uniform(4, 7, knots.size))
-        k = {"cross": [((0.0, one), (-one, 0.0)) for one in q], "push": (-0.3 * q).tolist()}.get(kind)
-        if k is not None:
-            node, c = int(rng.integers(1, n + 2)), rng.choice([30.0, 1000.0])
-            supports.append(fem.Support(node, k, c, speeds=tuple(knots), kind="seal"))
-    disc = rng.uniform(5, 50)
-    return fem.Rotor(
-        rng.dirichlet(np.full(n, 8.0)) * rng.uniform(0.6, 3.0),
-        rng.uniform(0.03, 0.12, n),
-        discs=[fem.Disc(int(rng.integers(1, n + 2)), disc, 0.015 * disc, 0.01 * disc)],
-        supports=supports,
-        material_damping=np.where(rng.random(n) < 0.5, 10 ** rng.uniform(-6, -3.5), 0.0),
-        model=fem.Model(rotary_inertia=True, gyroscopic=True),
-    ), knots
-
-
-@pytest.mark.full
-def test_no_window_is_missed_where_the_basis_is_a_part_of_the_space():
-    rng = np.random.default_rng(3)
-    wrong, unstable = {}, 0
-    for number in range(60 if FULL else 8):
-        rotor, knots = of_many_elements(rng)
-        speeds = np.union1d(np.linspace(0.0, 1500.0, int(rng.choice([3, 40, 200]))), knots)
-        inside = within(unstable_windows(rotor, speeds), speeds)
-        edges = np.flatnonzero(np.diff(inside.astype(int)))
-        looked = np.unique(np.concatenate((edges, edges + 1, rng.integers(0, speeds.size, 8))))
-        growth = np.array([largest_growth(rotor, speed) for speed in speeds[looked]])
-        unstable += int((growth > 1e-6).sum())
-        bad = ((growth > 1e-6) & ~inside[looked]) | ((growth < -1e-6) & inside[looked])
-        if bad.any():
-            wrong[number] = speeds[looked][bad]
-    assert wrong == {}
-    assert unstable > 5
-
-
 def test_two_windows_are_not_one_where_no_speed_between_is_asked_for():
     rotor = two_windows()
     windows = unstable_windows(rotor, np.array([110.0, 295.0, 296.0]))
@@ -519,24 +334,3 @@ def two_windows():
     disc, model = fem.Disc(3, 10.0, 0.1, 0.05), fem.Model(rotary_inertia=True, gyroscopic=True)
     bearings = [fem.Support(node, 1e8) for node in (1, 5)]
     return fem.Rotor([0.25] * 4, 0.04, discs=[disc], supports=[*bearings, seal], model=model)
-
-
-def test_many_speeds_are_judged_as_each_alone():
-    """Ranges that are certified as a whole hold what single speeds say."""
-    for material in (0.0, 2e-4):
-        rotor = inner(material) if material else machine()
-        speeds = np.linspace(20.0, 1500.0, 400)
-        together = within(unstable_windows(rotor, speeds), speeds)
-        alone = [bool(unstable_windows(rotor, np.array([speed]))) for speed in speeds[::16]]
-        np.testing.assert_array_equal(together[::16], alone)
-
-
-def test_no_mode_grows_above_its_bound():
-    rng = np.random.default_rng(4)
-    for _ in range(10):
-        rotor = drawn(rng)
-        speeds = rng.uniform(2.0, 1498.0, 5)
-        for speed, bound in zip(speeds, growth_bound(rotor, speeds), strict=True):
-            lam = dense_rotor.whirl(rotor, speed)[0]
-            growing = lam[lam.real > 1e-6 * np.abs(lam)]
-            assert (growing.imag <= bound * (1 + 1e-9)).all()

@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigvals
 from scipy.optimize import linear_sum_assignment
-from scipy.signal import StateSpace as ScipyStateSpace
-from scipy.signal import lsim
 
 import fem
 from fem import state_space
@@ -88,61 +86,6 @@ def test_feedthrough_of_a_force_on_a_massless_undamped_output():
     np.testing.assert_allclose(model.C, [[1, 0], [k1 / (k1 + k2), 0]], atol=1e-15)
 
 
-def test_a_damper_and_a_spring_without_mass_creep():
-    k, c = 4.0, 2.0
-    model = state_space(motion_of(0.0, c, k), outputs=["x1"])
-    assert model.states == ("damped1",)
-    t = np.linspace(0.0, 3.0, 61)
-    _, y, _ = lsim(ScipyStateSpace(*model), np.ones_like(t), t)
-    np.testing.assert_allclose(y, (1 - np.exp(-k * t / c)) / k, atol=1e-12)
-
-
-def test_it_unpacks_into_its_matrices():
-    motion, _ = random_motion(11, 2, 1, 1)
-    model = state_space(motion, inputs=["f_x2", "f_x1"], outputs=["x3", "x1"])
-    A, B, C, D = model
-    assert (A is model.A, B is model.B, C is model.C, D is model.D) == (True,) * 4
-    omega = np.array([0.4, 2.0])
-    dynamic = motion.K + 1j * omega[:, None, None] * motion.C - omega[:, None, None] ** 2 * motion.M
-    expected = np.linalg.inv(dynamic)[:, [2, 0]][:, :, [1, 0]]
-    np.testing.assert_allclose(frequency_response(model, omega), expected, rtol=1e-10)
-
-
-def test_velocities():
-    motion, _ = random_motion(2, 2, 2, 1)
-    massive = [name for name, row in zip(motion.coordinates, motion.M, strict=True) if row.any()]
-    model = state_space(motion, outputs=[*massive, *(f"v_{name}" for name in massive)])
-    H = frequency_response(model, [0.9, 2.5])
-    iw = 1j * np.array([0.9, 2.5])[:, None, None]
-    np.testing.assert_allclose(H[:, 2:], iw * H[:, :2], rtol=1e-9, atol=1e-12)
-    light = min(set(motion.coordinates) - set(massive))
-    with pytest.raises(ValueError, match=f"no output 'v_{light}'"):
-        state_space(motion, outputs=[f"v_{light}"])
-
-
-def test_a_shaft_with_shear_but_without_rotary_inertia_is_refused():
-    """Its mass matrix is singular without a zero row."""
-    rotor = fem.Rotor(
-        [0.1] * 8, 0.05, supports=[fem.Support(1, 1e7), fem.Support(9, 1e7)], model=fem.Model(shear=True)
-    )
-    with pytest.raises(ValueError, match=r"singular without a zero row.*rotary inertia"):
-        state_space(fem.equations_of_motion(rotor))
-
-
-def test_little_damping_on_a_massless_coordinate_costs_no_digits():
-    """A spring of two halves; at the point between them a damper c: one eigenvalue near −(k1 + k2)/c."""
-    k1, k2 = 3e8, 5e8
-    for c in (1e-2, 1e-5):
-        motion = motion_of(np.diag([10.0, 0.0]), np.diag([0.0, c]), [[k1, -k1], [-k1, k1 + k2]])
-        found = state_space(motion).eigenvalues
-        assert len(found) == 3
-        slow = found[np.abs(found) < 1e5]
-        root = np.sqrt(k1 * k2 / (k1 + k2) / 10.0)
-        decay = -0.5 * c * (k1 / (k1 + k2)) ** 2 / 10.0  # of first order in c
-        np.testing.assert_allclose(np.abs(slow.imag), root, rtol=1e-12)
-        np.testing.assert_allclose(slow.real, decay, rtol=1e-5, atol=1e-14 * root)
-
-
 def test_a_rotor_with_massless_pedestals_and_shaft():
     """A massless shaft with discs, on damped cross-coupled bearings; one on a foot that is damped in y."""
     rotor = fem.Rotor(
@@ -204,11 +147,3 @@ def test_names_are_checked():
     ):
         with pytest.raises(ValueError, match=message):
             state_space(motion, **choice)
-
-
-def test_an_undamped_system():
-    model = state_space(motion_of(1.0, 0.0, 4.0))
-    assert frequency_response(model, 1.0)[0, 0, 0] == pytest.approx(1 / 3)
-    document = model.to_dict()
-    assert document["A"] == [[0.0, 1.0], [-4.0, 0.0]]
-    assert document["states"] == ["x1", "v_x1"]

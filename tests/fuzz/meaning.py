@@ -33,7 +33,7 @@ def table(text):
         if begins and (not rows or separator not in line):
             comments.append(line.strip(BLANKS + "#"))
             continue
-        if not rows and line.startswith('"#'):
+        if line.startswith('"#') and (not rows or separator not in re.sub('"[^"]*"', "", line)):
             comments.append(line.strip(BLANKS + '"#;,'))
             continue
         if separator is None:

@@ -8,10 +8,9 @@ import re
 
 import openpyxl
 
-from fuzz.mutations import NUMBER, delete_bytes, flip_bit, repeat_bytes, truncate
+from fuzz.mutations import BYTES, NUMBER, named
 
 
-# the same table in another dress
 def _rows(text, change):
     """Every line changed but comments and blank ones."""
     return "\n".join(change(x) if x and not x.startswith("#") else x for x in text.split("\n"))
@@ -21,8 +20,9 @@ def _semicolons(text):
     return _rows(text, lambda row: row.replace(",", ";").replace(".", ","))
 
 
-def _rounded(rng, text, form):
+def _rounded(rng, text):
     """Some numbers as a format of cells shows them."""
+    form = rng.choice((".2E", ".2f"))
     return NUMBER.sub(lambda m: format(float(m[0]), form) if rng.random() < 0.3 else m[0], text)
 
 
@@ -36,7 +36,7 @@ DRESSES = {
     "quotes": lambda _r, t: _rows(t, lambda row: '"' + row.replace(",", '","') + '"'),
     "tabs": lambda _r, t: _rows(t, lambda row: row.replace(",", "\t")),
     "blanks": lambda _r, t: _rows(t, lambda row: row.replace(",", "\u00a0, ")),
-    "rounded": lambda r, t: _rounded(r, t, r.choice((".2E", ".2f"))),
+    "rounded": _rounded,
     "thousands_with_decimals": lambda _r, t: re.sub(r"(?<=,)(\d{4})(?=[,\n])", r"\1.000", t),
     "thousands": lambda _r, t: re.sub(r"\b(\d)(\d{3})\b", r"\1,\2", t),
     "thousands_with_points": lambda _r, t: re.sub(r"\b(\d)(\d{3})\b", r"\1.\2", _semicolons(t)),
@@ -49,159 +49,102 @@ def dress(rng, data):
     return name, DRESSES[name](rng, data.decode("utf-8-sig")).encode()
 
 
-# workbooks
 def mutate_workbook(rng, data):
     """(what was done, the mutated workbook)."""
     if rng.random() < 0.2:
-        done = rng.choice((flip_bit, flip_bit, delete_bytes, truncate, repeat_bytes))
+        done = rng.choice(BYTES)
         return done.__name__, done(rng, data)
     book = openpyxl.load_workbook(io.BytesIO(data))
-    sheet = rng.choice(book.worksheets)
-    done = rng.choice(CELLS)
-    done(rng, book, sheet)
+    done = rng.choice(CELLS + SHEETS)
+    done(rng, rng.choice(book.worksheets))
     stream = io.BytesIO()
     book.save(stream)
     return done.__name__, stream.getvalue()
 
 
-def _some_cell(rng, sheet):
-    return sheet.cell(rng.randrange(1, sheet.max_row + 1), rng.randrange(1, sheet.max_column + 1))
+VALUES = (
+    None,
+    "",
+    " ",
+    "x",
+    "#1",
+    "#N/A",
+    True,
+    0,
+    -1,
+    1e300,
+    datetime.datetime(2024, 5, 1),
+    "7,2",
+    "1.234,5",
+)
+VALUES += ("'5", "\n", "a\nb", "_x000D_", 10**20)
+FORMATS = ("0.00", "0%", "0.00E+00", "dd.mm.yyyy", "@", "#,##0.000", "General", "[h]:mm")
 
 
 def _set(change):
-    def done(rng, _book, sheet):
-        change(rng, _some_cell(rng, sheet))
+    """Of some cell: its value and maybe its type, or its format."""
 
-    done.__name__ = change.__name__
+    def done(rng, sheet):
+        cell = sheet.cell(rng.randint(1, sheet.max_row), rng.randint(1, sheet.max_column))
+        for name, value in change(rng, cell.value).items():
+            setattr(cell, name, value)
+
     return done
 
 
-@_set
-def cell_value(rng, cell):
-    values = (
-        None,
-        "",
-        " ",
-        "x",
-        "#1",
-        "#N/A",
-        True,
-        0,
-        -1,
-        1e300,
-        datetime.datetime(2024, 5, 1),
-        "7,2",
-        "1.234,5",
-        "'5",
-        "\n",
-        "a\nb",
-        "_x000D_",
-        10**20,
-    )
-    cell.value = rng.choice(values)
+CELLS = named(
+    _set,
+    {
+        "cell_value": lambda r, _: {"value": r.choice(VALUES)},
+        "cell_text": lambda _, x: {} if x is None else {"value": str(x), "data_type": "s"},
+        "cell_decimal_comma": lambda _, x: {} if x is None else {"value": str(x).replace(".", ",")},
+        "cell_format": lambda r, _: {"number_format": r.choice(FORMATS)},
+        "cell_formula": lambda r, _: {"value": r.choice(("=1+1", "=A1", '=HYPERLINK("x")'))},
+        "cell_error": lambda _, x: {"value": "#N/A", "data_type": "e"},
+        "cell_scale": lambda r, x: {"value": x * r.choice((-1, 2, 0.5, 1e3))} if isinstance(x, float) else {},
+    },
+)
 
 
-@_set
-def cell_text(_rng, cell):
-    cell.value = None if cell.value is None else str(cell.value)
-    cell.data_type = "s"
-
-
-@_set
-def cell_decimal_comma(_rng, cell):
-    cell.value = None if cell.value is None else str(cell.value).replace(".", ",")
-
-
-@_set
-def cell_format(rng, cell):
-    cell.number_format = rng.choice(
-        ("0.00", "0%", "0.00E+00", "dd.mm.yyyy", "@", "#,##0.000", "General", "[h]:mm")
-    )
-
-
-@_set
-def cell_formula(rng, cell):
-    cell.value = rng.choice(("=1+1", "=A1", '=HYPERLINK("x")'))
-
-
-@_set
-def cell_error(_rng, cell):
-    cell.value = "#N/A"
-    cell.data_type = "e"
-
-
-@_set
-def cell_scale(rng, cell):
-    if isinstance(cell.value, (int, float)):
-        cell.value *= rng.choice((-1, 2, 0.5, 1e3, 1e6, 1e-3))
-
-
-def stray_format(rng, _book, sheet):
+def _stray_format(rng, sheet):
     sheet.cell(rng.choice((1_048_576, 300, 5000)), rng.choice((1, 5, 16_384))).number_format = "0.00"
 
 
-def insert_row(rng, _book, sheet):
-    at = rng.randrange(1, sheet.max_row + 2)
+def _insert_row(rng, sheet):
+    at = rng.randint(1, sheet.max_row + 1)
     sheet.insert_rows(at)
-    if rng.random() < 0.6:
-        sheet.cell(at, 1).value = rng.choice(("# remark", "#12 coupling", "Title", "#N/A"))
+    sheet.cell(at, 1).value = rng.choice((None, None, "# remark", "#12 coupling", "Title", "#N/A"))
 
 
-def delete_row(rng, _book, sheet):
-    sheet.delete_rows(rng.randrange(1, sheet.max_row + 1))
+def _merge(rng, sheet):
+    at = rng.randint(1, sheet.max_row)
+    sheet.merge_cells(None, at, 1, at + rng.randint(1, 2), rng.randint(1, 2))
 
 
-def insert_blank_column(rng, _book, sheet):
-    sheet.insert_cols(rng.randrange(1, sheet.max_column + 2))
-
-
-def delete_a_column(rng, _book, sheet):
-    sheet.delete_cols(rng.randrange(1, sheet.max_column + 1))
-
-
-def merge(rng, _book, sheet):
-    a = rng.randrange(1, sheet.max_row + 1)
-    sheet.merge_cells(
-        start_row=a, end_row=a + rng.randrange(1, 3), start_column=1, end_column=rng.randrange(1, 3)
-    )
-
-
-def rename_sheet(rng, _book, sheet):
+def _rename_sheet(rng, sheet):
     sheet.title = rng.choice((sheet.title.upper(), sheet.title + " ", sheet.title[:-1], "Sheet9", "notes"))
 
 
-def add_sheet(rng, book, _sheet):
-    book.create_sheet(rng.choice(("notes", "extra", "results", "check"))).append(["x", 1])
+def _delete_sheet(_, sheet):
+    sheet.parent.remove(sheet)
+    if not sheet.parent.worksheets:
+        sheet.parent.create_sheet("x")
 
 
-def hide_sheet(_rng, _book, sheet):
-    sheet.sheet_state = "hidden"
-
-
-def delete_sheet(_rng, book, sheet):
-    book.remove(sheet)
-    if not book.worksheets:
-        book.create_sheet("x")
-
-
-CELLS = (
-    cell_value,
-    cell_value,
-    cell_value,
-    cell_text,
-    cell_decimal_comma,
-    cell_format,
-    cell_formula,
-    cell_error,
-    cell_scale,
-    stray_format,
-    insert_row,
-    delete_row,
-    insert_blank_column,
-    delete_a_column,
-    merge,
-    rename_sheet,
-    add_sheet,
-    hide_sheet,
-    delete_sheet,
+SHEETS = named(
+    lambda change: lambda rng, sheet: change(rng, sheet),
+    {
+        "stray_format": _stray_format,
+        "insert_row": _insert_row,
+        "delete_row": lambda r, s: s.delete_rows(r.randint(1, s.max_row)),
+        "insert_blank_column": lambda r, s: s.insert_cols(r.randint(1, s.max_column + 1)),
+        "delete_a_column": lambda r, s: s.delete_cols(r.randint(1, s.max_column)),
+        "merge": _merge,
+        "rename_sheet": _rename_sheet,
+        "add_sheet": lambda r, s: s.parent.create_sheet(r.choice(("notes", "extra", "check"))).append(
+            ["x", 1]
+        ),
+        "hide_sheet": lambda _, s: setattr(s, "sheet_state", "hidden"),
+        "delete_sheet": _delete_sheet,
+    },
 )

@@ -3,7 +3,7 @@
 import coverage_runup as example
 import numpy as np
 
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 
 
 def drawn(seed=5, rate=100.0, noise=1e-6):

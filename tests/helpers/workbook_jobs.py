@@ -9,6 +9,7 @@ import io
 import json
 import re
 import tomllib
+import zipfile
 from collections.abc import Mapping
 
 import numpy as np
@@ -98,7 +99,9 @@ def _parts(value):
     if dataclasses.is_dataclass(value):
         names = (field.name for field in dataclasses.fields(value) if field.name not in _NOT_SAID)
         return type(value), ".{}", {name: getattr(value, name) for name in names}
-    if isinstance(value, (Mapping, Settings)):
+    if isinstance(value, Settings):
+        return Mapping, ".{}", {key: part for key, part in value if key not in TABLES}
+    if isinstance(value, Mapping):
         return Mapping, ".{}", dict(value)
     if isinstance(value, (tuple, list)):
         return list, "[{}]", dict(enumerate(value, start=1))
@@ -215,3 +218,19 @@ def _cell(value):
     if isinstance(value, list):
         return "; ".join(map(str, value))
     return str(value) if isinstance(value, datetime.date) else value
+
+
+def with_stored_values(path, values):
+    """The workbook with values stored in its formulas, in order, as Excel stores them."""
+    with zipfile.ZipFile(path) as book:
+        parts = {name: book.read(name) for name in book.namelist()}
+    left = iter(values)
+    for name in (name for name in parts if name.startswith("xl/worksheets")):
+        parts[name] = re.sub(
+            rb"</f><v ?/?>(</v>)?", lambda _: f"</f><v>{next(left)}</v>".encode(), parts[name]
+        )
+    with zipfile.ZipFile(path, "w") as book:
+        for name, data in parts.items():
+            book.writestr(name, data)
+    assert next(left, None) is None
+    return path

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 
+from rotorid.base.answer import Column, frame, rows, text
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
 
 COLUMNS = (
     Column("plane", ("A", "B"), str),

@@ -14,8 +14,8 @@ from workbook_jobs import as_workbook
 
 import balancing
 import rotorid
+from rotorid.base.json import SCHEMA_VERSION, now
 from rotorid.base.tables import csv_bytes
-from rotorid.base.versions import SCHEMA_VERSION, now
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"

@@ -4,8 +4,6 @@ import os
 import signal
 from pathlib import Path
 
-from rotorid.study.results import Task
-
 ROTOR = """element,length_m,diameter_m,support_stiffness_N_per_m,mass_kg
 1,0.2,0.04,1e7,0
 2,0.2,0.04,0,5
@@ -41,14 +39,14 @@ def write(folder, text=STUDY):
     return folder / "study.toml"
 
 
-def number(data, rng):
+def number(rng):
     """A normal number."""
     return {"x": float(rng.standard_normal())}
 
 
 def noted(data, rng):
     """The same; each call leaves a line, and the number of one sample is wrong."""
-    row = number(data, rng)
+    row = number(rng)
     with open(data["calls"], "a") as stream:
         stream.write(f"{row['x']}\n")
     if row["x"] == data["wrong"]:
@@ -57,15 +55,10 @@ def noted(data, rng):
 
 
 def fatal(data, rng):
-    """The same; the worker dies of one sample, once or always."""
-    row = number(data, rng)
+    """The same; the worker dies once of one sample."""
+    row = number(rng)
     flag = Path(data["flag"])
-    if row["x"] == data["deadly"] and (data["always"] or not flag.exists()):
+    if row["x"] == data["deadly"] and not flag.exists():
         flag.touch()
         os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
     return row
-
-
-def task(sample=number, data=None):
-    """Of one number a sample."""
-    return Task(sample, data, 7, {"x": "double"}, "numbers")

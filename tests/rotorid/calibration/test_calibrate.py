@@ -15,7 +15,7 @@ from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.commands.calibrate import outcome
-from rotorid.regression import nonlinear, search
+from rotorid.regression import nonlinear
 
 ERRORS = ReadingErrors(0.02, 0.02)
 
@@ -35,6 +35,11 @@ def tabled():
         first, speeds=(100.0, 300.0, 500.0), stiffness=[k, 0.8 * k, 0.7 * k], damping=[2e4, 2.5e4, 2e4]
     )
     return replace(machine(), supports=[table, second])
+
+
+def with_seal():
+    seal = fem.Support(6, ((1e6, 0.0), (0.0, 1e6)), 500.0, kind="seal")
+    return replace(machine(), supports=[*machine().supports, seal])
 
 
 COEFFICIENTS = {
@@ -63,6 +68,11 @@ MASSES = {
     "bearing[2].kxx.offset": 3e6,
     "bearing[1].kyy.offset": 2e6,
 }
+NEGATIVE = {"seal[1].kxx": -8e5, "bearing[1].kxx.offset": -5e6}
+"""Offsets and the stiffness of a seal have either sign."""
+SPLIT = {"bearing[1].kxx": 4e7, "bearing[1].kyy": 6e7, "bearing[2].kxy": 5e6}
+"""Of supports that are alike in x and y: their derivatives couple forward and backward whirl."""
+ALIKE = uniform(10, discs=[fem.Disc(4, 20.0)], supports=[fem.Support(n, 5e7, 1e4) for n in (1, 11)])
 PROBES = {
     "bearing[1].kxx": 4.6e7,
     "probe[a].angle": 5.0,
@@ -84,10 +94,10 @@ def truth_of(runs, values):
     ("rotor", "values", "more"),
     [
         (machine(), COEFFICIENTS, {}),
-        (machine(), COEFFICIENTS, {"free": False}),
+        (with_seal(), NEGATIVE, {}),
+        (ALIKE, SPLIT, {"unbalance": {}}),
         (machine(), COEFFICIENTS, {"free": False, "derivative": 2, "key_phasor": 40.0}),
         (tabled(), SCALES, {"derivative": 1, "planes": {"P": (4, 0.12), "Q": (8, 0.2)}}),
-        (machine(), MASSES, {}),
         (machine(), MASSES, {"free": False}),
         (machine(), COEFFICIENTS, {"weights": ((0, 0), (2e-3, 0), (1e-3j, 0), (-1e-3, 1e-3), (0, 2e-3))}),
         (machine(), PROBES, {"key_phasor": 15.0}),
@@ -187,26 +197,38 @@ def mirrored(k1, k2):
     return rotor, runs.data(runs.readings(rotor), errors=ReadingErrors(0.002, 0.002))
 
 
-def test_the_search_looks_for_another_pair_that_explains_as_well():
-    """The middle does not tell which bearing is the stiffer one."""
+BOTH = ("bearing[1].stiffness", "bearing[2].stiffness")
+
+
+@pytest.mark.parametrize(
+    ("bounds", "start", "ends"),
+    [(None, (4.5e7, 1.8e7), 1), ((3e7, 1e9), (3e7, 1.8e7), 0), ((1e6, 3e7), (2.9e7, 4.5e7), 0)],
+)
+def test_the_search_looks_for_another_pair_that_explains_as_well(bounds, start, ends):
+    """The middle does not tell which bearing is the stiffer one; bounds do."""
     rotor, data = mirrored(4e7, 2e7)
-    unknowns = [Unknown("bearing[1].stiffness", start=4.5e7), Unknown("bearing[2].stiffness", start=1.8e7)]
-    found = calibrate(rotor, unknowns, [data])
+    first, second = (Unknown(path, start=value) for path, value in zip(BOTH, start, strict=True))
+    found = calibrate(rotor, [replace(first, bounds=bounds) if bounds else first, second], [data])
     assert sorted(found.values) == pytest.approx([2e7, 4e7], rel=1e-4)
-    (other,) = found.other_ends
-    assert other == pytest.approx(found.values[::-1], rel=1e-3)
-    assert "other numbers explain the data as well: bearing[1].stiffness = " in found.warnings[-1]
+    assert len(found.other_ends) == ends
+    if ends:
+        assert found.other_ends[0] == pytest.approx(found.values[::-1], rel=1e-3)
+        assert "other numbers explain the data as well: bearing[1].stiffness = " in found.warnings[-1]
+    else:
+        assert (found.values[0] > 3e7) == (bounds[0] == 3e7)
 
 
-@pytest.mark.parametrize("order", [1, -1])
-def test_ends_outside_the_bounds_are_not_told(order):
-    rotor, data = mirrored(4e7, 2e7)
-    bounds = {1: (3e7, 1e9), -1: (1e6, 3e7)}[order]
-    unknowns = [Unknown("bearing[1].stiffness", start=3e7, bounds=bounds)]
-    unknowns += [Unknown("bearing[2].stiffness", start=1.8e7 if order > 0 else 4.5e7)]
-    found = calibrate(rotor, unknowns, [data])
-    assert found.other_ends == ()
-    assert found.values == pytest.approx([4e7, 2e7][::order], rel=1e-4)
+@pytest.mark.full
+def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
+    """Readings of a rotor with another modulus: χ² is too large."""
+    truth = with_parameters(machine(), {"material.youngs_modulus.scale": 0.7})
+    data = Runs().data(Runs().readings(truth), errors=ReadingErrors(0.002, 0.002))
+    found, honest = (calibrate(rotor, [Unknown("bearing[1].kxx")], [data]) for rotor in (machine(), truth))
+    assert (found.explained, honest.explained) == (False, True)
+    assert found.rotor.calibration.needs_trial_run
+    assert found.rotor.calibration.lack_of_fit == found.lack_of_fit > 0.002
+    assert honest.lack_of_fit == 0
+    assert found.std[0] > 3 * honest.std[0]
 
 
 def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
@@ -223,29 +245,16 @@ def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     found = calibrate(rotor, unknowns, [data])
     assert np.isnan(found.values).all()
     assert np.isnan(found.std).all()
-    told = outcome(found, {}).to_dict()["parameters"]
-    assert [told[unknown.path]["value"] for unknown in unknowns] == [None, None]
+    parameters = outcome(found, {}).to_dict()["parameters"]
+    assert [parameters[unknown.path]["value"] for unknown in unknowns] == [None, None]
     assert "bearing[1].stiffness" in found.undetermined
     (k, p) = found.fit.estimate.solution
     assert k * p / (k + p) == pytest.approx(4e7 * 1e8 / 1.4e8, rel=1e-5)
-    known = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
-    assert known.values == pytest.approx([4e7, 1e8], rel=1e-4)
-    assert known.std[1] == pytest.approx(1e6, rel=1e-3)
-    assert known.std[0] > 1e6 * (4e7 / 1e8) ** 2  # what the pedestal leaves open, and the data's own
-    assert known.undetermined == ""
-
-
-def test_what_the_sensors_do_not_see_has_no_number():
-    """A weight that acts in x alone on supports that couple nothing: y is not moved."""
-    rotor = uniform(10, supports=[fem.Support(n, ((4e7, 0.0), (0.0, 6e7)), 1e3) for n in (1, 11)])
-    runs = Runs(sensors={"x": (4, 0.0)}, unbalance={})
-    data = runs.data(runs.readings(rotor), errors=ERRORS)
-    found = calibrate(
-        rotor, [Unknown("bearing[1].kxx"), Unknown("bearing[1].kyy")], [data], side_starts=False
-    )
-    assert found.values[0] == pytest.approx(4e7, rel=1e-6)
-    assert np.isnan(found.values[1])
-    assert np.isnan(found.std[1])
+    with_prior = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
+    assert with_prior.values == pytest.approx([4e7, 1e8], rel=1e-4)
+    assert with_prior.std[1] == pytest.approx(1e6, rel=1e-3)
+    assert with_prior.std[0] > 1e6 * (4e7 / 1e8) ** 2  # what the pedestal leaves open, and the data's own
+    assert with_prior.undetermined == ""
 
 
 def test_a_number_at_its_bound_has_no_deviation_and_says_so():
@@ -260,22 +269,10 @@ def test_a_number_at_its_bound_has_no_deviation_and_says_so():
     assert any(w.startswith("bearing[1].kxx stands at its bound") for w in found.warnings)
 
 
-def test_numbers_that_may_be_negative_are_not_stopped_at_zero():
-    """Offsets and the stiffness of a seal have either sign."""
-    seal = fem.Support(6, ((1e6, 0.0), (0.0, 1e6)), 500.0, kind="seal")
-    rotor = replace(machine(), supports=[*machine().supports, seal])
-    values = {"seal[1].kxx": -8e5, "bearing[1].kxx.offset": -5e6}
-    runs = Runs()
-    data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
-    found = calibrate(rotor, [Unknown(path) for path in values], [data])
-    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
-    assert found.fit.at_bounds == ()
-
-
 def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
     once = functools.partial(nonlinear.nonlinear_least_squares, max_iterations=1)
     monkeypatch.setattr(sys.modules[calibrate.__module__], "nonlinear_least_squares", once)
-    monkeypatch.setattr(search, "POLISH", 0)
+    monkeypatch.setattr(nonlinear, "POLISH", 0)
     runs = Runs()
     data = runs.data(runs.readings(machine()), errors=ERRORS)
     far = [Unknown("bearing[1].kxx", start=1e7), Unknown("bearing[2].kyy", start=1e8)]
@@ -287,33 +284,11 @@ def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypa
     assert found.rotor.calibration.needs_trial_run
 
 
-@pytest.mark.full
-def test_a_model_that_lacks_something_says_so_and_widens_its_intervals():
-    """Readings of a rotor with another modulus: χ² is too large."""
-    truth = with_parameters(machine(), {"material.youngs_modulus.scale": 0.7})
-    runs = Runs()
-    tight = ReadingErrors(0.002, 0.002)
-    data = runs.data(runs.readings(truth), errors=tight)
-    found = calibrate(machine(), [Unknown("bearing[1].kxx")], [data])
-    honest = calibrate(truth, [Unknown("bearing[1].kxx")], [data])
-    assert not found.explained
-    assert honest.explained
-    assert found.rotor.calibration.needs_trial_run
-    assert found.rotor.calibration.lack_of_fit == found.lack_of_fit > 0.002
-    assert honest.lack_of_fit == 0
-    assert found.std[0] > 3 * honest.std[0]
-    assert found.std[0] ** 2 == pytest.approx(
-        found.fit.estimate.solution_covariance[0, 0] * found.chi_square / found.dof
-    )
-
-
 @pytest.mark.parametrize(
     ("paths", "said"),
     [
         (("bearing[1].kxx", "bearing[DE].kxx"), "are the same number"),
-        (("bearing[1].kxx", "bearing.kxx"), "are the same number"),
         (("bearing[1].kxx", "bearing[1].stiffness.scale"), "are the same number"),
-        (("bearing[1].kxx", "bearing[1].kxx.offset"), "are the same number"),
         (("disc[1].mass", "disc[1].scale"), "are the same number"),
         (("bearing[1].kxx.scale", "bearing.kxx.offset"), "adds to more numbers than bearing[1].kxx.scale"),
         (("bearing[9].kxx",), "the bearing '9' is not known"),
@@ -352,16 +327,6 @@ def test_unbalances_that_the_readings_do_not_tell_apart_have_no_number():
     assert np.isnan(found.unbalance_std[0]).all()
     assert found.dof == 2 * 2 * 3 + 1 - 4 - 1
     assert "do not determine the unbalance of node 3, node 6 and node 9: name fewer" in found.warnings[-1]
-
-
-def test_supports_alike_in_x_and_y_may_turn_out_to_differ():
-    """Of a symmetric rotor the derivatives by kxx alone couple forward and backward whirl."""
-    rotor = uniform(10, discs=[fem.Disc(4, 20.0)], supports=[fem.Support(n, 5e7, 1e4) for n in (1, 11)])
-    values = {"bearing[1].kxx": 4e7, "bearing[1].kyy": 6e7, "bearing[2].kxy": 5e6}
-    runs = Runs(unbalance={})
-    data = runs.data(runs.readings(with_parameters(rotor, values)), errors=ERRORS)
-    found = calibrate(rotor, [Unknown(path) for path in values], [data])
-    assert found.values == pytest.approx(list(values.values()), rel=1e-6)
 
 
 def test_errors_count_what_numbers_taken_as_exact_may_be_off():

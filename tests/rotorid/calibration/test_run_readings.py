@@ -23,8 +23,7 @@ def coefficients_of(runs, rotor):
     return np.moveaxis(each.readings(rotor), 0, -1)
 
 
-@pytest.mark.parametrize("derivative", [0, 1, 2])
-@pytest.mark.parametrize("free", [True, False])
+@pytest.mark.parametrize(("derivative", "free"), [(0, True), (1, False), (2, False)])
 def test_coefficients_are_those_of_the_dense_rotor(derivative, free):
     """Radii, the clock of the key phasor, quantities, probes that stand elsewhere and read more."""
     runs = Runs(derivative=derivative, planes={"P": (4, 0.12), "Q": (8, 0.3)}, key_phasor=70.0, free=free)
@@ -145,17 +144,7 @@ def test_errors_that_are_assumed_are_not_called_stated():
     assert runs.data(exact * noise, errors=ERRORS).rows(W).stated
 
 
-def test_unbalances_of_the_bare_rotor_are_found_beside():
-    runs = Runs(free=False, weights=((0, 0),), planes={"P": (4, 1.0), "Q": (8, 1.0)})
-    data = runs.data(runs.readings(machine()), errors=ERRORS)
-    W, _ = data.coefficients(machine(), {})
-    r, _, u = data.rows(W).residual(W)
-    assert u == pytest.approx(list(runs.unbalance.values()), rel=1e-8)
-    assert abs(r).max() < 1e-6
-
-
-@pytest.mark.parametrize("tables", [False, True])
-@pytest.mark.parametrize("tilting", [0.0, 1e5])
+@pytest.mark.parametrize(("tables", "tilting"), [(False, 0.0), (True, 1e5)])
 def test_a_bow_is_found_in_metres(tables, tilting):
     """Of the lowest bending shape on the supports: from M and K of the dense rotor in one plane."""
     k = 5e7
@@ -174,30 +163,7 @@ def test_a_bow_is_found_in_metres(tables, tilting):
     assert u[:2] == pytest.approx(list(runs.unbalance.values()), rel=1e-6)
     assert abs(u[2]) == pytest.approx(30e-6, rel=1e-6)
     assert abs(r).max() < 1e-4
+    with pytest.raises(ValueError, match="has 22 shapes of a bow, not 99"):
+        replace(data, bow=99).coefficients(rotor, {})
     if not tilting:  # at rest it lies in its supports as it is bent
         assert abs(bent(rotor, bow, 1e-3)[0][[0, -1]]).max() < 1e-8
-
-
-def test_the_gradient_of_the_projected_residuals_is_exact():
-    data, _ = noisy(Runs(free=False))
-    data, rotor = replace(data, bow=1), machine()
-    start = {"bearing[1].kxx": 4.4e7, "bearing[2].cyy.scale": 1.1, "material.youngs_modulus.scale": 0.97}
-    start |= {"probe[a].angle": 2.0}
-    rows = data.rows(data.coefficients(rotor, start)[0])
-
-    def cost(values):
-        return float(np.sum(rows.residual(data.coefficients(rotor, values)[0])[0] ** 2)) / 2
-
-    W, dW = data.coefficients(rotor, start, list(start))
-    gradient = rows.jacobian(W, dW).T @ rows.residual(W)[0]
-    for (path, value), own in zip(start.items(), gradient, strict=True):
-        h = 1e-4 * abs(value)
-        expected = (cost({**start, path: value + h}) - cost({**start, path: value - h})) / (2 * h)
-        assert own == pytest.approx(expected, rel=1e-4), path
-
-
-def test_more_shapes_of_a_bow_than_the_shaft_has_are_refused():
-    runs = Runs(free=False)
-    data = runs.data(runs.readings(machine()), bow=99)
-    with pytest.raises(ValueError, match="has 22 shapes of a bow, not 99"):
-        data.coefficients(machine(), {})

@@ -61,7 +61,6 @@ def test_what_is_not_known_exactly_comes_beside():
     ("estimate", "taken"),
     [
         ("bearing[NDE].pedestal_stiffness_x", "bearing[2].pedestal_stiffness.scale"),
-        ("bearing[2].pedestal_stiffness.scale", "bearing[2].pedestal_stiffness.scale"),
         ("disc[1].mass", "disc[1].scale"),
         ("disc.scale", "disc[2].scale"),
         ("material.youngs_modulus", "material.youngs_modulus.scale"),
@@ -79,7 +78,6 @@ def test_a_number_that_is_estimated_is_not_a_second_time_beside(estimate, taken)
         ("bearing[1].kxx=1e6", (4e7, 1e6)),
         ("bearing[1].kxx=7e7+-20%", (7e7, 1.4e7)),
         ("k=7e7±1e6", (7e7, 1e6)),
-        ("bearing[*].k*=5%", (4e7, 2e6)),
         ("bearing[*].*=5%", (4e7, 2e6)),
         ({"bearing[1].kxx": "5%"}, (4e7, 2e6)),
     ],
@@ -102,11 +100,9 @@ def test_a_prior_without_its_suffix_is_of_the_scale():
     [
         ("bearing[1].kxx", (0.0, None)),
         ("bearing[1].kxy", (None, None)),
-        ("bearing[1].kxx.offset", (None, None)),
         ("bearing[1].kxx.scale", (1e-3, None)),
         ("disc[1].mass", (0.0, None)),
         ("seal[1].kxx", (None, None)),
-        ("seal[1].cxx.scale", (1e-3, None)),
         ("material.density", (7.8, None)),
     ],
 )
@@ -121,21 +117,15 @@ def test_limits(path, expected):
     ("estimate", "said"),
     [
         ("", "'' is no parameter"),
-        ("bearing[1].kxx,", "'' is no parameter"),
-        ("k1", "'k1' is no parameter"),
         ("bearing[1.kxx", "is no parameter"),
         ("bearing[7].kxx", "the bearing '7' is not known"),
         ("bearing[1].kzz", "'kzz' is not known"),
-        ("bearing[DX].*", "the bearing 'DX' is not known"),
         ("seal[*].*", "the rotor has no seal"),
         ("disc[*].*", "of a disc, 'kxx' is not known"),
         ("probe[z].angle", "the probe 'z' is not known"),
-        ("bearing[1].kxx,bearing[1].kxx", "bearing[1].kxx stands twice"),
         ("bearing[*].kxx,bearing[2].kxx", "bearing[2].kxx stands twice"),
-        ("bearing[1].kxx,bearing[DE].kxx", "are the same number of the rotor"),
         ("bearing[1].kxx,bearing[1].kxx.scale", "are the same number of the rotor"),
         ("k=bearing[*].kxx", "one name for 2 numbers"),
-        ("k=bearing[1].kxx,k=bearing[2].kxx", "two numbers are called k"),
         ("bearing[2].kxx=bearing[1].kxx,bearing[2].kxx", "two numbers are called bearing[2].kxx"),
     ],
 )
@@ -157,11 +147,7 @@ def test_supports_without_any_coefficient():
     [
         *(
             (f"bearing[1].kxx={text}", "a standard deviation is needed")
-            for text in ("", "x", "0", "-1", "nan", "20%%")
-        ),
-        *(
-            (f"bearing[1].kxx={text}", "a standard deviation is needed")
-            for text in ("7e7+-", "+-5%", "1+-2+-3", "1e400")
+            for text in ("", "x", "0", "-1", "nan", "20%%", "7e7+-", "+-5%", "1+-2+-3", "1e400")
         ),
         ("bearing[1].kxx", "is no NAME=VALUE"),
         ("=5%", "is no NAME=VALUE"),

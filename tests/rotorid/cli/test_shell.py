@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from rotorid.files.table_writing import write_files
+from rotorid.files.disk import write_files
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"

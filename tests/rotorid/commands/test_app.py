@@ -71,7 +71,7 @@ def test_without_a_calibration_nothing_is_there():
     plain = sample_data() / "rotor23.csv"
     found = critical(plain)
     assert "critical_speeds_std_rad_s" not in found.document
-    assert "±" not in found.answer.found
+    assert "±" not in found.answer.numbers
     assert "frequencies_std_rad_s" not in campbell(plain, CampbellOptions(speeds="50,100")).document
     answer = response(plain, {12: 1e-3}, ResponseOptions(speeds="50,100"))
     assert "amplitude_std_m" not in answer.document

@@ -22,7 +22,7 @@ from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
 from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.files import read_job
-from rotorid.files.input_file import each_file_once
+from rotorid.files.disk import each_file_once
 from rotorid.report.options import changed, checked, plain
 from rotorid.report.outcome import options_of
 from rotorid.samples import sample_data

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from run_ups import drawn, table
 
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.files import read_modes, read_rotor
 from rotorid.samples import sample_data

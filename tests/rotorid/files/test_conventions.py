@@ -11,7 +11,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 from balancing import Labels, correct, estimate_influence
 from balancing.conventions import opposite
 from rotorid.files import job_from_files, read_influence, read_job, write_influence
-from rotorid.files.conventions import STATED_ANGLES, check_angles, resolve_angles
+from rotorid.files.conventions import STATED_ANGLES, resolve_angles
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'
@@ -149,7 +149,7 @@ def test_words():
         assert {resolve_angles(word, rotation) for word in STATED_ANGLES[:2]} == set(STATED_ANGLES[:2])
     assert resolve_angles("clockwise", "counter-clockwise") == "against rotation"
     with pytest.raises(ValueError, match="'clockwise' or 'counter-clockwise', not 'left'"):
-        check_angles("left")
+        resolve_angles("left", None)
     for bad in (
         {"phase": "late"},
         {"angles": "clockwise"},

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rotorid.files import units
-from rotorid.files.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
+from rotorid.files.cells import NotANumber, parse_number, thousands_or_decimals
 from rotorid.files.problems import InputError, Problem, Problems
 
 
@@ -27,24 +27,16 @@ def test_plain_numbers(text, value):
     ("text", "words"),
     [
         ("", "a number"),
-        ("abc", "a number"),
-        ("nan", "a finite number"),
         ("NaN", "a finite number"),
-        ("inf", "a finite number"),
         ("-Infinity", "a finite number"),
         ("1e999", "a finite number"),
         ("1.#QNAN", "a finite number"),
         ("1 234", "thousands"),
-        ("1,234.5", "thousands"),
         ("1'234", "thousands"),
         ("2.5 g", "unit in the header"),
-        ("30°", "unit in the header"),
-        ("5%", "unit in the header"),
         ("−5", "minus sign"),
         ("١", "a number"),
-        ("0x10", "a number"),
         ("1_000", "a number"),
-        ("1e", "a number"),
         (".", "a number"),
     ],
 )
@@ -75,18 +67,11 @@ def test_every_float_is_read_back_exactly(value):
     [
         (units.LENGTH["mm"], 318.0, 0.318),
         (units.LENGTH["mil"], 1000.0, 0.0254),
-        (units.LENGTH["in"], 1.0, 0.0254),
-        (units.MASS["g"], 2.5, 0.0025),
-        (units.MASS["mg"], 1e6, 1.0),
         (units.MASS["oz"], 16.0, 0.45359237),
-        (units.MASS["lb"], 1.0, 0.45359237),
         (units.UNBALANCE["g_mm"], 1.0, 1e-6),
         (units.UNBALANCE["oz_in"], 1.0, 0.45359237 / 16 * 0.0254),
         (units.SPEED["rpm"], 60.0, 2 * math.pi),
-        (units.SPEED["Hz"], 1.0, 2 * math.pi),
-        (units.SPEED["rad_s"], 7.0, 7.0),
         (units.ANGLE["deg"], 180.0, math.pi),
-        (units.VIBRATION["um"], 1.0, 1e-6),
         (units.VIBRATION["um_pp"], 2.0, 1e-6),
         (units.VIBRATION["mm_s_rms"], 1.0, math.sqrt(2) * 1e-3),
         (units.VIBRATION["in_s"], 1.0, 0.0254),
@@ -99,32 +84,17 @@ def test_units_in_si(unit, shown, inside):
     assert inside * unit.scale == pytest.approx(shown, rel=1e-15)
 
 
-def test_g_is_an_acceleration_for_vibrations_and_a_mass_for_weights():
-    assert units.vibration("g").kind == "acceleration"
-    assert units.weight("g").kind == "mass"
-
-
-def test_every_known_vibration_unit_of_the_interface():
-    names = ("m", "mm", "um", "mil", "in", "mm_s", "in_s", "g")
-    for name in (base + suffix for base in names for suffix in ("", "_pp", "_rms")):
-        assert units.vibration(name).name == name
-        assert not units.vibration(name).kind.startswith("label")
+def test_usual_spellings_of_units():
+    assert units.vibration("µm_pp") == units.vibration("μm_pp") == units.VIBRATION["um_pp"]
+    assert units.vibration("mm/s_rms") is units.VIBRATION["mm_s_rms"]
+    assert units.weight("g·mm") is units.UNBALANCE["g_mm"]
+    assert (units.vibration("g").kind, units.weight("g").kind) == ("acceleration", "mass")
 
 
 def test_any_other_vibration_unit_is_a_label():
     for name in ("", "V", "div", "mV_rms"):
         unit = units.vibration(name)
         assert (unit.name, unit.scale) == (name, 1.0)
-
-
-def test_usual_spellings_of_units():
-    assert units.vibration("mm/s_rms") is units.VIBRATION["mm_s_rms"]
-    assert units.weight("g·mm") is units.UNBALANCE["g_mm"]
-    assert units.one_of(units.SPEED)("rad/s") is units.SPEED["rad_s"]
-
-
-def test_both_micro_signs_mean_micro():
-    assert units.vibration("µm_pp") == units.vibration("μm_pp") == units.VIBRATION["um_pp"]
 
 
 @pytest.mark.parametrize(("name", "words"), [("MM", "written mm"), ("um_pk", r"um_pp \(peak to peak\)")])

@@ -12,7 +12,7 @@ from balancing import ReadingErrors, estimate_influence, refine
 from rotorid.files import read_job, read_trials
 from rotorid.files.cells import Shown
 from rotorid.files.columns import written_steps
-from rotorid.files.slow_roll import SlowRoll, subtract_slow_roll
+from rotorid.files.further_runs import subtract_slow_roll
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_check_runs_keep_theirs(trials, monkeypatch):
 def test_slow_roll_turns_the_steps(trials, ratio):
     """Amplitude and phase are rounded along and across the measured reading, whatever is left of it."""
     S = ratio * trials.readings[0, 0, 0]
-    left = subtract_slow_roll(trials, SlowRoll(trials.sensors, S))
+    left = subtract_slow_roll(trials, S)
     assert np.isfinite(left.steps).all()
     for c in range(2):
         whole, now = trials.readings[0, 0, 0, c], left.readings[0, 0, 0, c]

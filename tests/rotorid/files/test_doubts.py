@@ -60,7 +60,10 @@ def test_many_runs_with_gaps_are_counted(tmp_path):
     with pytest.raises(InputError) as caught:
         read_trials(write_csv(tmp_path / "runs.csv", runs), None)
     problems = caught.value.problems
-    assert "readings of run 'r0' at 110 rpm, as other runs have; its nearest speed" in problems[0].expected
+    assert (
+        "readings of run 'r0' at 110 rpm, as every run needs at every speed; its nearest speed"
+        in problems[0].expected
+    )
     assert len(problems) == 20
 
 
@@ -100,7 +103,7 @@ def test_merged_speeds_are_said(tmp_path, files):
     path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "speed_rpm", 1003))
     path = write_csv(path, replaced(replaced(RUNS, 2, "speed_rpm", 1003), 3, "speed_rpm", 1003))
     [words] = read_trials(path, files[1]).warnings
-    assert words == "speeds of different runs within 0.5 % count as one: 1000, 1003 as 1001 rpm"
+    assert words == "speeds within 0.5 % count as one: 1000, 1003 as 1001 rpm"
     assert words in correct(estimate_influence(read_trials(path, files[1]))).warnings
 
 

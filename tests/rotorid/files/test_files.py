@@ -33,15 +33,10 @@ PADDED = "".join(line + ";;;\n" for line in EUROPE.splitlines())
 SPACED = EUROPE.replace(";7,2;", ";\u00a07,2\u00a0;").replace("speed_rpm", "speed_rpm\u00a0")
 DIALECTS = {
     "utf-8 with BOM": COMMA.encode("utf-8-sig"),
-    "CRLF": COMMA.replace("\n", "\r\n").encode(),
     "CR": COMMA.replace("\n", "\r").encode(),
-    "no newline at the end": COMMA.rstrip().encode(),
-    "semicolons": csv_text(RUNS, ";").encode(),
     "semicolons, decimal comma": EUROPE.encode(),
-    "sep=;": ("sep=;\r\n" + EUROPE).encode(),
-    "sep=; with BOM": ("sep=;\r\n" + EUROPE).encode("utf-8-sig"),
+    "sep=;": ("sep=;\r\n" + EUROPE).encode("utf-8-sig"),
     "sep=,": ("sep=,\n" + COMMA).encode(),
-    "tabs": csv_text(RUNS, "\t").encode(),
     "Unicode text": csv_text(RUNS, "\t").replace("\n", "\r\n").encode("utf-16"),
     "UTF-16, big endian": ("\ufeff" + COMMA).encode("utf-16-be"),
     "trailing columns": PADDED.encode(),
@@ -92,58 +87,51 @@ def test_an_8_bit_encoding_is_recognised_and_named(tmp_path, weights, plain, enc
 
 
 BAD_FILES = {
-    "empty": (b"", "the file is empty"),
-    "blank": (b"\n \r\n\n", "the file is empty"),
-    "only a mark": (b"\xef\xbb\xbf", "the file is empty"),
-    "only comments": (b"# nothing\n;;;\n", "the file is empty"),
-    "binary": (bytes(range(256)), "this one is neither"),
-    "binary without NUL": (b"\x01\x02\x03\x04,\x05", "this one is neither"),
-    "utf-16 cut off": (b"\xff\xfea\x00b", "this one is neither"),
-    "renamed xlsx": (b"PK\x03\x04 and so on", "name it .xlsx"),
-    "renamed xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old workbook"),
-    "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", "this one is neither"),
+    "empty.csv": (b"", "the file is empty"),
+    "blank.csv": (b"\xef\xbb\xbf\n \r\n# nothing\n;;;\n", "the file is empty"),
+    "binary.csv": (bytes(range(256)), "this one is neither"),
+    "cut off.csv": (b"\xff\xfea\x00b", "this one is neither"),
+    "renamed.csv": (b"PK\x03\x04 and so on", "name it .xlsx"),
+    "xls.csv": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old workbook"),
+    "text.xlsx": (COMMA.encode(), "this is none"),
+    "broken.xlsx": (b"PK\x03\x04 broken", "an intact Excel workbook"),
+    "folder.csv": (None, "a file, not a folder"),
 }
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
 def test_files_that_are_no_tables(tmp_path, weights, name):
     data, words = BAD_FILES[name]
-    path = tmp_path / "runs.csv"
-    path.write_bytes(data)
-    the_only(complaints(read_trials, path, weights), "runs.csv", None, None, None, words)
+    (tmp_path / name).mkdir() if data is None else (tmp_path / name).write_bytes(data)
+    the_only(complaints(read_trials, tmp_path / name, weights), name, None, None, None, words)
 
 
-def test_a_header_without_rows(tmp_path, weights):
-    path = write_csv(tmp_path / "runs.csv", RUNS[:1])
-    the_only(complaints(read_trials, path, weights), "runs.csv", 1, None, None, "rows below the header")
-
-
-def test_missing_files_and_folders(tmp_path, weights):
+def test_missing_files_and_sheets(tmp_path, weights):
     write_csv(tmp_path / "runs.csv", RUNS)
-    found = complaints(read_trials, tmp_path / "rusn.csv", weights)
-    the_only(found, "rusn.csv", None, None, None, "a file that exists (did you mean 'runs.csv'?)")
-    (tmp_path / "folder.csv").mkdir()
-    found = complaints(read_trials, tmp_path / "folder.csv", weights)
-    the_only(found, "folder.csv", None, None, None, "a file, not a folder")
-    found = complaints(read_trials, tmp_path / "none" / "runs.xlsx", weights)
-    the_only(found, "runs.xlsx", None, None, None, "a file that exists")
+    write_book(tmp_path / "two.xlsx", {"one": RUNS, "two": RUNS})
+    for name, words in (
+        ("rusn.csv", "a file that exists (did you mean 'runs.csv'?)"),
+        ("none/runs.xlsx", "a file that exists"),
+        ("two.xlsx", "a sheet 'runs'; the sheets are one, two"),
+    ):
+        found = complaints(read_trials, tmp_path / name, weights)
+        the_only(found, name.rpartition("/")[2], None, None, None, words)
     assert complaints(read_trials, "a\0b.csv", weights)
 
 
-def test_a_file_that_is_no_workbook(tmp_path, weights):
-    path = tmp_path / "runs.xlsx"
-    path.write_text(COMMA)
-    the_only(complaints(read_trials, path, weights), "runs.xlsx", None, None, None, "this is none")
-    path.write_bytes(b"PK\x03\x04 broken")
-    the_only(
-        complaints(read_trials, path, weights), "runs.xlsx", None, None, None, "an intact Excel workbook"
-    )
-
-
-def test_a_workbook_without_the_sheet(tmp_path, weights):
-    path = write_book(tmp_path / "runs.xlsx", {"one": RUNS, "two": RUNS})
-    found = complaints(read_trials, path, weights)
-    the_only(found, "runs.xlsx", None, None, None, "a sheet 'runs'; the sheets are one, two")
+@pytest.mark.parametrize(
+    ("text", "row", "value", "words"),
+    [
+        (csv_text(RUNS[:1]), 1, None, "rows below the header"),
+        ("sep=|\n" + COMMA, 1, "sep=|", "sep=; or sep=,"),
+        (COMMA.replace("initial,1000,A", '"initial,1000,A'), 2, None, "quotes that are closed"),
+    ],
+)
+def test_tables_that_cannot_be_split(tmp_path, weights, text, row, value, words):
+    (tmp_path / "runs.csv").write_text(text)
+    first, *_ = complaints(read_trials, tmp_path / "runs.csv", weights)
+    assert (first.row, first.column, first.value) == (row, None, value)
+    assert words in first.expected
 
 
 @pytest.mark.parametrize(
@@ -156,7 +144,6 @@ def test_a_workbook_without_the_sheet(tmp_path, weights):
         ("2.5 um", "2.5 um", "a number in um_pp, as the heading"),
         ("9,487", "9,487", "comma may separate thousands"),
         ("", "", "a number"),
-        (None, "", "a number"),
     ],
 )
 def test_cells_of_a_workbook_that_are_no_numbers(tmp_path, weights, value, shown, words):
@@ -165,22 +152,17 @@ def test_cells_of_a_workbook_that_are_no_numbers(tmp_path, weights, value, shown
     assert "sheet 'runs'" in found.file
 
 
-def test_a_number_written_as_text_in_a_workbook_is_read(tmp_path, weights, plain):
-    path = write_book(tmp_path / "runs.xlsx", {"runs": replaced(RUNS, 2, "amplitude_um_pp", "7.2")})
-    assert_same(read_trials(path, weights), plain)
-
-
 def test_decimal_commas_in_a_comma_separated_file_are_explained(tmp_path, weights):
     path = tmp_path / "runs.csv"
     path.write_text(COMMA.replace("7.2", "7,2"))
     problems = complaints(read_trials, path, weights)
-    assert [(p.row, p.value) for p in problems if "need ; between" in p.expected] == [(2, "6 cells")]
+    assert [(p.row, p.value) for p in problems if "need ; between" in p.expected] == [(2, "238")]
     path.write_text(COMMA.replace("7.2", '"7,2"'))
     words = "in a comma-separated file a comma is not a decimal sign"
     the_only(complaints(read_trials, path, weights), "runs.csv", 2, "amplitude_um_pp", "7,2", words)
 
 
-@pytest.mark.parametrize("written", ["1.234,5", "1 234,5", "1\u00a0234,5", "1'234,5", "1.234"])
+@pytest.mark.parametrize("written", ["1.234,5", "1\u00a0234,5", "1.234"])
 def test_thousands_separators_are_not_guessed(tmp_path, weights, written):
     path = tmp_path / "runs.csv"
     path.write_text(EUROPE.replace("13,5", written), encoding="utf-8")
@@ -195,14 +177,6 @@ def test_rows_are_counted_as_a_spreadsheet_shows_them(tmp_path, weights):
     for text, row in ((bad, 3), ("# a\n\n" + bad, 5), ("sep=,\n" + bad, 3), (bad.replace("\n", "\r\n"), 3)):
         path.write_bytes(text.encode())
         the_only(complaints(read_trials, path, weights), "runs.csv", row, "amplitude_um_pp", "x", "a number")
-
-
-def test_unclosed_quotes_and_line_breaks_in_cells(tmp_path, weights):
-    path = tmp_path / "runs.csv"
-    path.write_text(COMMA.replace("initial,1000,A", '"initial,1000,A'))
-    problems = complaints(read_trials, path, weights)
-    assert problems[0].row == 2
-    assert "quotes that are closed" in problems[0].expected
 
 
 def test_values_below_no_name(tmp_path, weights):
@@ -223,13 +197,7 @@ def test_one_wrong_heading_is_one_message(tmp_path, weights, column, new):
     assert str(caught.value).count("\n") == 0
 
 
-def test_wrong_sep_line(tmp_path, weights):
-    path = tmp_path / "runs.csv"
-    path.write_text("sep=|\n" + COMMA)
-    the_only(complaints(read_trials, path, weights), "runs.csv", 1, None, "sep=|", "sep=; or sep=,")
-
-
-@pytest.mark.parametrize("name", ["=SUM(A1)", "@home", "a\u200bb", "bell\u2028x"])
+@pytest.mark.parametrize("name", ["=SUM(A1)", "a\u200bb"])
 def test_names_that_are_formulas_or_hide_characters(tmp_path, weights, name):
     path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "sensor", name))
     assert [(p.row, p.column) for p in complaints(read_trials, path, weights)][:1] == [(2, "sensor")]

@@ -81,7 +81,7 @@ def test_modes_of_a_file_are_those_of_the_masses(tmp_path, cli):
     ("changed", "words"),
     [
         ({"func_type": 1, "data": np.ones(401)}, "frequency responses (function type 4) in datasets 58"),
-        ({"ordinate_spec_data_type": 0}, "responses of a displacement, velocity or acceleration by a force"),
+        ({"ordinate_spec_data_type": 0}, "displacements, velocities or accelerations by a force"),
         ({"ordinate_axis_units_lab": "furlong"}, "found 'furlong by no unit'"),
     ],
 )
@@ -92,22 +92,18 @@ def test_what_is_no_response_is_refused(tmp_path, changed, words):
     assert words in str(caught.value)
 
 
-def test_responses_to_two_forces_are_refused(tmp_path):
+def test_responses_to_two_forces_and_a_file_without_its_end_are_refused(tmp_path):
     path = write(tmp_path / "f.uff", receptances())
+    whole = path.read_bytes()
     write(path, receptances(0), ref_node=1)
-    with pytest.raises(InputError, match="of each point, to one force"):
-        read_amplitudes(path)
+    for data, words in ((path.read_bytes(), "of each point, to one force"), (whole[:-100], "a whole file")):
+        path.write_bytes(data)
+        with pytest.raises(InputError, match=words):
+            read_amplitudes(path)
 
 
 def test_without_the_extra_it_is_said_how_to_install_it(tmp_path, monkeypatch):
     path = write(tmp_path / "f.uff", receptances())
     monkeypatch.setitem(sys.modules, "pyuff", None)
     with pytest.raises(InputError, match="pip install pyuff"):
-        read_amplitudes(path)
-
-
-def test_a_file_without_its_end_is_refused(tmp_path):
-    path = write(tmp_path / "f.uff", receptances())
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(InputError, match="a whole file"):
         read_amplitudes(path)

@@ -12,9 +12,7 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 
-from rotorid.base.text import listing
 from rotorid.files import InputError, read_job, read_trials
-from rotorid.files.runs import COLUMNS
 
 UNITS_ROW = """\
 run,speed,sensor,amplitude,phase
@@ -237,8 +235,6 @@ def test_the_same_as_a_sheet(tmp_path, name):
     assert_same(read_trials(tmp_path / "export.xlsx", weights, phase="lag"), tidy)
 
 
-NAMES = listing([name for column in COLUMNS for name in column.names], "and")
-KNOWN = f"a known column: {NAMES}; remarks go into 'note'"
 VECTOR = "expected amplitude and phase, unmistakable as 6.93 @ 98°"
 EXPLAINED = {
     "radians or degrees": (
@@ -323,10 +319,6 @@ EXPLAINED = {
         "runs.csv, row 8, column Amplitude (µm pk-pk): found '4,9 um', expected a number in um_pp, as the "
         "heading says",
     ),
-    "a vector of a weight": (
-        WIDE_VECTORS.replace("um pp;um pp", "um pp;g").replace("B", "Trial weight"),
-        f"runs.csv, row 2, column Trial weight (g): found 'Trial weight (g)', expected {KNOWN}",
-    ),
     "thousands": (
         VECTORS.replace("4,9∠", "1.004,9∠"),
         "runs.csv, row 4, column 1X [um pp]: found '1.004,9', expected a number without thousands separators",
@@ -351,57 +343,3 @@ def test_a_phase_that_says_lag_must_be_what_the_job_says(tmp_path):
         assert read(tmp_path, text, phase=phase).conventions.labels.phase == phase
         other = {"lag": "lead", "lead": "lag"}[phase]
         assert f"expected phases that {other}, as the job says" in refused(tmp_path, text, phase=other)
-
-
-GERMAN = """\
-Messung vom 1.5.2024
-Lauf;Drehzahl;Messstelle;Ausschlag;Phase
-initial;1000;A;7,2;238
-initial;1000;B;13,5;296
-trial 1;1000;A;4,9;114
-trial 1;1000;B;9,2;347
-trial 2;1000;A;4,0;79
-trial 2;1000;B;12,0;292
-"""
-NAMED = """
-[columns]
-run = "Lauf"
-speed_rpm = "Drehzahl"
-sensor = "Messstelle"
-amplitude_um_pp = "Ausschlag"
-phase_deg = "Phase"
-"""
-
-
-def test_other_names_of_columns(tmp_path):
-    expected = read(tmp_path, tidy_text("german")).trials
-    job = read(tmp_path, GERMAN, NAMED)
-    assert_same(job.trials, expected)
-    (tmp_path / "check.csv").write_text(tidy_text("german"), encoding="utf-8")
-    slow = "Lauf;Drehzahl;Messstelle;Ausschlag;Phase\nx;200;A;1,5;20\nx;200;B;2,5;30\n"
-    (tmp_path / "slow.csv").write_text(slow, encoding="utf-8")
-    both = read(tmp_path, GERMAN, 'check = "check.csv"\nslow_roll = "slow.csv"\n' + NAMED)
-    np.testing.assert_array_equal(both.check.readings, both.trials.readings)
-    shown = both.trials.labels.vibration(both.slow_roll)
-    np.testing.assert_allclose(shown, [[1.5, 2.5], [20, 30]], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            '"Drehzahl"',
-            '"Drehzal"',
-            "job.toml, key columns.speed_rpm: found 'Drehzal', expected a column of runs.csv (did you mean "
-            "'Drehzahl'?); its columns are Lauf, Drehzahl, Messstelle, Ausschlag and Phase",
-        ),
-        (
-            "speed_rpm",
-            "speed_mph",
-            "job.toml, key columns.speed_mph: found 'Drehzahl', expected a known key (did you mean "
-            "'speed_rpm'?); known are run, speed_rpm, sensor, amplitude, phase_deg and repeat",
-        ),
-    ],
-)
-def test_names_that_do_not_fit_are_explained(tmp_path, old, new, message):
-    assert refused(tmp_path, GERMAN, NAMED.replace(old, new)) == message

@@ -59,31 +59,20 @@ def test_a_model_file_with_everything(model):
     np.testing.assert_allclose(model.x0([2.0, 0.1, 7.0])[:, 0], [7.0, 0.0])
 
 
-def test_without_states_the_outputs_are_functions_of_time(tmp_path):
-    text = '[outputs]\ny = "a*exp(-b*t)"\n[estimate]\na = 1\nb = 2\n'
-    assert read_ode_model(saved(tmp_path, "m.toml", text)).states == ()
-
-
 @each_of(
     ("old", "new", "said"),
     [
         ("-k*x - c*v + u", "-k*x - c*v + w", "state v: .*w is not defined here"),
         ("-k*x - c*v + u", "-kk*x - c*v + u", r"kk is not defined here \(did you mean .k"),
-        ("-k*x - c*v + u", "-k*x - (c*v", "state v: .*parenthesis is never closed"),
         ("-k*x - c*v + u", "__import__('os')", "state v: .*_ cannot stand here"),
         ("[outputs]", "[output]", r"key output: .*did you mean 'outputs'"),
         ('x = "x0"\n', "", "the value of the state x is missing"),
         ('x = "x0"\n', 'x = "u"\n', "initial x: .*u is not defined here"),
-        ("v = 0\n", "vv = 0\n", "the value of the state v is missing"),
         ("k = 2\n", 'k = "two"\n', "key estimate.k: .*a number"),
-        ("k = 2\n", "k = nan\n", "key estimate.k: .*finite"),
         ("c = [0, inf]", "c = [1, 2]", "key bounds: .*of c, .*starting value"),
-        ("c = [0, inf]", "d = [1, 2]", "key bounds: .*names of estimate; d is none"),
         ("c = [0, inf]", "c = [2, 1]", "key bounds: .*lowest, highest"),
-        ('inputs = ["u"]', 'inputs = "u"', "key inputs: .*a list"),
         ('inputs = ["u"]', 'inputs = ["u", "x"]', "input x: x is already a state"),
         ("g = 9.81", "k = 9.81", "known value k: k is already a parameter"),
-        ("g = 9.81", "t = 9.81", "known value t: t is the time"),
         ('y = "x"', "y = true", "key outputs.y: .*in quotes"),
     ],
 )
@@ -95,24 +84,13 @@ def test_complaints_about_a_model_file_name_the_key(tmp_path, old, new, said):
     assert str(path) in message
 
 
-def test_a_model_file_without_parameters_or_states(tmp_path):
-    assert "estimate" in refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", '[states]\nx = "-x"\n')))
-    assert "states" in refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", "[estimate]\na = 1\n")))
-
-
-def test_a_record(tmp_path, model):
-    record = read_record(saved(tmp_path, "r.csv", GOOD), model)
-    np.testing.assert_array_equal(record.t, [0, 0.1, 0.2])
-    np.testing.assert_array_equal(record.outputs["z"], [2, 2.5, 3])
-    np.testing.assert_array_equal(record.inputs["u"], [3, 3.5, 4])
-    assert record.name == str(tmp_path / "r.csv")
-
-
 def test_milliseconds_and_european_excel(tmp_path, model):
     text = "t_ms;u;z;y\n0;1,5;2;3\n100;1,25;2;3\n"
     record = read_record(saved(tmp_path, "r.csv", text), model)
     np.testing.assert_array_equal(record.t, [0, 0.1])
     np.testing.assert_array_equal(record.inputs["u"], [1.5, 1.25])
+    np.testing.assert_array_equal(record.outputs["z"], [2, 2])
+    assert record.name == str(tmp_path / "r.csv")
 
 
 @pytest.mark.parametrize(
@@ -123,17 +101,10 @@ def test_milliseconds_and_european_excel(tmp_path, model):
             "0.1,2,3,4",
             r"row 4, column t_s: found '0.1', expected a time above 0.1 of row 3: sort",
         ),
-        (
-            "0.2,2,3,4",
-            "0.05,2,3,4",
-            r"row 4, column t_s: found '0.05', expected a time above 0.1 of row 3: sort",
-        ),
-        ("0.2,2,3,4", ",2,3,4", r"row 4, column t_s: found nothing"),
         ("0.2,2,3,4", "0.2,,3,4", r"row 4, column y: found nothing .*--allow-missing"),
         ("0.2,2,3,4", "0.2,nan,3,4", r"row 4, column y: found 'nan', expected a finite number"),
         ("0.2,2,3,4", "0.2,2,3,", r"row 4, column u: found nothing"),
         ("t_s,y,z,u", "t_s,y,zz,u", r"column zz: .*did you mean 'z'"),
-        ("t_s,y,z,u", "t,y,z,u", r"column t:"),
         ("t_s,y,z,u", "t_s,y_mm,z,u", r"column y_mm: .*without a unit"),
     ],
 )
@@ -147,6 +118,8 @@ def test_a_missing_column_is_named(tmp_path, model):
     assert "column z" in refusal(lambda: read_record(path, model))
     record = read_record(path, model, allow_missing=True)
     assert set(record.outputs) == {"y"}
+    path = saved(tmp_path, "s.csv", "t_s,u\n0,1\n1,2\n")
+    assert "at least one output" in refusal(lambda: read_record(path, model, allow_missing=True))
 
 
 def test_missing_samples_are_honoured_where_the_user_says_so(tmp_path, model):
@@ -158,11 +131,6 @@ def test_missing_samples_are_honoured_where_the_user_says_so(tmp_path, model):
     assert "column u" in refusal(lambda: read_record(broken, model, allow_missing=True))
     empty = saved(tmp_path, "e.csv", "t_s,y,z,u\n0,,1,2\n1,,2,3\n")
     assert "column y" in refusal(lambda: read_record(empty, model, allow_missing=True))
-
-
-def test_nothing_measured_at_all(tmp_path, model):
-    path = saved(tmp_path, "r.csv", "t_s,u\n0,1\n1,2\n")
-    assert "at least one output" in refusal(lambda: read_record(path, model, allow_missing=True))
 
 
 MATRICES = """
@@ -194,12 +162,9 @@ def test_a_model_of_matrices(tmp_path):
     ("old", "new", "said"),
     [
         ('M = [["m1", 0], [0, 2.0]]', "M = [[1, 2]]", "key M: .*square matrices"),
-        ('M = [["m1", 0], [0, 2.0]]', "", "key M: .*square matrices"),
-        ('M = [["m1", 0], [0, 2.0]]', "M = [[1]]", "key M: .*of one size"),
         ("[-1, 3]]", "[-1, true]]", "key K: .*a number, or an expression"),
         ('["a", "b"]', '["a"]', "key M: .*of one size, with a name for each row"),
         ('b = "cos(t)"', 'b = "cos(w)"', "state v_b: .*w is not defined here"),
-        ('["k + 1", -1]', '["q + 1", -1]', "a possible model: .*q"),
         ("a = 0.5", "c = 0.5", "initial: c is no state"),
         ("[force]", "[states]\nx = 1\n[force]", "equations, matrices or states"),
     ],

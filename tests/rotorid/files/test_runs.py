@@ -136,7 +136,9 @@ def test_speeds_of_different_runs_count_as_one(read):
 def test_speeds_further_apart_than_the_tolerance(bad):
     runs = [RUNS[0], *([line[0], 1000 + n // 2 * 2, *line[2:]] for n, line in enumerate(RUNS[1:]))]
     problems = bad(runs, speed_tolerance_percent=0.1)
-    words = "readings of run 'initial' at 1002 rpm, as other runs have; its nearest speed is 1000 rpm"
+    words = (
+        "readings of run 'initial' at 1002 rpm, as every run needs at every speed; its nearest speed is 1000"
+    )
     assert any(p.column == "speed_rpm" and p.expected.startswith(words) for p in problems)
     assert all("count as one within 0.1 %" in p.expected for p in problems)
 
@@ -150,7 +152,7 @@ def test_a_chain_of_speeds_is_ambiguous(bad):
 def test_two_near_speeds_in_one_run(bad, read):
     close = [*RUNS, *([line[0], 1002, *line[2:]] for line in RUNS[1:])]
     problems = bad(close)
-    assert [(p.row, p.value) for p in problems] == [(8, "1002"), (10, "1002"), (12, "1002")]
+    assert [(p.row, p.value) for p in problems] == [(row, "1002") for row in range(8, 14)]
     assert "one speed: run 'initial' has 1000 as well" in problems[0].expected
     assert len(read(close, speed_tolerance_percent=0).speeds) == 2
 
@@ -257,7 +259,7 @@ def test_equal_rows(bad):
 
 
 def test_a_sensor_missing_in_one_run(bad):
-    words = "a reading of sensor 'B' in run 'trial 1' at 1000 rpm, as other runs have"
+    words = "a reading of sensor 'B' in run 'trial 1' at 1000 rpm, as every run needs at every speed"
     the_only(bad(RUNS[:4] + RUNS[5:]), "runs.csv", None, "sensor", None, words)
 
 

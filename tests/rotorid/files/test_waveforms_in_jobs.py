@@ -19,10 +19,6 @@ def job(tmp_path):
     return tmp_path / "job.toml"
 
 
-def test_neighbouring_speeds_of_sound_records_need_no_word(job):
-    assert read_job(job).trials.warnings == ()
-
-
 def test_what_vectors_say_of_records_is_said_of_a_job(job):
     rate, counts = wavfile.read(job.with_name("as_found.wav"))
     wavfile.write(

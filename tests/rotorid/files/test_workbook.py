@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import io
 import json
-import re
 import shutil
-import zipfile
 
 import numpy as np
 import openpyxl
 import pytest
 from openpyxl.styles import Font
 from tables_data import RUNS, WEIGHTS, write_csv
-from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, as_workbook, differences
+from workbook_jobs import (
+    CHECK,
+    HEAD,
+    PARTS,
+    ROTOR,
+    SAMPLES,
+    SLOW,
+    as_workbook,
+    differences,
+    with_stored_values,
+)
 
 from balancing import correct, estimate_influence
 from rotorid.files import job_from_files, read_job, write_influence
-from rotorid.files.job_excel import NAMED, template_bytes
-from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
 from rotorid.samples import sample_data
 
 DATA = sample_data()
@@ -107,7 +112,7 @@ def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):
     book.create_sheet("results of June")["A1"] = 1
     book.save(path)
     for name in ("done", "again"):  # once more from its own copy
-        with_values(path)
+        with_stored_values(path, [1])
         outcome = cli("balance", path, "--output", folder / f"{name}.xlsx")
         assert outcome.code == 0, outcome.err
         done = openpyxl.load_workbook(folder / f"{name}.xlsx")
@@ -122,26 +127,3 @@ def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):
         assert done.active.title == "results"
         assert done["results"]["A2"].value is not None
         path = folder / f"{name}.xlsx"
-
-
-def with_values(path):
-    """The formula of H2 with a stored value, as Excel saves it."""
-    with zipfile.ZipFile(path) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    sheet = "xl/worksheets/sheet1.xml"
-    parts[sheet] = re.sub(rb"<f>D2\*2</f><v ?/?>(</v>)?", b"<f>D2*2</f><v>1</v>", parts[sheet])
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in parts.items():
-            archive.writestr(name, data)
-
-
-def test_the_columns_of_the_form_are_keys():
-    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
-    for (sheet, first), model in zip(NAMED.items(), (Plane, Sensor), strict=True):
-        names = [cell.value for cell in book[sheet][1] if cell.value not in (first, "note")]
-        assert names
-        known = model.known_keys()
-        assert {model.usual(name) for name in names} <= set(known)
-    of_errors = Errors.known_keys()
-    known = {*JobSettings.known_keys(), *(f"errors.{name}" for name in of_errors)}
-    assert {cell.value for cell in book["settings"]["A"][1:]} <= known

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import datetime
 import io
-import zipfile
 
 import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
 from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, write_book
-from workbook_jobs import differences, filled, rows
+from workbook_jobs import differences, filled, rows, with_stored_values
 
-from balancing import correct, estimate_influence
 from rotorid.files import read_job
-from rotorid.files.job_excel import template_bytes
-from rotorid.samples import sample_data
+from rotorid.files.job_excel import NAMED, template_bytes
+from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
 
-BK = sample_data() / "bk_two_plane"
 FORM = ("runs", "weights", "planes", "sensors", "settings")
 SETTINGS = [["key", "value"], ["phase", "lag"], ["errors.phase_deg", 0.5], ["speed_tolerance_percent", 1]]
 PLANES = [
@@ -37,20 +34,6 @@ def european(table):
     ]
 
 
-def bk(name):
-    lines = (BK / name).read_text(encoding="utf-8").splitlines()
-    header, *body = [line.split(",") for line in lines if not line.startswith("#")]
-    number = {"speed_rpm", "amplitude", "phase_deg", "mass_g", "angle_deg"}
-    return [
-        header,
-        *[[float(c) if h in number else c for h, c in zip(header, row, strict=True)] for row in body],
-    ]
-
-
-def solved(job):
-    return correct(estimate_influence(job.trials)).weights
-
-
 def test_the_form_has_headers_explanations_and_choices():
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
     assert tuple(book.sheetnames) == (*FORM, "notes")
@@ -67,25 +50,15 @@ def test_the_form_has_headers_explanations_and_choices():
         keys = names if name != "settings" else [cell.value for cell in book["settings"]["A"][1:]]
         assert {(name, key) for key in keys} <= set(notes)
 
-    rules = {str(rule.sqref): rule for rule in book["runs"].data_validations.dataValidation}
-    assert rules["B1"].formula1.strip('"').split(",") == ["speed_rpm", "speed_rad_s", "speed_Hz"]
-    assert float(rules["D2:D1048576"].formula1) == 0
-    assert [float(rules["E2:E1048576"].formula1), float(rules["E2:E1048576"].formula2)] == [-360, 360]
-
-
-def test_the_form_filled_with_the_published_example(tmp_path):
-    runs, weights = bk("runs.csv"), bk("weights.csv")
-    path = filled(tmp_path / "job.xlsx", runs=rows(runs, amplitude="amplitude_um_pp"), weights=rows(weights))
-    expected = solved(read_job(BK / "job.toml"))
-    np.testing.assert_allclose(solved(read_job(path)), expected, rtol=1e-12)
-    assert abs(expected[0]) == pytest.approx(2.951e-3, rel=1e-3)
-    book = openpyxl.load_workbook(path)
-    book["runs"]["D1"] = "amplitude"
-    book.save(path)
-    assert differences(read_job(path), read_job(BK / "job.toml")) == ()
+    for (sheet, first), model in zip(NAMED.items(), (Plane, Sensor), strict=True):
+        names = {cell.value for cell in book[sheet][1]} - {first, "note"}
+        assert names <= {name for key in model.known_keys().values() for name in key.variants}
+    known = {*JobSettings.known_keys(), *(f"errors.{name}" for name in Errors.known_keys())}
+    assert {cell.value for cell in book["settings"]["A"][1:]} <= known
 
 
 def test_the_form_with_settings(tmp_path):
+    """Excel keeps 2% as 0.02, which must not be read as 0.02 percent."""
     path = filled(
         tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=[{"plane": "1", "use": "no"}]
     )
@@ -98,6 +71,11 @@ def test_the_form_with_settings(tmp_path):
     job = read_job(path)
     assert (job.conventions.labels.phase, job.used) == ("lag", ("2",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
+    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).number_format = "0%"
+    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).value = 0.02
+    book.save(path)
+    (complaint,) = complaints(read_job, path)
+    assert "found '2%'" in str(complaint)
 
 
 def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
@@ -117,6 +95,7 @@ def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
         ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
+        ("planes", 3, "plane", "9", "9", "one of the job's planes, 1 and 2"),
         ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
         ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
         ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
@@ -129,28 +108,6 @@ def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, v
     found = complaints(read_job, write_book(tmp_path / "job.xlsx", changed))
     problem = the_only(found, "job.xlsx", row, column, shown, words)
     assert f"sheet {sheet!r}" in problem.file
-
-
-def with_stored_values(path, values):
-    """The workbook with values stored in its formulas, in order, as Excel stores them."""
-    parts = {}
-    with zipfile.ZipFile(path) as book:
-        for name in book.namelist():
-            data = book.read(name).decode() if name.endswith(".xml") else book.read(name)
-            while (
-                isinstance(data, str)
-                and name.startswith("xl/worksheets")
-                and "</f><v></v>" in data.replace("<v />", "<v></v>")
-            ):
-                data = data.replace("<v />", "<v></v>").replace(
-                    "</f><v></v>", f"</f><v>{values.pop(0)}</v>", 1
-                )
-            parts[name] = data
-    with zipfile.ZipFile(path, "w") as book:
-        for name, data in parts.items():
-            book.writestr(name, data)
-    assert not values
-    return path
 
 
 def test_formulas_with_stored_values_count(tmp_path):
@@ -185,24 +142,3 @@ def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
     path = write_book(tmp_path / "job.xlsx", {**BOOK, "check_weights": WEIGHTS})
     words = "the check runs too"
     the_only(complaints(read_job, path), "job.xlsx", None, "check_weights", None, words)
-
-
-def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):
-    """Excel keeps "2%" as 0.02: it must not be read as 0.02 percent."""
-    path = tmp_path / "job.xlsx"
-    write_book(path, BOOK)
-    book = openpyxl.load_workbook(path)
-    cell = book["settings"]["B4"]
-    cell.value, cell.number_format = 0.02, "0%"
-    book.save(path)
-    (complaint,) = complaints(lambda: read_job(path))
-    assert "2%" in str(complaint)
-    assert "formatted as a percentage" in str(complaint)
-
-
-def test_a_plane_that_does_not_exist_is_named_with_its_sheet_and_row(tmp_path):
-    path = tmp_path / "job.xlsx"
-    write_book(path, {**BOOK, "planes": [*PLANES, ["9", 5, None, None, None, None, None]]})
-    (complaint,) = complaints(lambda: read_job(path))
-    assert (complaint.row, complaint.column, complaint.value) == (4, "plane", "9")
-    assert "planes" in complaint.file

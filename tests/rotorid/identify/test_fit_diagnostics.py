@@ -12,7 +12,7 @@ from timedomain_cases import (
     fitzhugh_nagumo_record,
 )
 
-from rotorid.base.registry import names
+from rotorid.base.choices import names
 from rotorid.identify.fit_records import METHODS, fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record

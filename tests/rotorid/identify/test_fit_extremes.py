@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.base.registry import names
+from rotorid.base.choices import names
 from rotorid.identify.fit_records import METHODS, fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record

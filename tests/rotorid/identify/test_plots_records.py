@@ -97,7 +97,7 @@ def test_residuals_stand_in_a_band_of_two_standard_deviations(result):
 def test_parameters_have_their_intervals_in_percent_of_their_values(result):
     axes = Figure().add_subplot()
     draw_parameters(result, axes)
-    ends = [bar[2][0].get_segments()[0][:, 0] for bar in axes.containers]
+    ends = [bar[:, 0] for bar in axes.containers[0][2][0].get_segments()]
     values = result.values[:, None]
     np.testing.assert_allclose(ends, 100 * (result.estimate.ci95 - values) / np.abs(values))
 

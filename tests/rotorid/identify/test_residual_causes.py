@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
-from rotorid.base.registry import names
+from rotorid.base.choices import names
 from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import METHODS, fit
 from rotorid.identify.ode import ode_model, with_nuisance

@@ -146,7 +146,7 @@ def test_masses_that_are_not_determined_are_named(nonnegative):
     found = equivalent_masses(alpha, [100.0], [[1.0], [1.0], [0.9]], nonnegative=nonnegative)
     assert found.undetermined == ("m1", "m2")
     assert "only m3 and m1 + m2 are determined" in found.describe_rank()
-    assert found.answer.found.count("not determined") == 2
+    assert found.answer.numbers.count("not determined") == 2
     # a mass that no mode moves
     still = equivalent_masses(COMPLIANCE, [100.0], [[1.0], [1.0], [0.0]], nonnegative=nonnegative)
     assert still.undetermined == ("m3",)

@@ -56,7 +56,7 @@ def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
     assert "frequencies alone are a trap" in text
     named = {"best by MAC": triples.best_by_mac, "compromise": triples.compromise, "the book's": triples.book}
     lines = [
-        (next(x for x in answer.found.splitlines() if x.startswith(f"  {w}")), i) for w, i in named.items()
+        (next(x for x in answer.numbers.splitlines() if x.startswith(f"  {w}")), i) for w, i in named.items()
     ]
     lines += [(line, i) for i, line in enumerate(answer.tables[0].splitlines()[2:])]
     assert len(lines) == 13

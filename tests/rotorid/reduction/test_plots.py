@@ -8,7 +8,7 @@ import pytest
 from documents import check_hygiene
 from fem_rotors import rotor23
 
-from rotorid.base.rpm import RPM
+from rotorid.base.text import RPM
 from rotorid.reduction import compare_methods, reduce
 from rotorid.reduction.plots import (
     HATCHES,

@@ -127,114 +127,74 @@ def test_a_linear_model_gives_the_linear_kernel(seed, stated, sigma):
 
 def test_a_parameter_at_its_bound_is_named_and_held():
     K, y = line()
-    fit = nonlinear_least_squares(
-        lambda x: K @ x - y, lambda x: K, [0.0, 0.0], names=["a", "slope"], sigma_stated=False,
-        bounds={"slope": (None, 1.5)},
-    )  # fmt: skip
-    assert fit.at_bounds == ("slope",)
-    assert fit.values[1] == 1.5
+    run = {"names": ["a", "slope"], "sigma_stated": False}
+    bounds = {"a": (-9, None), "slope": (None, 1.5)}  # the first does not bind
+    fit = nonlinear_least_squares(lambda x: K @ x - y, lambda x: K, [-99.0, 0.0], bounds=bounds, **run)
     held = least_squares(K[:, :1], y - 1.5 * K[:, 1])
-    assert fit.values[0] == pytest.approx(held.values[0], rel=1e-9)
-    assert fit.std[0] == pytest.approx(held.std[0], rel=1e-9)
-    assert np.isnan(fit.std[1])
-    document = fit.estimate.to_dict()["parameters"]["slope"]
-    assert document["std"] is None
-    assert document["ci95"] is None
-    assert "at its bound" in fit.estimate.told(fit.at_bounds).found
-    assert "nan" not in fit.estimate.told(fit.at_bounds).brief()
+    assert fit.at_bounds == ("slope",)
+    assert fit.values == pytest.approx([held.values[0], 1.5], rel=1e-9)
+    assert fit.std == pytest.approx([held.std[0], np.nan], rel=1e-9, nan_ok=True)
+    assert fit.estimate.to_dict()["parameters"]["slope"] == {"value": 1.5, "std": None, "ci95": None}
+    assert "nan" not in fit.estimate.answer.brief()
     assert "slope stands at its bound" in fit.end_warnings[0]
-
-
-def test_everything_at_bounds_is_still_an_answer():
-    K, y = line()
-    fit = nonlinear_least_squares(
-        lambda x: K @ x - y, lambda x: K, [0.0, 0.0], names=["a", "b"], sigma_stated=True,
-        bounds={"a": (5.0, None), "b": (10.0, None)},
-    )  # fmt: skip
-    assert fit.at_bounds == ("a", "b")
-    np.testing.assert_array_equal(fit.values, [5.0, 10.0])
-    assert fit.converged
-
-
-def test_a_bound_that_does_not_bind_changes_nothing():
-    residual, jacobian, names = misra1a()
-    free = nonlinear_least_squares(residual, jacobian, [250, 5e-4], names=names, sigma_stated=False)
-    fit = nonlinear_least_squares(
-        residual, jacobian, [-3, 5e-4], names=names, sigma_stated=False, bounds={"b1": (0, 1e4)}
-    )
-    assert fit.at_bounds == ()
-    np.testing.assert_allclose(fit.values, free.values, rtol=1e-9)
 
 
 def test_a_product_cannot_be_split_and_the_words_say_so():
     t = np.linspace(1, 2, 8)
-    y = 6 * t
     fit = nonlinear_least_squares(
-        lambda x: x[0] * x[1] * t + x[2] - y,
+        lambda x: x[0] * x[1] * t + x[2] - 6 * t,
         lambda x: np.stack((x[1] * t, x[0] * t, np.ones(8)), axis=1),
         [1.0, 4.0, 0.5],
         names=["a", "b", "c"],
         sigma_stated=True,
     )
-    assert fit.estimate.rank == 2
-    assert fit.estimate.undetermined == ("a", "b")
-    assert abs(fit.values[2]) < 1e-9
-    solution = fit.estimate.solution
-    assert solution[0] * solution[1] == pytest.approx(6, rel=1e-9)
+    assert (fit.estimate.rank, fit.estimate.undetermined) == (2, ("a", "b"))
+    a, b, c = fit.estimate.solution
+    assert (a * b, c) == pytest.approx((6, 0), rel=1e-9, abs=1e-9)
     assert any("a and b by themselves are not" in w for w in fit.end_warnings)
 
 
-@pytest.mark.parametrize("loss", ["huber", "soft_l1", "cauchy"])
 @pytest.mark.parametrize("stated", [True, False])
-def test_a_robust_loss_shrugs_off_gross_errors(loss, stated):
+def test_a_robust_loss_shrugs_off_gross_errors(stated):
     K, y = line(seed=3, m=60, sigma=0.1)
     y[::12] += 30.0
-    run = {"names": ["a", "b"], "sigma_stated": stated}
-    fit = nonlinear_least_squares(lambda x: (K @ x - y) / 0.1, lambda x: K / 0.1, [0, 0], loss=loss, **run)
-    plain = nonlinear_least_squares(lambda x: (K @ x - y) / 0.1, lambda x: K / 0.1, [0, 0], **run)
-    error, harm = np.abs(fit.values - [1, 2]), np.abs(plain.values - [1, 2])
-    assert fit.converged
-    assert (error < 4 * fit.std).all()
-    assert (error < 0.15).all()
+    functions = (lambda x: (K @ x - y) / 0.1, lambda x: K / 0.1, [0, 0])
+    robust, plain = (
+        nonlinear_least_squares(*functions, names=["a", "b"], sigma_stated=stated, loss=loss)
+        for loss in ("huber", "linear")
+    )
+    error, harm = np.abs(robust.values - [1, 2]), np.abs(plain.values - [1, 2])
+    assert robust.converged
+    assert (error < np.minimum(4 * robust.std, 0.15)).all()
     assert harm.max() > 10 * error.max()
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("loss", ["linear", "huber", "soft_l1", "cauchy"])
+@pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_spread_of_a_robust_estimate_is_the_spread_of_repetitions(loss):
     K, _ = line(m=60)
-    rng = np.random.default_rng(11)
-    values, stds = [], []
-    for _ in range(200):
-        y = K @ [1.0, 2.0] + rng.standard_t(3, 60)
-        fit = nonlinear_least_squares(
-            lambda x, y=y: K @ x - y, lambda x: K, [1, 2], names="ab", sigma_stated=False, loss=loss
-        )
-        values.append(fit.values)
-        stds.append(fit.std)
-    ratio = np.sqrt(np.mean(np.square(stds), axis=0)) / np.std(values, axis=0)
+    noise = np.random.default_rng(11).standard_t(3, (200, 60))
+    run = {"names": "ab", "sigma_stated": False, "loss": loss}
+    fits = [
+        nonlinear_least_squares(lambda x, e=e: K @ (x - [1, 2]) - e, lambda x: K, [1, 2], **run)
+        for e in noise
+    ]
+    std = np.sqrt(np.mean([fit.std**2 for fit in fits], axis=0))
     # 200 repetitions know a standard deviation to 5 %
-    np.testing.assert_array_less(np.abs(np.log(ratio)), 0.2)
+    np.testing.assert_allclose(std, np.std([fit.values for fit in fits], axis=0), rtol=0.2)
 
 
 @pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_what_the_functions_return_stays_as_it_is(loss):
-    K, _ = line(m=20)
-    y = K @ [1.0, 2.0] + np.random.default_rng(1).standard_t(2, 20)
-    last = {}
+    K, y = line(m=20)
+    K.flags.writeable = False
 
     def residual(x):
-        last["given"] = K @ x - y
-        last["kept"] = last["given"].copy()
-        return last["given"]
+        r = K @ x - y
+        r.flags.writeable = False
+        return r
 
-    def jacobian(x):
-        np.testing.assert_array_equal(last["given"], last["kept"])
-        return K
-
-    kept = K.copy()
-    nonlinear_least_squares(residual, jacobian, [0, 0], names="ab", sigma_stated=False, loss=loss)
-    np.testing.assert_array_equal(K, kept)
+    nonlinear_least_squares(residual, lambda x: K, [0, 0], names="ab", sigma_stated=False, loss=loss)
 
 
 def test_no_convergence_is_said():

@@ -18,9 +18,8 @@ from balancing import Trials, correct, refine
 from rotorid import read_rotor
 from rotorid.files.problems import InputError
 from rotorid.samples import sample_data
-from rotorid.study import StudyOptions, drawn_machine, study
-from rotorid.study.drawn_machine import UNSTABLE
-from rotorid.study.studies import UNDETERMINED
+from rotorid.study import UNDETERMINED, StudyOptions, samples, study
+from rotorid.study.samples import UNSTABLE
 from rotorid.study.study_file import read_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
@@ -57,10 +56,10 @@ def test_the_probability_is_that_of_rayleigh(tmp_path):
 
 
 def test_the_median_of_rayleigh_and_a_velocity_are_as_their_units_say(tmp_path):
-    job = read_study(write(tmp_path, TWO)).machine
+    job = read_study(write(tmp_path, TWO))
     assert job.unbalance[2] * np.sqrt(2 * np.log(2)) == pytest.approx(300e-6)
     assert job.unbalance[4] * np.sqrt(2) == pytest.approx(500e-6)
-    turned = read_study(write(tmp_path, STUDY.replace("limit_um_pp", "angle_deg = 90\nlimit_um_pp"))).machine
+    turned = read_study(write(tmp_path, STUDY.replace("limit_um_pp", "angle_deg = 90\nlimit_um_pp")))
     assert turned.sensors["probe"] == fem.Sensor(3, 90.0)
     omega = 3000 * np.pi / 30
     assert job.gains[0] == pytest.approx([1 / 10e-6, 1j * omega / (1.2e-3 * np.sqrt(2))])
@@ -101,13 +100,11 @@ def test_counts_are_those_of_the_table_and_later_corrections_help(tmp_path):
 def test_a_trim_is_that_of_refine(tmp_path, monkeypatch):
     """A sample again, its runs given to `balancing.refine` one by one."""
     text = TWO.replace("limit_um_pp = 20", "limit_um_pp = 0.02") + SCATTER
-    job = read_study(write(tmp_path, text)).machine
+    job = read_study(write(tmp_path, text))
     seen = []
-    real = drawn_machine.estimate_influence
-    monkeypatch.setattr(
-        drawn_machine, "estimate_influence", lambda trials: seen.append(trials) or real(trials)
-    )
-    row = drawn_machine.draw_machine((job, drawn_machine.nominal(job)[0]), np.random.default_rng([1, 4]))
+    real = samples.estimate_influence
+    monkeypatch.setattr(samples, "estimate_influence", lambda trials: seen.append(trials) or real(trials))
+    row = samples.draw_machine(job, samples.nominal(job).W, np.random.default_rng([1, 4]))
     assert row["ratio_3"] is not None
     first, last = seen[0], seen[-1]
 
@@ -228,7 +225,7 @@ def test_the_pictures_have_a_limit_and_units(tmp_path):
         "after the last correction",
         "limit",
     ]
-    assert ax.get_xlabel() == "largest reading over its limit"
-    assert ax.get_ylabel() == "share of machines below"
+    assert ax.get_ylabel() == "largest reading over its limit"
+    assert ax.get_xlabel() == "share of machines below"
     (ax,) = run(write(tmp_path)).figure().axes
     assert len(ax.get_legend().get_texts()) == 2

@@ -52,19 +52,20 @@ def test_its_stated_error_holds():
 
 
 @pytest.mark.parametrize(
-    ("edge", "zero"),
-    [("leading", 0.0), ("rising", 0.0), ("trailing", 0.05), ("falling", 0.05), ("centre", 0.025)],
+    ("edge", "zero", "low"),
+    [
+        ("leading", 0.0, 1),
+        ("rising", 0.0, 0),
+        ("trailing", 0.05, 0),
+        ("falling", 0.05, 0),
+        ("centre", 0.025, 1),
+    ],
 )
-def test_edges(edge, zero):
-    tacho = read(pulses(), edge=edge)
-    assert np.abs(offsets(tacho, zero)).max() * 360 < 0.25
-    assert tacho.warnings == ()
-
-
-def test_a_notch_is_the_mark_although_it_is_low():
-    tacho = read(5.0 - pulses())
-    assert np.abs(offsets(tacho)).max() * 360 < 0.25
-    assert tacho.warnings == ()
+def test_edges_of_a_mark_and_of_a_notch(edge, zero, low):
+    for samples in (pulses(), *[5.0 - pulses()] * low):
+        tacho = read(samples, edge=edge)
+        assert np.abs(offsets(tacho, zero)).max() * 360 < 0.25
+        assert tacho.warnings == ()
 
 
 def test_a_mark_of_half_a_turn_is_said():
@@ -83,14 +84,13 @@ def damaged(missing=0, double=0, seed=1):
     return samples
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("missing", "double"), [(12, 0), (0, 12), (12, 12)])
 def test_missing_and_double_pulses_are_bridged_and_counted(missing, double, seed):
     tacho = read(damaged(missing, double, seed))
     assert np.abs(offsets(tacho)).max() * 360 < 0.5
     (words,) = tacho.warnings
-    if seed == 0:
-        assert ("missing" in words, "too many" in words) == (missing > 0, double > 0)
+    assert "missing" in words if missing else "too many" in words
     # a pulse too many in the turn of a missing one may stand for it, off by a part of a turn
     assert abs(len(tacho.missing) - missing) <= min(missing, double)
     assert abs(len(tacho.double) - double) <= min(missing, double)
@@ -115,13 +115,6 @@ def test_even_pulses_leave_the_turn_open_and_uneven_ones_do_not():
     assert np.abs(offsets(uneven)).max() * 360 < 0.3  # the gap from 0.4 to 1 is the longest
 
 
-def test_less_than_two_turns_of_a_wheel_are_refused():
-    teeth = 5.0 * (TURNS * 60 % 1 < 0.5)
-    some = teeth[: int(np.searchsorted(TURNS, START + 1.5))]
-    with pytest.raises(ValueError, match="at least 121 are needed"):
-        read_tacho(Channel("KEY", some), RATE, TachoSettings(pulses=60, edge="rising"))
-
-
 def test_a_wheel_that_lacks_a_tooth():
     teeth = 5.0 * ((TURNS * 12 % 1 < 0.5) & (TURNS % 1 < 11 / 12))
     tacho = read(teeth, pulses=12, edge="rising")
@@ -139,17 +132,25 @@ def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
     assert read(5.0 * (turns % 1 < 0.05)).offset_s == pytest.approx(0.1 / RATE / np.sqrt(12), rel=0.2)
 
 
+TURN = TURNS % 1
+BOUNCES = 5.0 * ((TURN < 0.02) | ((TURN > 0.025) & (TURN < 0.03)) | ((TURN > 0.034) & (TURN < 0.05)))
+TEETH = 5.0 * (TURNS[: int(np.searchsorted(TURNS, START + 1.5))] * 60 % 1 < 0.5)
+
+
 @pytest.mark.parametrize(
-    ("samples", "words"),
+    ("samples", "settings", "words"),
     [
-        (np.zeros(10000), "has no pulses: it reads 0 throughout"),
-        (5.0 * (0.3 * T % 1 < 0.05), "at least 8 are needed"),
-        (np.where((T > 8) & (T < 8.6), 0.0, pulses()), "is silent from 7.989 to 8.618 s, about 18"),
+        (np.zeros(10000), {}, "has no pulses: it reads 0 throughout"),
+        (5.0 * (0.3 * T % 1 < 0.05), {}, "at least 8 are needed"),
+        (TEETH, {"pulses": 60, "edge": "rising"}, "at least 121 are needed"),
+        (np.where((T > 8) & (T < 8.6), 0.0, pulses()), {}, "is silent from 7.989 to 8.618 s, about 18"),
+        (BOUNCES, {}, r"only \d+ of 1\d\d\d pulses of the tacho 'KEY' follow each other"),
+        (pulses(), {"level": 7.0}, "tacho_level must be between 0 and 5"),
     ],
 )
-def test_what_does_not_tell_turns_is_refused(samples, words):
+def test_what_does_not_tell_turns_is_refused(samples, settings, words):
     with pytest.raises(ValueError, match=words):
-        read(samples)
+        read(samples, **settings)
 
 
 def test_a_wrong_number_of_uneven_pulses_is_said():
@@ -157,13 +158,6 @@ def test_a_wrong_number_of_uneven_pulses_is_said():
     assert words.startswith(
         "the tacho's pulses scatter by 36° around even turns: are there other marks than 1"
     )
-
-
-def test_marks_that_bounce_or_are_too_many_to_follow_each_other_are_refused():
-    turn = TURNS % 1
-    bounces = 5.0 * ((turn < 0.02) | ((turn > 0.025) & (turn < 0.03)) | ((turn > 0.034) & (turn < 0.05)))
-    with pytest.raises(ValueError, match=r"only \d+ of 1\d\d\d pulses of the tacho 'KEY' follow each other"):
-        read(bounces)
 
 
 def test_a_machine_that_stands_at_first_and_at_last_is_silent_without_a_word():
@@ -186,16 +180,8 @@ def test_a_magnetic_pickup_is_read_where_it_is_steep(polarity, edge):
     assert tacho.warnings == ()
 
 
-@pytest.mark.parametrize("count", range(8, 13))
+@pytest.mark.parametrize("count", [8, 12])
 def test_a_few_turns_are_enough(count):
-    some = pulses()[: int(np.searchsorted(TURNS, count + 1.2))]
-    tacho = read_tacho(Channel("KEY", some), RATE, TachoSettings())
+    tacho = read(pulses()[: int(np.searchsorted(TURNS, count + 1.2))])
     assert len(tacho.times) == count + 1
-    t = np.linspace(*tacho.span, 50)
-    off = tacho.turn_at(t) - np.interp(t, T, TURNS)
-    assert np.abs(off - np.round(off.mean())).max() * 360 < 1.0
-
-
-def test_a_level_beyond_the_pulses_is_refused():
-    with pytest.raises(ValueError, match="tacho_level must be between 0 and 5"):
-        read(pulses(), level=7.0)
+    assert np.abs(offsets(tacho)).max() * 360 < 1.0

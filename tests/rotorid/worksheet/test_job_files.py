@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from workbook_jobs import as_workbook
 
-from rotorid.files import table_writing
+from rotorid.files import disk
 from rotorid.files.columns import read_grid
 from rotorid.files.job import read_job
 from rotorid.files.problems import InputError, Problems
@@ -181,23 +181,19 @@ def test_an_undo_after_a_change_from_outside_is_refused(turbo):
     assert (job.look(), job.look(), job.state()["undo"]) == (["runs.csv"], [], False)
 
 
-def test_ids_stay_when_rows_come_and_go(turbo):
+def test_rows_are_called_by_what_they_hold_and_new_ones_stand_below_their_run(turbo):
     job = JobFiles(turbo)
     before = {row["id"]: row["cells"] for row in rows(job)}
-    third, fifth = rows(job)[2], rows(job)[4]
-    (made,) = job.apply([{"table": "runs", "after": third["id"], "cells": {"run": "new"}}])
+    fifth = rows(job)[4]
+    assert fifth["id"] == "baseline|1220|probe 1|1".replace("1220|probe 1", "|".join(fifth["cells"][1:3]))
+    new = {"run": "baseline", "speed_rpm": "7", "sensor": "probe 1"}
+    (made,) = job.apply([{"table": "runs", "cells": new}])
+    assert made == "baseline|7|probe 1|1"
+    assert [row["cells"][0] for row in rows(job)][19:22] == ["baseline", "baseline", "trial 1"]
     job.apply([{"table": "runs", "delete": fifth["id"], "old": fifth["cells"]}])
-    assert [row["id"] for row in rows(job)][2:4] == [third["id"], made]
-    lines = (turbo / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-    lines[1] = lines[1].replace(",89", ",91")
-    lines[8:9] = ["outside,1,2,3,4\n", "# between\n", lines[8]]
-    (turbo / "runs.csv").write_text("".join(lines), encoding="utf-8")
-    assert job.look() == ["runs.csv"]
     after = {row["id"]: row["cells"] for row in rows(job)}
-    assert set(before) - set(after) == {fifth["id"]}
-    assert len(set(after) - set(before)) == 2
-    changed = [key for key in after if key in before and after[key] != before[key]]
-    assert changed == [rows(job)[0]["id"]]
+    assert (set(before) - set(after), set(after) - set(before)) == ({fifth["id"]}, {made})
+    assert JobFiles(turbo).state()["tables"] == job.state()["tables"]
 
 
 def test_two_programs_see_each_other_and_conflict_only_in_one_cell(turbo):
@@ -225,7 +221,7 @@ def test_a_change_between_reading_and_replacing_is_not_lost(turbo, monkeypatch):
             text = (turbo / "runs.csv").read_text(encoding="utf-8")
             (turbo / "runs.csv").write_text(text.replace("3.36", "3.37"), encoding="utf-8")
 
-    monkeypatch.setattr(table_writing.os, "fsync", fsync)
+    monkeypatch.setattr(disk.os, "fsync", fsync)
     job.apply([cell(job)])
     assert rows(job)[0]["cells"] == ["baseline", "1220", "probe 1", "3.37", "90"]
     assert "3.37,90" in (turbo / "runs.csv").read_text(encoding="utf-8")

@@ -6,27 +6,33 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from studies.drawn import SCATTER, STUDY, fatal, noted, task, write
+from studies.drawn import SCATTER, STUDY, fatal, noted, number, write
 
-import rotorid.study.results as results
 from rotorid.base.worker_processes import single_threads
-from rotorid.study import StudyOptions, study
-from rotorid.study.results import SampleError, run
+from rotorid.study import StudyOptions, samples, study
+from rotorid.study.samples import SampleError, draw_all
 
-pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
+pa = pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
+pq = pytest.importorskip("pyarrow.parquet")
 
 NUMBERS = [float(np.random.default_rng([7, k]).standard_normal()) for k in range(12)]
+SCHEMA = pa.schema([("sample", "int64"), ("x", "double")], {"study": "numbers"})
 
 
 @pytest.fixture
 def threads(monkeypatch):
-    monkeypatch.setattr(results, "CHUNK", 2)
+    monkeypatch.setattr(samples, "CHUNK", 2)
     with ThreadPoolExecutor(2) as pool:
         yield pool
+
+
+def drawn(sample, file, executor, count=12):
+    return draw_all(sample, 7, count, SCHEMA, file, executor)["x"].to_pylist()
 
 
 @pytest.mark.full
@@ -44,19 +50,22 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, threads)
     assert others == [one] * 3
     assert len({str(each.to_dict()) for each in found}) == 1
     assert len(set(pq.read_table(tmp_path / "own1.parquet")["ratio_0"].to_pylist())) == 60
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.lock"))
 
 
 @pytest.mark.full
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads):
-    """The workers end with their parent; only what is missing is drawn again."""
+    """The workers end with their parent."""
     file = write(tmp_path, STUDY.replace("= 60", "= 400") + '[scatter]\n"bearing[*].stiffness" = 20')
-    small = "import rotorid.study.results as r, rotorid.cli; r.CHUNK = 20; rotorid.cli.main()"
-    words = ["study", file, "--workers", "2", "--results", tmp_path / "killed.parquet"]
-    part = tmp_path / "killed.parquet.part"
+    small = (
+        "import rotorid.study.samples as s, rotorid.cli; s.CHUNK, s.KEPT = 20, 0.0; "
+        "__name__ == '__main__' and rotorid.cli.main()"
+    )
+    killed, unbroken = tmp_path / "killed.parquet", tmp_path / "unbroken.parquet"
+    words = ["study", file, "--workers", "2", "--results", killed]
     started = subprocess.Popen([sys.executable, "-c", small, *words], stderr=subprocess.DEVNULL)
-    while not part.exists() or part.stat().st_size < 20_000:
+    while not killed.exists():
         time.sleep(0.01)
         assert started.poll() is None
     workers = subprocess.run(["pgrep", "-P", str(started.pid)], capture_output=True, text=True).stdout.split()
@@ -67,79 +76,76 @@ def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threa
             break
         time.sleep(0.05)
     assert [pid for pid in workers if os.path.exists(f"/proc/{pid}")] == []
-    assert part.exists()
-    continued = study(file, StudyOptions(results=tmp_path / "killed.parquet"), executor=threads)
-    unbroken = study(file, StudyOptions(results=tmp_path / "unbroken.parquet"), executor=threads)
-    assert (tmp_path / "killed.parquet").read_bytes() == (tmp_path / "unbroken.parquet").read_bytes()
-    assert continued.to_dict() == unbroken.to_dict()
-    assert not part.exists()
+    assert 0 < len(pq.read_table(killed)) < 400
+    continued = study(file, StudyOptions(results=killed), executor=threads)
+    assert continued.to_dict() == study(file, StudyOptions(results=unbroken), executor=threads).to_dict()
+    assert killed.read_bytes() == unbroken.read_bytes()
 
 
 def test_what_is_missing_after_a_break_is_drawn_and_nothing_else(tmp_path, threads):
-    calls = tmp_path / "calls"
-    data = {"calls": str(calls), "wrong": NUMBERS[7]}
+    calls, file = tmp_path / "calls", tmp_path / "a.parquet"
     with pytest.raises(SampleError, match=r"^sample 7 \(seed 7\): ZeroDivisionError: no such bearing$"):
-        run(task(noted, data), 12, tmp_path / "a.parquet", threads, 1)
+        drawn(partial(noted, {"calls": calls, "wrong": NUMBERS[7]}), file, threads)
     before = len(calls.read_text().split())
-    frame = run(task(noted, {**data, "wrong": None}), 12, tmp_path / "a.parquet", threads, 1)
-    assert frame["x"].tolist() == NUMBERS
-    assert len(calls.read_text().split()) == before + 6
-    run(task(noted, {**data, "wrong": None}), 12, tmp_path / "a.parquet", threads, 1)
-    assert len(calls.read_text().split()) == before + 6
+    for _ in range(2):
+        assert drawn(partial(noted, {"calls": calls, "wrong": None}), file, threads) == NUMBERS
+        assert len(calls.read_text().split()) == before + 6
 
 
-def test_a_worker_that_dies_is_told_and_the_next_call_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "CHUNK", 2)
-    data = {"flag": str(tmp_path / "died"), "deadly": NUMBERS[9], "always": False}
+def test_a_worker_that_dies_is_reported_and_the_next_call_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(samples, "CHUNK", 2)
+    sample = partial(fatal, {"flag": str(tmp_path / "died"), "deadly": NUMBERS[9]})
     with pytest.raises(ValueError, match=r"a worker died, perhaps for want of memory; .*BrokenProcessPool"):
-        run(task(fatal, data), 12, tmp_path / "a.parquet", None, 1)
-    assert run(task(fatal, data), 12, tmp_path / "a.parquet", None, 1)["x"].tolist() == NUMBERS
+        drawn(sample, tmp_path / "a.parquet", None)
+    assert drawn(sample, tmp_path / "a.parquet", None) == NUMBERS
 
 
 def test_more_samples_continue_a_study(tmp_path, threads):
-    file = write(tmp_path)
-    for samples in (50, 90):
-        grown = study(file, StudyOptions(samples=samples, results=tmp_path / "grown.parquet"), threads)
-    at_once = study(file, StudyOptions(samples=90, results=tmp_path / "at_once.parquet"), threads)
-    assert (tmp_path / "grown.parquet").read_bytes() == (tmp_path / "at_once.parquet").read_bytes()
-    assert grown.to_dict() == at_once.to_dict()
-    fewer = study(file, StudyOptions(samples=50, results=tmp_path / "grown.parquet"), threads)
+    file, grown, at_once = write(tmp_path), tmp_path / "grown.parquet", tmp_path / "at_once.parquet"
+    for count in (50, 90):
+        outcome = study(file, StudyOptions(samples=count, results=grown), threads)
+    assert outcome.to_dict() == study(file, StudyOptions(samples=90, results=at_once), threads).to_dict()
+    assert grown.read_bytes() == at_once.read_bytes()
+    fewer = study(file, StudyOptions(samples=50, results=grown), threads)
     assert fewer.to_dict() == study(file, StudyOptions(samples=50), threads).to_dict()
+    assert grown.read_bytes() == at_once.read_bytes()
 
 
-def test_a_study_that_breaks_before_its_file_is_written_loses_nothing(tmp_path, threads, monkeypatch):
+def test_a_study_that_breaks_before_its_file_is_written_is_whole_the_next_time(
+    tmp_path, threads, monkeypatch
+):
     file = tmp_path / "x.parquet"
-    monkeypatch.setattr(results, "write_bytes", Mock(side_effect=OSError("disk full")))
+    monkeypatch.setattr(samples, "write_files", Mock(side_effect=OSError("disk full")))
     with pytest.raises(OSError, match="full"):
-        run(task(), 12, file, threads, 1)
+        drawn(number, file, threads)
     monkeypatch.undo()
     assert not file.exists()
-    run(task(), 12, file, threads, 1)
-    assert len(pq.read_table(file)) == 12
-    assert not list(tmp_path.glob("*.part"))
+    assert drawn(number, file, threads) == pq.read_table(file)["x"].to_pylist() == NUMBERS
+    assert not list(tmp_path.glob("*.lock"))
 
 
 def test_a_file_of_another_study_is_refused_as_it_is(tmp_path, threads):
     file, kept = write(tmp_path), tmp_path / "kept.parquet"
+
+    def refused(words, results=kept, **options):
+        with pytest.raises(ValueError, match=words):
+            study(file, StudyOptions(results=results, **options), executor=threads)
+
     study(file, StudyOptions(results=kept), executor=threads)
     before = kept.read_bytes()
-    with pytest.raises(ValueError, match="another study is kept here"):
-        study(file, StudyOptions(seed=2, results=kept), executor=threads)
+    refused("another study is kept here", seed=2)
     (tmp_path / "rotor.csv").write_text((tmp_path / "rotor.csv").read_text().replace("0.04", "0.05"))
-    with pytest.raises(ValueError, match="another study is kept here"):
-        study(file, StudyOptions(results=kept), executor=threads)
+    refused("another study is kept here")
     assert kept.read_bytes() == before
     kept.write_bytes(before[:-100])
-    with pytest.raises(ValueError, match="no study is kept here, but something else"):
-        study(file, StudyOptions(results=kept), executor=threads)
-    with pytest.raises(ValueError, match=r"must end in \.parquet"):
-        study(file, StudyOptions(results=tmp_path), executor=threads)
-    with pytest.raises(ValueError, match="cannot be written"):
-        study(file, StudyOptions(results=tmp_path / "none" / "a.parquet"), executor=threads)
-    assert not list(tmp_path.glob("*.part"))
+    refused("expected the samples of a study: name another file")
+    assert kept.read_bytes() == before[:-100]
+    refused(r"must end in \.parquet", tmp_path)
+    refused("cannot be written", tmp_path / "none" / "a.parquet")
+    assert not list(tmp_path.glob("*.lock"))
 
 
-def test_a_second_study_on_the_same_file_is_refused_while_the_first_runs(tmp_path, threads):
+def test_a_second_study_on_the_same_file_is_refused_while_the_first_runs(tmp_path):
     file, kept = write(tmp_path), tmp_path / "kept.parquet"
     seconds = []
 
@@ -156,9 +162,9 @@ def test_a_second_study_on_the_same_file_is_refused_while_the_first_runs(tmp_pat
     assert len(pq.read_table(kept)) == 60
 
 
-def test_progress_is_told(threads, caplog):
+def test_progress_is_logged(threads, caplog):
     with caplog.at_level(logging.INFO, "rotorid.progress"):
-        run(task(), 6, None, threads, 1)
+        drawn(number, None, threads, 6)
     assert [record.getMessage() for record in caplog.records] == [f"{n} of 6 samples" for n in (2, 4, 6)]
 
 
