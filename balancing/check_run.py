@@ -143,7 +143,7 @@ class CheckComparison(Answered):
         )
 
     def _as_if(self) -> str:
-        """What other weights would cause the differences; empty: none in the planes."""
+        """Other weights that would cause the differences, in words; empty: none in the planes."""
         if self.change is None:
             return ""
         planes = np.flatnonzero(np.abs(self.change) > 0.1 * np.abs(self.change).max())
@@ -358,7 +358,7 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
 
 
 def last_run(runs: Trials) -> Trials:
-    """The last of several runs.
+    """Trials of the last run alone.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def last_run(runs: Trials) -> Trials:
 
 
 def index_of(name: str, names: tuple[str, ...], what: str) -> int:
-    """Where a name of a check run stands among those of the coefficients."""
+    """Index of a name of a check run among those of the coefficients."""
     if name not in names:
         raise ValueError(
             f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "

@@ -253,7 +253,7 @@ def unresolved(W: ComplexArray, planes: Sequence[str], covariance: FloatArray) -
 
 
 def alike_words(W: ComplexArray, lost: list[int], planes: Sequence[str]) -> str:
-    """That some planes, columns of W (N, P), act alike, and how."""
+    """Which planes, columns of W (N, P), act alike, and how, in words."""
     names = [repr(planes[p]) for p in lost]
     if len(lost) != 2:
         return f"planes {', '.join(names)} act alike: the effect of each follows from the others"

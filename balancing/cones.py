@@ -62,7 +62,7 @@ class Bounds(NamedTuple):
         return np.array([m > 0 and s != () for m, s in zip(self.max_weight, self.sectors, strict=True)])
 
     def part(self, planes: BoolArray) -> Bounds:
-        """The same for some planes alone."""
+        """The bounds for some of the planes alone."""
         sectors = tuple(s for s, one in zip(self.sectors, planes, strict=True) if one)
         return self._replace(W=self.W[:, planes], max_weight=self.max_weight[planes], sectors=sectors)
 

@@ -146,7 +146,7 @@ class Labels:
         return f"{self.speed_number(speed)} {self.speed_in}"
 
     def speed_number(self, speed: float) -> str:
-        """The same without the unit."""
+        """A speed in the job's unit, without the name of the unit."""
         return f"{speed * SPEEDS[self.speed_unit][1]:.6g}"
 
     def amplitude_words(self, size: float) -> str:

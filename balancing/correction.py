@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ from balancing.tables import (
 from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, rows, text
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.text import capital, cut, figures, listing, wrap
+from rotorid.base.text import WIDTH, capital, cut, figures, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +54,7 @@ class Choice:
 
     @property
     def most(self) -> float:
-        """What they leave at most with 95 %."""
+        """Largest rms that a check run with these weights shows, with 95 %."""
         return float(self.rms + NORMAL_RADIUS / np.sqrt(2) * self.error)
 
 
@@ -160,7 +161,7 @@ class Correction(Prediction, Answered):
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """That the runs contradict their conventions; nothing may be mounted then."""
+        """Sentences on how the runs contradict their conventions; nothing may be mounted then."""
         return () if self.convention_test is None else self.convention_test.contradiction(self.labels)
 
     @property
@@ -170,7 +171,7 @@ class Correction(Prediction, Answered):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user may want to know."""
+        """Further remarks for the user, none of them a warning."""
         return (*self.influence.remarks.notes, *self.decision.notes)
 
     @property
@@ -361,7 +362,7 @@ class Correction(Prediction, Answered):
         lines = [self.method_in_words, self.conditioning.sentence()]
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
-        return "\n".join(wrap(line, "") for line in lines)
+        return "\n".join(fill(line, WIDTH) for line in lines)
 
 
 def _angle_width(half: float) -> str:

@@ -69,7 +69,7 @@ class Case:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the planes."""
+        """Names of the planes."""
         return self.part.planes
 
     @property
@@ -115,7 +115,7 @@ class Case:
 
     @property
     def max_weight(self) -> FloatArray:
-        """Of each plane, (P,)."""
+        """Largest weight of each plane, (P,)."""
         return np.full(len(self.names), np.inf) if self.limits is None else self.limits.max_weight
 
     def choice(self, planes: Sequence[int], weights: ComplexArray | None = None) -> Choice:

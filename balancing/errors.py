@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import chance
 from balancing.regions import real_parts
 from balancing.trials import ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.regression import gain
 
 Source = Literal[
@@ -94,7 +94,7 @@ class Reading(NamedTuple):
     dof: float = np.inf
 
     def scales(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """How many times larger the errors may be, (count,)."""
+        """Drawn factors by which the errors may be larger than estimated, (count,)."""
         draws = rng.chisquare(min(self.dof, 1e9), count)
         return np.sqrt(self.dof / draws) if np.isfinite(self.dof) else np.ones(count)
 
@@ -117,14 +117,6 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
     z = np.asarray(readings, dtype=complex)
     size, floor = np.abs(z), errors.floor**2
     return turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
-
-
-def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
-    """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
-    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
-    parts = ((radial, along), (tangential, across))
-    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
 
 
 def mean_variance(covariance: FloatArray) -> FloatArray:
@@ -260,7 +252,7 @@ def rms(values: ArrayLike) -> float:
 
 
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
-    """What unbalances do, one in each plane, of equal effect and together of mean square size², (S, C, P)."""
+    """Readings by one unbalance in each plane, of equal effect, together of mean square size², (S, C, P)."""
     mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
     return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
 

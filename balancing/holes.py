@@ -87,7 +87,7 @@ class Holes:
 
 @dataclass(frozen=True, eq=False)
 class Mounting:
-    """What goes where in one plane.
+    """Pieces or amounts in each hole of one plane.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ def from_list(
 
 
 def _same_place(angles: FloatArray) -> list[int]:
-    """The first two holes that are one."""
+    """The first two holes that stand at the same angle."""
     apart = np.abs(np.mod(angles[:, None] - angles + np.pi, 2 * np.pi) - np.pi)
     at, other = np.nonzero(np.triu(apart < SAME_ANGLE, 1))
     return [int(at[0]), int(other[0])] if len(at) else []

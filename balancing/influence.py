@@ -110,7 +110,7 @@ class Influence:
 
     @property
     def trials(self) -> Trials | None:
-        """The runs; None: there are none."""
+        """The runs that the coefficients are from; None: they were stored or computed."""
         return self.errors.trials
 
     @property
@@ -120,7 +120,7 @@ class Influence:
 
     @property
     def run_errors(self) -> RunErrors:
-        """What changes from run to run."""
+        """Errors of a run that all its readings share or that repeats do not show."""
         return self.errors.run
 
     @property
@@ -214,7 +214,7 @@ class Influence:
         return self.errors.noise.covariance(self.errors.sizes * counts)
 
     def columns(self) -> ComplexArray:
-        """What of it readings have in common, (M, S, C, P + 1).
+        """Errors that readings have in common, (M, S, C, P + 1).
 
         (Y₀, W) errs by their sum, each times a real number of variance 1.
         """
@@ -223,7 +223,7 @@ class Influence:
     def part(
         self, speeds: Sequence[int], sensors: Sequence[int] | None = None, planes: Sequence[int] | None = None
     ) -> Influence:
-        """Those of some speeds, sensors and planes, by their indices; None: of all."""
+        """Coefficients of some speeds, sensors and planes, by their indices; None: of all."""
         sensors = range(len(self.sensors)) if sensors is None else sensors
         planes = list(range(len(self.planes)) if planes is None else planes)
         chosen = tuple(self.planes[p] for p in planes)

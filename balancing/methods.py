@@ -132,7 +132,7 @@ class Job(NamedTuple):
     explained: Explained | None = None
 
     def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Solution:  # noqa: ANN401
-        """The result."""
+        """The solution with weights D."""
         residual, share = self.Y + self.W @ D, 1 - AT_LIMIT
         left = self.w * np.abs(residual)
         objective = float(left.max() if self.method == "minmax" else np.linalg.norm(left))
@@ -347,7 +347,7 @@ class _Errors(NamedTuple):
         return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
-        """Where Q is smallest, from some weights."""
+        """Weights at which Q is smallest, sought from some start."""
         from scipy.optimize import least_squares
 
         @lru_cache(1)
@@ -434,7 +434,7 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
         )
 
     def wider(share: float) -> _Errors:
-        """With a further variance of both parts of Y."""
+        """The errors with a further variance of both parts of Y."""
         C = errors.C.copy()
         C[:, [0, 1], [0, 1]] += (FLOOR**2 + share) * variance
         return errors._replace(C=C)

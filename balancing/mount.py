@@ -100,7 +100,7 @@ class Mounted(Answered):
         )
 
     def _left(self, discrete: Discrete, after: ComplexArray) -> dict[str, Any]:
-        """How many pieces leave how much."""
+        """Number of pieces and the vibration that they leave, as JSON types."""
         size = self.correction.labels.vibration(after)[0]
         return {"pieces": discrete.pieces, "rms_after": rms(size), "max_after": size.max()}
 

@@ -36,7 +36,7 @@ READING, OWN, COMMON, LOADS, UNBALANCE, KNOWN = range(6)
 
 
 class Noise(NamedTuple):
-    """How (Y₀, W) err.
+    """Errors of (Y₀, W): blocks by reading, and columns in common.
 
     `blocks` (2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1;
     `columns` (M, S, C, P + 1) of size 1, and `kind` (M,), which size each has.
@@ -47,7 +47,7 @@ class Noise(NamedTuple):
     kind: IntArray
 
     def part(self, speeds: Sequence[int], sensors: Sequence[int], planes: Sequence[int]) -> Noise:
-        """Of some speeds, sensors and planes."""
+        """The noise of some speeds, sensors and planes."""
         chosen = [0, *(1 + p for p in planes)]
         real = [2 * k + part for k in chosen for part in (0, 1)]
         return Noise(
@@ -57,7 +57,7 @@ class Noise(NamedTuple):
         )
 
     def changed(self, change: ComplexArray) -> Noise:
-        """Of other combinations (m, P + 1), or (S, C, m, P + 1), of (Y₀, W)."""
+        """The noise of combinations (m, P + 1), or (S, C, m, P + 1), of (Y₀, W)."""
         real = stretch(change)
         blocks = real @ self.blocks @ np.swapaxes(real, -1, -2)
         return Noise(blocks, (change @ self.columns[..., None])[..., 0], self.kind)
@@ -73,7 +73,7 @@ class Noise(NamedTuple):
         return blocks, self.columns * sizes[self.kind][:, None, None, None]
 
     def covariance(self, sizes: FloatArray) -> FloatArray:
-        """Of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
+        """Covariance of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
         blocks, columns = self.at(sizes)
         F = real_parts(columns)
         return np.asarray(blocks + np.einsum("mscp,mscq->scpq", F, F, optimize=True))
@@ -161,7 +161,7 @@ class Gaussian(Errors):
 
     @classmethod
     def none(cls, S: int, C: int, P: int) -> Gaussian:
-        """Of coefficients (S, C, P) of which no errors are known."""
+        """Errors of coefficients (S, C, P) of which nothing is known."""
         blocks = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
         return cls(blocks, np.zeros((0, S, C, P + 1), dtype=complex), Reading(), NO_RUN_ERRORS)
 
@@ -243,5 +243,5 @@ class Whitening:
         return np.asarray(w - self._basis @ (self._less[:, None] * (self._basis.T @ w)))
 
     def chi_square(self, difference: ComplexArray) -> float:
-        """Of differences (S, C, R)."""
+        """χ² of differences (S, C, R)."""
         return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))

@@ -216,7 +216,7 @@ class TwoPositions:
         return {**_document("two positions", self.target, labels), "masses": masses, "solutions": solutions}
 
     def sentence(self, labels: Labels) -> str:
-        """Both solutions."""
+        """Both solutions in one sentence."""
         each = (" and ".join(map(labels.weight_at, pair)) for pair in self.weights())
         return f"{labels.weight_at(self.target)} from two weights: either {' or '.join(each)}."
 
@@ -359,7 +359,7 @@ OneWeight = Split | TwoPositions | Removal
 
 
 def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:
-    """What every document has; with the error of what is made."""
+    """Keys that every document has; with the error where a weight is made."""
     head = {"method": method, "unit": labels.weight_unit, "angles": labels.angles}
     document: dict[str, Any] = {**head, "target": labels.weight_entry(target)}
     if made is not None:

@@ -259,7 +259,7 @@ class PlaneVectors:
 
 
 def _few(half: _Half, most: int) -> _Half:
-    """Of so many pieces at most."""
+    """The sums of a half that take so many pieces at most."""
     kept = _number(half.used) <= most
     return _Half(half.sums[kept], half.used[kept], half.picks[kept])
 
@@ -290,7 +290,7 @@ def _contents(K: int, most: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Discrete:
-    """What is mounted in all planes.
+    """Pieces chosen for all planes together.
 
     Attributes
     ----------
@@ -454,7 +454,7 @@ def _guides(
 def _planes(
     named: Mapping[Any, Holes | None], limits: Limits, exact: ComplexArray, heavier: float
 ) -> list[PlaneVectors]:
-    """What each plane can take."""
+    """Vectors that each plane can take, with its limits."""
     sets = []
     for (name, holes), arcs, largest, d in zip(
         named.items(), limits.forbidden, limits.max_weight, exact, strict=True

@@ -291,7 +291,7 @@ def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) ->
 
 
 def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
-    """Where the chosen planes stand.
+    """Indices of the chosen planes.
 
     Raises
     ------

@@ -57,17 +57,17 @@ class Prediction:
 
     @property
     def speeds(self) -> FloatArray:
-        """rad/s, (S,)."""
+        """Speeds in rad/s, (S,)."""
         return self.influence.speeds
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names, C."""
+        """Names of the C sensors."""
         return self.influence.sensors
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Names, P."""
+        """Names of the P planes."""
         return self.influence.planes
 
     @property
@@ -102,7 +102,7 @@ class Prediction:
 
     @property
     def covariance(self) -> FloatArray:
-        """Of (Re D₁, Im D₁, …), (2P, 2P); NaN where errors are unknown."""
+        """Covariance of (Re D₁, Im D₁, …), (2P, 2P); NaN where errors are unknown."""
         return self.region().covariance
 
     @cached_property

@@ -58,7 +58,7 @@ class Region:
         return region_edge(self.centre[0], self.covariance, points, self.radius)
 
     def _distance(self, off: FloatArray) -> FloatArray:
-        """Of real vectors (n, 2k), in standard deviations; far along what is held."""
+        """Distance of real vectors (n, 2k), in standard deviations; far along what is held."""
         values, axes = np.linalg.eigh(self.covariance)
         along = off @ axes / np.sqrt(np.maximum(values, max(_HELD * values[-1], 1e-300)))
         return np.asarray(np.linalg.norm(along, axis=1))

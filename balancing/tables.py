@@ -43,7 +43,7 @@ def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) ->
 
 
 def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
-    """The same as JSON rows."""
+    """Weights of the planes as JSON rows."""
     return rows(weight_columns(labels, planes, weights))
 
 
@@ -144,7 +144,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
-    """The same in numbers; amplitudes in the job's unit."""
+    """Errors of a reading and between runs in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
     alone, common, effect, further = run.typical
     whole, level = float(np.linalg.norm(run.typical)), run.level * scale

@@ -244,7 +244,7 @@ class Limits:
         )
 
     def pick(self, speeds: Sequence[int], planes: Sequence[int]) -> Limits:
-        """Those of some speeds and planes, by index."""
+        """Limits of some speeds and planes, by index."""
         return Limits(
             self.max_weight[list(planes)],
             self.residual[list(speeds)],

@@ -71,7 +71,7 @@ class Judgement:
 
     @property
     def size(self) -> float:
-        """Of the estimate."""
+        """Size of the estimate."""
         return abs(self.value)
 
     @property

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from rotorid import read_rotor, reduction
+from rotorid.files.settings import toml_bytes
 from rotorid.files.small_model import equations_of
-from rotorid.files.toml_file import toml_bytes
 
 ROTOR = Path(__file__).parents[1] / "sample_data" / "rotor23.csv"
 NODES = (7, 12, 18)

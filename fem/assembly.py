@@ -314,7 +314,7 @@ class Reduced:
 
     @property
     def size(self) -> int:
-        """R."""
+        """Number of unknowns, R."""
         return len(self.M)
 
     def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:

@@ -414,7 +414,7 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
 
 
 def _cut(paths: _Paths) -> str:
-    """What to say where modes that are not listed have critical speeds in the range, or may have."""
+    """A warning where modes that are not listed have critical speeds in the range, or may have."""
     speeds, lam = paths.speeds, paths.others
     f = np.where(decrements_of(lam) <= _SWINGS, off_synchronous(lam, speeds), np.nan)
     computed = np.fmax.reduce(np.abs(np.hstack((paths.values, lam)).imag), axis=1)
@@ -428,7 +428,7 @@ def _cut(paths: _Paths) -> str:
 
 
 def _warnings(paths: _Paths, n: int, gone: BoolArray) -> tuple[str, ...]:
-    """What the modes listed are not; `gone`, shape (S, n): where they do not oscillate."""
+    """Warnings of the modes listed; `gone`, shape (S, n): where they do not oscillate."""
     texts = [
         f"mode {mode + 1} does not oscillate (or above the frequencies computed) at {column.sum()} of "
         f"{column.size} speeds"

@@ -68,7 +68,7 @@ def check_numbers(item: Any, what: str) -> None:  # noqa: ANN401
 
 @dataclass(frozen=True)
 class NodeForce:
-    """What all of them have; their numbers are finite and not negative.
+    """A force at a node: what all kinds have; their numbers are finite and not negative.
 
     Attributes
     ----------
@@ -277,7 +277,7 @@ _WALL = 1e-14  # of 1 − ε², below which it is rounding
 
 
 def kind_of(force: NodeForce) -> str:
-    """Its name in `FORCES`.
+    """Name of the kind of a force, as in `FORCES`.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def kind_of(force: NodeForce) -> str:
 
 
 def code_of(force: NodeForce) -> int:
-    """Its place in `FORCES`; ValueError as `kind_of`."""
+    """Number of the kind of a force, its place in `FORCES`; ValueError as `kind_of`."""
     return [method.function for method in FORCES].index(type(force))
 
 
@@ -388,7 +388,7 @@ def _film(v: FloatArray, z: complex, dz: complex, omega: float, k2: float) -> tu
 
 @compiled_part
 def _stop(v: FloatArray, z: complex, dz: complex, omega: float) -> tuple[complex, ...]:
-    """As `_film`; zeros without contact."""
+    """Force of a stop with its derivatives, as `_film` returns them; zeros without contact."""
     _, gap, k, c, friction, diameter, v0, _ = v
     r = abs(z)
     n = z / r if r > gap else 0j

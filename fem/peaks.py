@@ -146,7 +146,7 @@ class Peaks(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is missing of each peak."""
+        """Why peaks have no amplification factor, a sentence each."""
         return tuple(f"{rpm_text(peak.speed)}: {peak.note}" for peak in self.peaks if peak.note)
 
     def to_dict(self) -> dict[str, Any]:
@@ -164,7 +164,7 @@ class Peaks(Result):
         return (Table("peaks", peak_columns(self.peaks)),)
 
     def sentence(self) -> str:
-        """Where they are."""
+        """Speeds of the peaks, in one sentence."""
         where = listing([rpm_text(peak.speed) for peak in self.peaks], "and")
         return f"peaks at {where}" if where else "no peak in this range of speeds"
 

@@ -57,7 +57,7 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, phase_deg, range_text, rpm_text
 
-Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
+UnbalanceLike = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
 """`{node or station: m r e^{iφ}}`, kg·m."""
 NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
@@ -262,7 +262,7 @@ class BearingForces(Result):
         return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
 
     def sentence(self) -> str:
-        """How many there are."""
+        """Number of coefficients and their speeds, in one sentence."""
         return f"Forces on {counted(len(self.supports), 'support')} at {speed_range(self.speeds)}."
 
 
@@ -331,7 +331,7 @@ class InfluenceCoefficients(Result):
         return (Table("largest influence coefficients", largest), every)
 
     def sentence(self) -> str:
-        """How many there are, and the largest."""
+        """Number of amplitudes and the largest of them, in one sentence."""
         _, C, P = self.W.shape
         first, *rest = self.tables()
         largest = "None has a meaning: there is no steady response."
@@ -367,7 +367,7 @@ def speed_range(speeds: FloatArray) -> str:
 
 def unbalance_response(
     rotor: Rotor,
-    unbalance: Unbalance,
+    unbalance: UnbalanceLike,
     speeds: ArrayLike,
     *,
     nodes: Sequence[int] | None = None,
@@ -582,7 +582,7 @@ class Receptance:
         return WholeBand(both_planes(self.rotor))
 
     def _exact(self, omega: FloatArray) -> ComplexArray:
-        """The same by LU factors of the whole band.
+        """Receptance by LU factors of the whole band, without modes.
 
         With one mode φ alone F = φ (φᵀ f) / (λ − ω²): then |Fᴴ f| / (Fᴴ M F) is the distance of λ from ω², or
         what damping makes of it.

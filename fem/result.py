@@ -35,7 +35,7 @@ class Result(Answered):
 
     @abstractmethod
     def tables(self) -> tuple[Table, ...]:
-        """The numbers."""
+        """The numbers of the result, as tables."""
 
     def to_frame(self) -> pd.DataFrame:
         """The last of the tables: of modes, a row per node."""
@@ -43,7 +43,7 @@ class Result(Answered):
 
     @abstractmethod
     def sentence(self) -> str:
-        """The answer."""
+        """The answer in one sentence."""
 
     @property
     def answer(self) -> Answer:

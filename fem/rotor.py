@@ -593,7 +593,7 @@ class Rotor:
 
     @property
     def linear(self) -> Rotor:
-        """The same without any of its forces, internal damping included."""
+        """The rotor without any of its forces, internal damping included."""
         return replace(self, forces=()) if self.forces else self
 
     @property
@@ -719,7 +719,7 @@ def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
 
 
 def label(sensor: SensorLike) -> str | int:
-    """How a table names it: as given, or "5 at 45°".
+    """Name of a sensor in tables: as given, or "5 at 45°".
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ class SpeedMap(Result):
         return (Table("limits of soft and of stiff supports", limits), Table("map", chart))
 
     def sentence(self) -> str:
-        """What the map is of."""
+        """Range of stiffness and number of critical speeds, in one sentence."""
         return (
             f"Map of critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m."
         )

@@ -110,7 +110,7 @@ class Window:
         return f"from {text(self.first)} to {text(self.last)}"
 
     def sentence(self) -> str:
-        """What happens, as a warning."""
+        """A warning of the growth in this window."""
         cause = "the rotor runs away without oscillating; check negative stiffness"
         if self.mode is not None:
             cause = f"mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows"
@@ -233,7 +233,7 @@ def grid_of(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 
 
 def covering(whirl: Whirl) -> Whirl:
-    """The same, or one at the same speeds that has all modes that may grow."""
+    """The whirl given, or one at the same speeds that has all modes that may grow."""
     P, speeds, n = whirl.Q.P, whirl.speeds, whirl.values.shape[1]
     bound, available = growth_bound(P.rotor, speeds), available_modes(P.rotor)
     while n < available:
@@ -349,7 +349,7 @@ def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float
 
 
 def windows_of(whirl: Whirl) -> tuple[Window, ...]:
-    """Ranges of growth.
+    """Ranges of speed in which a mode grows.
 
     Parameters
     ----------

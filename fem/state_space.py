@@ -43,7 +43,7 @@ class Motion:
     speed: float
 
     def index(self, name: str) -> int:
-        """Where an unknown stands, from 0.
+        """Index of an unknown by its name, from 0.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class StateSpace:
 
     @property
     def eigenvalues(self) -> ComplexArray:
-        """Of A, 1/s, by rising frequency |Im|, then real part, shape (n,)."""
+        """Eigenvalues of A, 1/s, by rising frequency |Im|, then real part, shape (n,)."""
         # From the last state: what is fast stands first, and the slow keep their digits.
         values = np.linalg.eigvals(self.A[::-1, ::-1]).astype(complex)
         return values[np.lexsort((values.imag, values.real, np.abs(values.imag)))]
@@ -220,7 +220,7 @@ def state_space(
 
 
 def _places(chosen: Sequence[str], names: Sequence[str], what: str) -> list[int]:
-    """Where names stand."""
+    """Indices of the chosen names among the names there are."""
     for name in chosen:
         if name not in names:
             raise ValueError(f"no {what} {name!r}: they are {names[0]} … {names[-1]}")

@@ -634,7 +634,7 @@ class Spectrum:
     pencil: Pencil
 
     def only(self, which: slice | IndexArray) -> Spectrum:
-        """Some modes."""
+        """The spectrum of some of the modes."""
         squares, rounding = self.squares[which], self.rounding[which]
         return replace(self, squares=squares, vectors=self.vectors[:, which], rounding=rounding)
 

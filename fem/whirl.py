@@ -93,11 +93,11 @@ class Whirl:
     error: float = 0.0
 
     def at(self, *speeds: ArrayLike) -> Whirl:
-        """The same at other speeds, rad/s, in this basis."""
-        return solve(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
+        """Whirl at other speeds, rad/s, in this basis."""
+        return solve_modes(self.Q, np.hstack(speeds), self.values.shape[1], self.scale)
 
 
-def solve(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
+def solve_modes(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     """The m ≤ 2 R modes of lowest frequency at each speed, in a basis; `scale` as in `Whirl`.
 
     Parameters
@@ -268,7 +268,7 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
 
 
 def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m: int) -> Whirl:
-    """The same in a basis that is made for a few speeds, then for all."""
+    """Whirl in a reduced basis that is made for a few speeds, then for all."""
     from scipy.linalg.lapack import dtbtrs
 
     A, U, kept = P.A, spectrum.factor, P.rows.size
@@ -280,7 +280,7 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         loads = np.hstack([multiply(band, Q.basis) for band in (A.mass, A.gyroscopic, A.material)])
         images = dtbtrs(U, loads, trans="T")[0]
         outside, triangle = np.linalg.qr(images - Y @ (Y.T @ images))
-        whirl = solve(Q, some, m, scale)
+        whirl = solve_modes(Q, some, m, scale)
         x, r = _vectors_and_loads(whirl, spectrum.shift)
         missing = -r @ triangle.T
         error = float((np.abs(missing) ** 2).sum(axis=(2, 3)).max())
@@ -449,7 +449,7 @@ def in_both_planes(
 
 
 def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
-    """What is not among the modes, of which `count` of n oscillate."""
+    """Warnings of modes that are missing: `count` of n oscillate."""
     texts = [f"only {count} of {n} modes oscillate"] if count < n else []
     if still > 1:
         texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still // 2} times) are left out")

@@ -55,6 +55,16 @@ def test_every_public_name_exists_and_is_documented(package):
         assert name in dir(package)
 
 
+def test_no_public_name_means_two_things():
+    values = {}
+    for package in (fem, balancing, rotorid):
+        for name in package.__all__:
+            assert name == "__version__" or name not in values, (
+                f"{package.__name__} and {values[name]}: {name}"
+            )
+            values[name] = package.__name__
+
+
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = rotorid.nonsense

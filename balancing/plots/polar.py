@@ -96,7 +96,7 @@ def on_paper(labels: Labels, vectors: ArrayLike) -> ComplexArray:
 
 
 def unit(labels: Labels) -> str:
-    """Of the readings, behind the name of an axis."""
+    """Unit of the readings, as it stands behind the name of an axis."""
     return f", {labels.vibration_in}" if labels.vibration_in else ""
 
 

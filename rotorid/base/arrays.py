@@ -66,11 +66,11 @@ def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
     try:
         array = np.atleast_1d(np.array(speeds, dtype=float))
     except (TypeError, ValueError):
-        raise ValueError("speeds must be numbers in rad/s") from None
-    if array.ndim != 1 or not array.size:
-        raise ValueError("speeds must be one number or a list of at least one")
-    if not (np.isfinite(array) & (array >= 0)).all():
-        raise ValueError("speeds must be finite and not negative, in rad/s")
+        array = np.empty(0)
+    if array.ndim != 1 or not array.size or not (np.isfinite(array) & (array >= 0)).all():
+        raise ValueError(
+            "speeds must be numbers in rad/s, at least one, in one list, finite and not negative"
+        )
     if ascending and (falls := np.diff(array) <= 0).any():
         before, after = array[(k := int(np.argmax(falls))) : k + 2]
         raise ValueError(f"speeds must ascend, but {after:.6g} rad/s follows {before:.6g} rad/s; sort them")
@@ -91,11 +91,9 @@ def attachment(item: Any) -> str:  # noqa: ANN401  all that has a node and a nam
 
 def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
     """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
-    turns = np.asarray(angle, dtype=float) / (np.pi / 2)
-    quarter = np.round(turns)
-    exact = np.abs(turns - quarter) < 1e-15 * np.maximum(np.abs(turns), 1.0)
-    unit = np.where(exact, 1j ** np.mod(np.where(exact, quarter, 0.0), 4), np.exp(1j * np.asarray(angle)))
-    return np.asarray(size * unit, dtype=complex)
+    unit = np.exp(1j * np.asarray(angle, dtype=float))
+    along, across = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in (unit.real, unit.imag))
+    return np.asarray(np.asarray(size) * (along + 1j * across), dtype=complex)
 
 
 def off_axis(weights: ArrayLike) -> bool:
@@ -106,10 +104,7 @@ def off_axis(weights: ArrayLike) -> bool:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    size = np.abs(z)
-    unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
-    along, across = np.array([unit.real, unit.imag]), np.array([-unit.imag, unit.real])
-    return np.asarray(
-        np.einsum("...,i...,j...->...ij", radial, along, along)
-        + np.einsum("...,i...,j...->...ij", tangential, across, across)
-    )
+    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
+    parts = ((radial, along), (tangential, across))
+    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))

@@ -47,19 +47,19 @@ class Compiled:
         """What numba makes of it."""
         from numba import njit
 
-        code, known = self.py_func.__code__, self.py_func.__globals__
-        used = {name: known.get(name) for name in code.co_names}
+        code, names = self.py_func.__code__, self.py_func.__globals__
+        used = {name: names.get(name) for name in code.co_names}
         called = {name: each.machine for name, each in used.items() if isinstance(each, Compiled)}
-        own = FunctionType(code, {**known, **called}, code.co_name)
-        made: Any = njit(cache=True, error_model="numpy")(update_wrapper(own, self.py_func))
+        linked = FunctionType(code, {**names, **called}, code.co_name)
+        made: Any = njit(cache=True, error_model="numpy")(update_wrapper(linked, self.py_func))
         made._cache._cache_file._source_stamp = self.stamp
         return made  # type: ignore[no-any-return]
 
     @cached_property
     def stamp(self) -> str:
         """Digest of the source of its module, and of those whose functions of this class that one imports."""
-        known = self.py_func.__globals__
-        imported = {each.py_func.__module__: each for each in known.values() if isinstance(each, Compiled)}
+        names = self.py_func.__globals__
+        imported = {each.py_func.__module__: each for each in names.values() if isinstance(each, Compiled)}
         digest = hashlib.sha256(Path(self.py_func.__code__.co_filename).read_bytes())
         for name in sorted(imported.keys() - {self.py_func.__module__}):
             digest.update(imported[name].stamp.encode())

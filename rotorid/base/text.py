@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -67,11 +66,6 @@ def sentence(text: str) -> str:
     'The runs agree.'
     """
     return capital(text) + ("" if text.endswith(".") else ".")
-
-
-def wrap(text: str, indent: str = "") -> str:
-    """The text in lines of 80 columns, all but the first indented."""
-    return textwrap.fill(text, WIDTH, subsequent_indent=indent)
 
 
 def cut(text: str, width: int) -> str:

@@ -74,7 +74,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
 
     --template job.xlsx writes a form; filled in, it is a job. --output sheet.xlsx is the job with results,
-    --output w.json the coefficients, for --influence.
+    --output w.json the coefficients, for --influence, and influence.csv a table of them.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         answer=_answer(result, mounted, check, left, verdict, read, influence),
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
-        files={".xlsx": workbook, ".json": coefficients},
+        files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),

@@ -30,7 +30,7 @@ from rotorid.report.outcome import Outcome, command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from fem import Peak, Peaks, Response, Rotor, SensorLike, Unbalance
+    from fem import Peak, Peaks, Response, Rotor, SensorLike, UnbalanceLike
     from rotorid.base.arrays import AnyArray, FloatArray
     from rotorid.reduction import SmallModel
 
@@ -378,7 +378,7 @@ def _api_unbalance(rotor: Rotor, given: str, speeds: Sequence[float], highest: f
 @command
 def response(
     rotor: Rotor | SmallModel | Path | str,
-    unbalance: Unbalance | Path | str,
+    unbalance: UnbalanceLike | Path | str,
     options: ResponseOptions,
 ) -> Outcome:
     """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
@@ -456,7 +456,7 @@ def response(
 
 def _solved(
     model: Rotor | SmallModel,
-    unbalance: Unbalance,
+    unbalance: UnbalanceLike,
     speeds: Sequence[float],
     places: Sequence[SensorLike],
     operating: tuple[float, float] | None,

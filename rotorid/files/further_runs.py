@@ -43,12 +43,12 @@ def outside(
 
     Sensors, planes (of these), units that do not convert, and speeds.
     """
-    for column, names, known in (
+    for column, names, there in (
         ("sensor", part.sensors, whole.sensors),
         ("plane", part.planes, planes),
     ):
-        for name in (name for name in names if name not in known):
-            yield column, name, f"{listing(known, 'and')}{did_you_mean(name, known)}"
+        for name in (name for name in names if name not in there):
+            yield column, name, f"{listing(there, 'and')}{did_you_mean(name, there)}"
     labels, others = part.labels, whole.labels
     pairs = [("amplitude", units.vibration(labels.vibration_unit), units.vibration(others.vibration_unit))]
     if part.planes:
@@ -132,12 +132,12 @@ def _stated(
     source: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
 ) -> ComplexArray:
     """Vectors that the job itself states; problems where they are none of its readings."""
-    usual, sizes, known = units.vibration(trials.labels.vibration_unit), list[float](), trials.sensors
+    usual, sizes, sensors = units.vibration(trials.labels.vibration_unit), list[float](), trials.sensors
     for name, vector in source.items():
         unit = vector.amplitude.unit if vector.amplitude.unit.name else usual
         sizes.append(unit.to_si(vector.amplitude.value))
-        if name not in known:
-            hint = f"{did_you_mean(name, known)}; its sensors are {listing(known, 'and')}"
+        if name not in sensors:
+            hint = f"{did_you_mean(name, sensors)}; its sensors are {listing(sensors, 'and')}"
             vector.complain(problems, "", f"a sensor of the runs table, not {name!r}{hint}")
         elif unit.kind != usual.kind:
             unit_words = f"{usual.name or 'no unit'}, as the readings have, or in a unit that converts to it"
@@ -147,9 +147,9 @@ def _stated(
 
 def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, problems: Problems) -> None:
     """Note what is `outside` the job in the files of further runs and their weights."""
-    for column, shown, known in more:
+    for column, shown, there in more:
         file = weights if column in ("plane", "weight") else runs
-        problems.add(file, None, column, shown, f"what the job has: {known}")
+        problems.add(file, None, column, shown, f"what the job has: {there}")
 
 
 def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:

@@ -202,9 +202,9 @@ def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
     errors = Gaussian.none(S, C, P)
     if std:
-        own = np.zeros((S, C, 2 * P + 2))
-        own[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
-        covariance = own[..., None] * np.eye(2 * P + 2)
+        variance = np.zeros((S, C, 2 * P + 2))
+        variance[..., 2:] = np.repeat(table.numbers("std")[at] ** 2, 2, axis=-1)
+        covariance = variance[..., None] * np.eye(2 * P + 2)
         errors = Gaussian(covariance, errors.noise.columns, errors.reading, errors.run)
     labels = replace(
         labels,
@@ -235,16 +235,16 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
 def _of_document(stored: Mapping[str, Any]) -> Influence:
     """The coefficients of `_document`, as they were."""
     reading, run, labels = stored["reading"], stored["run_errors"], stored["labels"]
-    sizes, chances, own = (
+    sizes, chances, covariance = (
         np.array(part, dtype=float) for part in (run["sizes"], run["probability"], stored["covariance"])
     )
     if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
         raise ValueError("sizes of errors and probabilities must be 0 or more")
-    if not np.linalg.eigvalsh(own).min() >= -1e-6 * np.abs(own).max():
+    if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
         raise ValueError("a covariance is none")
     stated = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
     run = run | {"sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()}
-    common = _complex(stored["common"]).reshape(-1, *own.shape[:2], own.shape[2] // 2)
+    common = _complex(stored["common"]).reshape(-1, *covariance.shape[:2], covariance.shape[2] // 2)
     reading = Reading(stated, reading["source"], dof=reading["dof"] or np.inf)
     return Influence(
         speeds=np.array(stored["speeds_rad_s"], dtype=float),
@@ -252,7 +252,7 @@ def _of_document(stored: Mapping[str, Any]) -> Influence:
         planes=tuple(stored["planes"]),
         W=_complex(stored["W"]),
         baseline=_complex(stored["baseline"]),
-        errors=Gaussian(own, common, reading, RunErrors(**run)),
+        errors=Gaussian(covariance, common, reading, RunErrors(**run)),
         labels=Labels(**labels | {"assumed": tuple(labels["assumed"])}),
     )
 
@@ -265,7 +265,7 @@ def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON docu
 
 def _document(influence: Influence) -> dict[str, Any]:
     """All that is known of coefficients and their errors, SI and phase lead: (2, …) real, imaginary parts."""
-    own, common = influence.errors.noise.at(influence.errors.sizes)
+    covariance, common = influence.errors.noise.at(influence.errors.sizes)
     run, reading = influence.run_errors, influence.reading
     stored = {
         "speeds_rad_s": influence.speeds,
@@ -273,7 +273,7 @@ def _document(influence: Influence) -> dict[str, Any]:
         "planes": influence.planes,
         "W": (influence.W.real, influence.W.imag),
         "baseline": (influence.baseline.real, influence.baseline.imag),
-        "covariance": own,
+        "covariance": covariance,
         "common": (common.real, common.imag),
         "reading": {
             "errors": None if reading.errors is None else asdict(reading.errors),
@@ -363,8 +363,8 @@ def fit_to_readings(
     Every speed and sensor of the readings must be there; further ones are left out.
     """
     before = len(problems)
-    for column, shown, known in outside(trials, influence, influence.planes, tolerance_percent):
-        expected = f"coefficients for {column} {shown!r}, which the readings have; there are {known}"
+    for column, shown, there in outside(trials, influence, influence.planes, tolerance_percent):
+        expected = f"coefficients for {column} {shown!r}, which the readings have; there are {there}"
         column = "influence" if column in ("amplitude", "weight") else column
         problems.add(source, None, column, None, expected)
     if len(problems) > before:

@@ -30,7 +30,7 @@ from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_o
 from rotorid.files.layout import files_of_runs, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
-from rotorid.files.toml_file import read_toml
+from rotorid.files.settings import read_toml
 
 if TYPE_CHECKING:
     from balancing import Mounted
@@ -303,11 +303,10 @@ def _stating(settings: JobSettings, stated: Mapping[str, Any]) -> JobSettings:
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
     """What tables there are, by `TABLES`, and the files with one run each."""
     runs = tuple(written.folder / name for name in settings.runs or ())
-    tables: dict[str, Source] = {"runs": runs[0]} if runs else {}
-    tables |= {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
-    tables |= written.tables
-    files = runs if len(runs) > 1 else files_of_runs(tables.get("runs"))
-    return tables | ({"runs": files} if files else {}), files
+    named = {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
+    table = runs[0] if runs else written.tables["runs"]
+    files = runs if len(runs) > 1 else files_of_runs(table)
+    return {**named, **written.tables, "runs": files or table}, files
 
 
 def _readings(

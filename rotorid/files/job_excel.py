@@ -20,7 +20,7 @@ from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.headings import find_header
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
-from rotorid.files.problems import Problems
+from rotorid.files.problems import Problems, refusal
 from rotorid.files.settings import Place
 
 NAMED = {"planes": "plane", "sensors": "sensor"}
@@ -36,8 +36,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
     """The job in the sheets of a workbook (`.xlsx`); raises `InputError` where there are no runs."""
     if not is_workbook(path):
         expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
-        problems.add(str(path), None, None, None, expected)
-        problems.stop()
+        raise refusal(path, expected)
     sheets = problems.need(read_workbook(path, problems))
     job = WrittenJob(path)
     titles = {title.strip().casefold(): title for title in reversed([*sheets]) if sheets[title]}

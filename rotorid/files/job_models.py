@@ -16,7 +16,7 @@ from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
 from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
-from rotorid.files.problems import Problems
+from rotorid.files.problems import Problems, refusal
 from rotorid.files.settings import (
     Date,
     Label,
@@ -431,8 +431,7 @@ class WrittenJob:
         """All settings; a file that is named in place of a sheet is a problem."""
         source = "" if self.path is None else str(self.path)
         if not self.tables and "runs" not in self.settings:
-            problems.add(source, None, "runs", None, 'a job, which names the runs table, runs = "runs.csv"')
-            problems.stop()
+            raise refusal(source, 'a job, which names the runs table, runs = "runs.csv"', column="runs")
         settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
         for name in filter(settings.has, self.tables):
             settings.complain(problems, name, f"the table in the sheet {name!r} of this workbook, not a file")

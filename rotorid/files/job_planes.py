@@ -68,9 +68,9 @@ def _placed(part: Plane | Sensor, rotor: Rotor | None, problems: Problems) -> Pl
     if rotor is None:
         part.complain(problems, key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
     elif station is not None and station not in rotor.stations:
-        known = listing(map(repr, rotor.stations), "and") or "none"
+        stations = listing(map(repr, rotor.stations), "and") or "none"
         hint = did_you_mean(station, rotor.stations)
-        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {known}")
+        part.complain(problems, key, f"a station of the rotor model{hint}; its stations are {stations}")
     elif (node := node or rotor.stations[str(station)]) > rotor.n_nodes:
         part.complain(problems, key, f"a node of the rotor model, from 1 to {rotor.n_nodes}")
     return part.model_copy(update={"node": node})
@@ -96,15 +96,13 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    missing = "; there is no trial weight in plane {!r}: is its row missing in the weights?"
-    for noun, parts, known, more_words in (
-        ("plane", stated, (*planes,), missing),
-        ("sensor", settings.sensors, trials.sensors, ""),
-    ):
-        for name in (name for name in parts if known and name not in known):
-            expected = f"one of the job's {noun}s, {listing(known, 'and')}{did_you_mean(name, known)}"
-            problem = parts[name].problem("", expected + more_words.format(name))
-            problems.extend([replace(problem, value=name)])
+    for kind, names in (("planes", [*planes]), ("sensors", trials.sensors)):
+        for name, part in getattr(settings, kind).items() if names else ():
+            if name not in names:
+                expected = f"one of the job's {kind}, {listing(names, 'and')}{did_you_mean(name, names)}"
+                if kind == "planes":
+                    expected += f"; there is no trial weight in plane {name!r}: is its row missing?"
+                problems.append(replace(part.problem("", expected), value=name))
     if not trials.labels.unbalances:
         trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
     return trials, planes
@@ -174,18 +172,17 @@ def _at_speeds(
     problems: Problems,
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
-    unit, near = units.SPEED[trials.labels.speed_unit], dict[int, float]()
+    unit, near = units.SPEED[trials.labels.speed_unit], dict[int | None, float]()
     for word in filter(None, numbers):
         k = None
         with suppress(NotANumber):
             speed = unit.to_si(parse_number(word, comma="," in word))
             k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
         if k is None or k in near:
-            known = show_speeds(trials.speeds, unit)
-            expected = f"speeds of the runs table, each once, not {word}: there are {known}"
+            there = show_speeds(trials.speeds, unit)
+            expected = f"speeds of the runs table, each once, not {word}: there are {there}"
             part.complain(problems, field, expected)
-        else:
-            near[k] = numbers[word]
+        near[k] = numbers[word]
     return np.array([near.get(k, numbers.get("", default)) for k in range(len(trials.speeds))])
 
 
@@ -225,14 +222,13 @@ def with_taken(
     A plane whose weights are not all in its holes, or fill all of them, stays as it is.
     """
     read, out = read_weights(weights, check.runs, conventions, Problems()), dict(holes)
+    rows = () if read is None else read.rows
     for plane, free in holes.items():
-        rows = () if read is None else read.rows
         mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
-        if not len(mounted) or free.taken.any():
-            continue
-        off = np.abs(mounted[:, None] - np.abs(mounted)[:, None] * np.exp(1j * free.angles))
-        taken = np.zeros(len(free.angles))
-        np.add.at(taken, off.argmin(axis=1), np.abs(mounted))
-        if (off.min(axis=1) <= IN_HOLE * np.abs(mounted)).all() and not taken.all():
+        size, holes_at = np.abs(mounted), np.exp(1j * free.angles)
+        off = np.abs(mounted[:, None] - size[:, None] * holes_at)
+        taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
+        in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
+        if in_holes and taken.any() and not taken.all() and not free.taken.any():
             out[plane] = replace(free, taken=taken)
     return out

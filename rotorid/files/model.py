@@ -21,9 +21,18 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.attached import whole
 from rotorid.files.problems import Problems, TableWarning
-from rotorid.files.settings import NotNegative, Number, Positive, Settings, key, listed, read_settings
+from rotorid.files.settings import (
+    MOST_NAMES,
+    NotNegative,
+    Number,
+    Positive,
+    Settings,
+    key,
+    listed,
+    read_settings,
+    read_toml,
+)
 from rotorid.files.small_model import FORCE, is_small, small_equations
-from rotorid.files.toml_file import MOST_NAMES, read_toml
 from rotorid.identify import expressions
 from rotorid.identify.amplitudes import AmplitudeErrors
 from rotorid.identify.equations import harmonic_model

@@ -42,9 +42,19 @@ from rotorid.files.attached import (
 from rotorid.files.columns import Column, read_table
 from rotorid.files.disk import each_file_once, write_files
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
-from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, read_settings
+from rotorid.files.settings import (
+    NotNegative,
+    Number,
+    Positive,
+    Settings,
+    Text,
+    key,
+    listed,
+    read_settings,
+    read_toml,
+    toml_bytes,
+)
 from rotorid.files.small_model import is_small, is_small_model, read_small_model
-from rotorid.files.toml_file import read_toml, toml_bytes
 from rotorid.files.units import one_of
 
 USUAL = {

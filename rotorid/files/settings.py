@@ -10,9 +10,11 @@ from __future__ import annotations
 import datetime
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -37,9 +39,14 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
+from rotorid.files.disk import read_bytes
 from rotorid.files.problems import Problem, Problems
 from rotorid.files.units import Quantity, Unit
 
+MOST_BYTES = 2_000_000
+_DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
+"""A key of so many parts; the time that tomllib takes grows with their square."""
+MOST_NAMES = 1_000
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Place = tuple[str, int, str]
 """Sheet, row and column of a setting of a workbook."""
@@ -273,14 +280,14 @@ class Settings(BaseModel):
         ctx, kind, value = error.get("ctx", {}), error["type"], error["input"]
         if isinstance(ctx.get("error"), _Wrong):
             return list(ctx["error"].args)
-        known, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
-        words, key = known.get(usual, Key()).expected, table.keys.get(usual)
+        keys, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
+        words, key = keys.get(usual, Key()).expected, table.keys.get(usual)
         if key is None:
             return [table.problem(usual, words)]
         inside = table.data[key] if isinstance(table.data[key], dict) else {}
         key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
-            names = [name for each in known.values() for name in each.names]
+            names = [name for each in keys.values() for name in each.names]
             near = did_you_mean(usual, names)
             words = f"a known key{near}; known are {listing(names, 'and') or 'none yet'}"
             if not (table.name or near or len(table.keys) > 1):
@@ -431,3 +438,52 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
         "description": "of the keys of this file; unstated: this one",
     }
     return {"$schema": DRAFT, **schema, "title": title}
+
+
+def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
+    """The content of a TOML file without its `schema_version`, or None and a problem."""
+    data = read_bytes(path, problems)
+    if data is None:
+        return None
+    try:
+        if len(data) > MOST_BYTES:
+            raise ValueError(f"at most {MOST_BYTES // 10**6} MB")
+        text = data.decode("utf-8-sig")
+        if not text.strip():
+            raise ValueError("settings; the file is empty")
+        if _DEEP.search(text):
+            raise ValueError("a key of more than 20 parts")
+        # A lone carriage return ends a line for no reader of TOML.
+        settings = tomllib.loads(text.replace("\r\n", "\n"))
+    except UnicodeDecodeError:
+        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
+    except (ValueError, RecursionError) as error:
+        problems.add(str(path), None, None, None, f"a TOML file: {error}")
+    else:
+        problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
+        return settings
+    return None
+
+
+def toml_bytes(data: Mapping[str, Any], comments: Iterable[str] = ()) -> bytes:
+    """A file of settings, with comment lines at the top; numbers keep all their digits, empty parts go.
+
+    Raises
+    ------
+    ValueError
+        For a name that is no Unicode text.
+    """
+    import tomli_w
+
+    lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
+    lines.append(f"schema_version = {SCHEMA_VERSION}")
+    tables = {}
+    for name, part in data.items():
+        rows = part if isinstance(part, list) else []
+        if isinstance(part, dict) or (rows and isinstance(rows[0], dict)):
+            tables[name] = part
+        elif rows and isinstance(rows[0], list):
+            lines += [f"{name} = [", *(f"  {json.dumps(row)}," for row in rows), "]"]
+        else:
+            lines.append(f"{name} = {json.dumps(part)}")
+    return "\n".join([*lines, "", tomli_w.dumps(tables)]).encode()

@@ -28,8 +28,7 @@ from rotorid.files.attached import (
     whole,
 )
 from rotorid.files.problems import InputError, Problem, Problems, TableWarning
-from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings
-from rotorid.files.toml_file import read_toml, toml_bytes
+from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"

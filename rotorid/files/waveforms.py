@@ -34,8 +34,8 @@ from rotorid.files.settings import (
     key,
     listed,
     read_settings,
+    read_toml,
 )
-from rotorid.files.toml_file import read_toml
 from rotorid.files.units import VIBRATION, Unit, spelt
 from rotorid.waveforms.record import Channel, Edge, SignalPath, TachoSettings, WaveformRecord
 from rotorid.waveforms.vectors import Vectors, find_vectors

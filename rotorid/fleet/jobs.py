@@ -24,7 +24,7 @@ from rotorid.base.logs import progress
 from rotorid.files import InputError, read_job
 from rotorid.files.disk import each_file_once, file_content
 from rotorid.files.problems import Problem, Problems
-from rotorid.files.toml_file import read_toml
+from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 
 if TYPE_CHECKING:

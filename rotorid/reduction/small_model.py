@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem import GRAVITY, JournalBearing, NodeForce, SqueezeFilm, StateSpace, Whirl, solve
+from fem import GRAVITY, JournalBearing, NodeForce, SqueezeFilm, StateSpace, Whirl, solve_modes
 from fem.assembly import (
     Reduced,
     assemble,
@@ -264,7 +264,7 @@ class SmallModel(Answered):
         # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
         n = Q.size if Q.P.planes == 2 else 2 * Q.size
         K, on = np.abs(Q.at(omega[:1])[1][0].diagonal()), np.flatnonzero(self.masses)
-        return solve(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
+        return solve_modes(Q, omega, n, float(np.sqrt(np.median(K[on] / self.masses[on]))))
 
     def critical_speeds(self, lowest: float, highest: float) -> FloatArray:
         """Speeds between two, rad/s, ascending, at which a mode whirls once a turn, either way."""

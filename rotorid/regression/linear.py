@@ -273,11 +273,11 @@ def _row_factors(weights: ArrayLike | None, sigma: ArrayLike | None, rows: int, 
         raise ValueError("give either weights or errors of Y, not both")
     stated = sigma is not None
     each = np.asarray(sigma if stated else 1.0 if weights is None else weights, dtype=np.float64)
-    if each.shape not in ((), (rows,)):
-        raise ValueError(f"weights and errors need one entry per row of Y, {rows}; got {each.shape}")
-    if not np.isfinite(each).all() or (each < 0).any() or not (each.all() if stated else each.any()):
+    fits = each.shape in ((), (rows,)) and np.isfinite(each).all() and not (each < 0).any()
+    if not fits or not (each.all() if stated else each.any()):
         raise ValueError(
-            "errors must be finite and greater than zero, weights finite, not negative, not all 0"
+            f"weights and errors need one finite entry per row of Y, {rows}: errors greater than zero, "
+            f"weights not negative and not all 0; got {each.shape}"
         )
     over = 1.0 / each if stated else np.sqrt(each)
     return np.repeat(np.broadcast_to(over, rows), m // rows)

@@ -184,27 +184,24 @@ def nonlinear_least_squares(  # noqa: PLR0913
             raise ValueError("a prior or a ridge needs the loss linear: a robust loss would discount it, too")
         residual, jacobian = prior.beside(residual, jacobian)
     search = _Search(labels, residual, jacobian, lower, upper, sigma_stated)
-    x, ended, small = first, near and not robust, False
-    if ended:
+    x, why, small = first, "", False
+    if near and not robust:
         x, judged, small = search.polish(first)
     if not small:
         x, ended = search.drive(first, robust, max_iterations)
         x, judged, small = search.polish(x)
-    if not ended:
         tried = counted(max_iterations, "evaluation")
-        why = f"not converged after {tried}: raise max_iterations or start nearer"
-    elif not small:
-        why = "the minimum was not reached: the last step is not yet small"
-    else:
-        why = f"converged in {counted(len(search.path) - 1, 'iteration')}"
-    if not (ended and small):
+        why = "" if small else "the minimum was not reached: the last step is not yet small"
+        why = why if ended else f"not converged after {tried}: raise max_iterations or start nearer"
+    if why:
         judged = replace(judged, covariance=None, solution_covariance=None)
+    path, costs = zip(*search.path, strict=True)
     return NonlinearEstimate(
         estimate=replace(judged, residuals=judged.residuals[: len(r0)]),
-        history=np.array([point for point, _ in search.path]),
-        costs=np.array([cost for _, cost in search.path]),
-        converged=ended and small,
-        message=why,
+        history=np.array(path),
+        costs=np.array(costs),
+        converged=not why,
+        message=why or f"converged in {counted(len(path) - 1, 'iteration')}",
         at_bounds=tuple(labels[j] for j in np.flatnonzero((x <= lower) | (x >= upper))),
     )
 
@@ -243,38 +240,33 @@ class _Search:
 
         A robust loss without stated errors takes its scale from the median residual of the search before it.
         """
-        if robust and self.stated:
-            self.limit = HUBER
-        x, converged = self._driven(x, most)
-        for _ in range(2 if robust and not self.stated else 0):
-            r = np.abs(self.residual(x))
-            rms = max(float(np.sqrt(np.mean(r**2))), np.finfo(float).tiny)
-            self.limit = HUBER * (1.4826 * float(np.median(r)) or rms)
-            x, converged = self._driven(x, most)
-        return x, converged
-
-    def _driven(self, x: FloatArray, most: int) -> tuple[FloatArray, bool]:
-        """One run of scipy's trust-region search."""
         from scipy.optimize import least_squares as driver
 
-        self.path.clear()
-        robust = np.isfinite(self.limit)
-        with np.errstate(all="ignore"):  # the driver shortens steps that overflow
-            end = driver(
-                lambda x: np.array(self.residual(x), dtype=np.float64),  # copies: it scales in place
-                inside(x, self.lower, self.upper, 1e-10),
-                jac=self._at_accepted,
-                bounds=(self.lower, self.upper),
-                x_scale="jac",
-                loss="huber" if robust else "linear",
-                f_scale=self.limit if robust else 1.0,
-                ftol=TOLERANCE,
-                xtol=TOLERANCE,
-                gtol=TOLERANCE,  # absolute: it depends on the units of the parameters
-                max_nfev=most,
-            )
-        at = end.active_mask
-        return np.where(at < 0, self.lower, np.where(at > 0, self.upper, end.x)), end.status > 0
+        self.limit = HUBER if robust and self.stated else np.inf
+        for run in range(3 if robust and not self.stated else 1):
+            if run:
+                r = np.abs(self.residual(x))
+                rms = max(float(np.sqrt(np.mean(r**2))), np.finfo(float).tiny)
+                self.limit = HUBER * (1.4826 * float(np.median(r)) or rms)
+            self.path.clear()
+            square = np.isinf(self.limit)
+            with np.errstate(all="ignore"):  # the driver shortens steps that overflow
+                end = driver(
+                    lambda x: np.array(self.residual(x), dtype=np.float64),  # copies: it scales in place
+                    inside(x, self.lower, self.upper, 1e-10),
+                    jac=self._at_accepted,
+                    bounds=(self.lower, self.upper),
+                    x_scale="jac",
+                    loss="linear" if square else "huber",
+                    f_scale=1.0 if square else self.limit,
+                    ftol=TOLERANCE,
+                    xtol=TOLERANCE,
+                    gtol=TOLERANCE,  # absolute: it depends on the units of the parameters
+                    max_nfev=most,
+                )
+            at = end.active_mask
+            x = np.where(at < 0, self.lower, np.where(at > 0, self.upper, end.x))
+        return x, end.status > 0
 
     def polish(self, x: FloatArray) -> tuple[FloatArray, Estimate, bool]:
         """Gauss–Newton to the last digits; the kernel's judgement; whether the last step is negligible."""

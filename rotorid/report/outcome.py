@@ -135,9 +135,9 @@ class Outcome(Answered):
 
     def written(self, path: Path) -> Written:
         """What `--output` writes to a file of this name."""
-        build = self.files.get(path.suffix.lower())
-        if build is not None:
-            return build(path)
+        for ending, build in self.files.items():
+            if path.name.lower().endswith(ending):
+                return build(path)
         if path.suffix.lower() != ".xlsx":
             return csv(self.table())
         from rotorid.base.tables import excel

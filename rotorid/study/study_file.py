@@ -28,8 +28,8 @@ from rotorid.files.settings import (
     listed,
     of,
     read_settings,
+    read_toml,
 )
-from rotorid.files.toml_file import read_toml
 from rotorid.files.units import Quantity
 
 if TYPE_CHECKING:

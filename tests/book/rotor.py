@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from fem_rotors import refined
 
 import fem
 from book.printed import below, parts, read
@@ -70,7 +69,7 @@ def exact():
 def speeds_and_shapes():
     """Slender elements, consistent masses, no shear, no rotary inertia: the defaults of a rotor table."""
     rotor = read_rotor(sample_data() / "rotor23.csv")
-    modes, fine = fem.critical_speeds(rotor, 3), fem.critical_speeds(refined(rotor, 12), 3)
+    modes, fine = fem.critical_speeds(rotor, 3), fem.critical_speeds(fem.refined(rotor, 12), 3)
     names = "critical speed {}, rad/s", "critical speed {}, each element cut into twelve, rad/s"
     shapes = modes.shapes / modes.shapes[0]
     again = parts(names[0], modes.frequencies) | parts(names[1], fine.frequencies)

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from fem_rotors import refined, rotor23, uniform
+from fem_rotors import rotor23, uniform
 
 import fem
 from fem import lowest_modes, one_plane
@@ -24,7 +24,7 @@ def test_fine_meshes_keep_their_digits(n):
 
 
 def test_a_fine_mesh_is_said_and_a_hopeless_one_refused():
-    (text,) = fem.critical_speeds(refined(rotor23(), 20)).warnings
+    (text,) = fem.critical_speeds(fem.refined(rotor23(), 20)).warnings
     assert "460 elements" in text
     assert "by 7e-06 of their size" in text
     with pytest.raises(ValueError, match=r"6000 elements is too fine for float64.*join"):

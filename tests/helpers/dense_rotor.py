@@ -8,8 +8,7 @@ z = x + i y, rotation from x to y at Ω and slopes dx/ds, dy/ds as angles,
 
 Euler–Bernoulli elements are the cubic ones, so answers on one mesh are comparable digit by digit. With shear
 the elements are polynomials of high degree in deflection and rotation, so answers are the continuum's, to
-about ten digits on any mesh. A pedestal is two more unknowns. `precision=np.longdouble` carries 19 digits
-where meshes are so fine that float64 no longer does (Euler–Bernoulli only).
+about ten digits on any mesh. A pedestal is two more unknowns.
 
 Unknowns stand in the order of the axis: node 1 (x, θx, y, θy), inner unknowns of element 1, node 2, …
 """
@@ -28,14 +27,13 @@ class Dense:
     K: np.ndarray  # with the circulatory part of material damping
     x: np.ndarray  # index of the deflection of each node, x-direction
     y: np.ndarray
-    bandwidth: int  # of shaft and supports; pedestals come last
 
     def dynamic(self, s):
         """s² M + s C + K."""
         return s * s * self.M + s * self.C + self.K
 
 
-def assemble(rotor, speed, precision=float):
+def assemble(rotor, speed):
     """All matrices at a rotating speed, supports taken at that speed."""
     model = rotor.model
     inner = DEGREE - 1 if model.shear else 0
@@ -44,10 +42,10 @@ def assemble(rotor, speed, precision=float):
     node = step * np.arange(n)
     pedestals = [support for support in rotor.supports if support.pedestal is not None]
     size = node[-1] + 4 + 2 * len(pedestals)
-    M, C, K = (np.zeros((size, size), dtype=precision) for _ in range(3))
+    M, C, K = np.zeros((3, size, size))
     for i in range(rotor.n_elements):
-        Me, Ge, Ke = _shear_element(rotor, i) if model.shear else _cubic_element(rotor, i, precision)
-        beta = precision(rotor.material_damping[i])
+        Me, Ge, Ke = _shear_element(rotor, i) if model.shear else _cubic_element(rotor, i)
+        beta = rotor.material_damping[i]
         near = [node[i], node[i] + 1, node[i + 1], node[i + 1] + 1]
         x = np.array(near + [node[i] + 4 + k for k in range(2 * inner)])
         y = np.array([k + 2 for k in near] + [node[i] + 4 + 2 * inner + k for k in range(2 * inner)])
@@ -89,7 +87,7 @@ def assemble(rotor, speed, precision=float):
         M[below, below] += support.pedestal.mass
         K[below, below] += np.broadcast_to(support.pedestal.stiffness, 2)
         C[below, below] += np.broadcast_to(support.pedestal.damping, 2)
-    return Dense(M, C, K, node, node + 2, size if pedestals else step + 4)
+    return Dense(M, C, K, node, node + 2)
 
 
 def whirl(rotor, speed):
@@ -128,73 +126,29 @@ def synchronous(rotor, speed):
     return tuple(A[np.ix_(x, x)] - 1j * A[np.ix_(x, y)] for A in (K, N))
 
 
-def polished(rotor, speed, lam, precision=np.longdouble, steps=3):
-    """An eigenvalue near `lam` and its vector, (λ, X, Y), by inverse iteration in higher precision."""
-    D = assemble(rotor, speed, precision)
-    complex_type = np.result_type(precision, np.complex64).type
-    lam = complex_type(lam)
-    left = right = np.ones(len(D.M), dtype=complex_type) + 1j * np.arange(len(D.M)) / len(D.M)
-    for _ in range(steps):
-        T = D.dynamic(lam)
-        right = solve(T, D.M @ right, D.bandwidth)
-        left = solve(T.T.copy(), D.M.T @ left, D.bandwidth)
-        right, left = right / np.abs(right).max(), left / np.abs(left).max()
-        lam = lam - (left @ (T @ right)) / (left @ ((2 * lam * D.M + D.C) @ right))
-    return lam, right[D.x], right[D.y]
-
-
-def direction(X, Y):
-    """Sign of the area of each orbit: 1 with the rotation, −1 against it, 0 for a line."""
-    return np.sign(-(X.conj() * Y).imag)
-
-
-def response(rotor, unbalance, speed, precision=float):
+def response(rotor, unbalance, speed):
     """Complex amplitudes X, Y (N,) at one speed: x = Re X e^{iΩt}; unbalance {node: m r e^{iφ}}, kg·m."""
-    D = assemble(rotor, speed, precision)
-    force = np.zeros(len(D.M), dtype=np.result_type(precision, np.complex64))
+    D = assemble(rotor, speed)
+    force = np.zeros(len(D.M), dtype=complex)
     for node, amount in unbalance.items():
-        force[D.x[node - 1]] += amount * precision(speed) ** 2
-        force[D.y[node - 1]] += -1j * amount * precision(speed) ** 2
-    A = D.dynamic(1j * precision(speed))
-    q = np.linalg.solve(A, force) if precision is float else solve(A, force, D.bandwidth)
+        force[D.x[node - 1]] += amount * speed**2
+        force[D.y[node - 1]] += -1j * amount * speed**2
+    q = np.linalg.solve(D.dynamic(1j * speed), force)
     return q[D.x], q[D.y]
 
 
-def solve(A, b, bandwidth):
-    """Gaussian elimination with row exchange in whatever precision the numbers have."""
-    A, b = A.copy(), b.astype(A.dtype)
-    n = len(A)
-    for k in range(n):
-        low, far = min(n, k + bandwidth + 1), min(n, k + 2 * bandwidth + 2)
-        pivot = k + int(np.argmax(np.abs(A[k:low, k])))
-        if pivot != k:
-            A[[k, pivot], k:far] = A[[pivot, k], k:far]
-            b[[k, pivot]] = b[[pivot, k]]
-        factor = A[k + 1 : low, k] / A[k, k]
-        A[k + 1 : low, k:far] -= factor[:, None] * A[k, k:far]
-        b[k + 1 : low] -= factor * b[k]
-    for k in range(n - 1, -1, -1):
-        far = min(n, k + 2 * bandwidth + 2)
-        b[k] = (b[k] - A[k, k + 1 : far] @ b[k + 1 : far]) / A[k, k]
-    return b
+def _section(rotor, i):
+    outer, inner = rotor.outer_diameter[i], rotor.inner_diameter[i]
+    return np.pi / 4 * (outer**2 - inner**2), np.pi / 64 * (outer**4 - inner**4)
 
 
-def _section(rotor, i, precision=float):
-    outer, inner = precision(rotor.outer_diameter[i]), precision(rotor.inner_diameter[i])
-    pi = 4 * np.arctan(precision(1))
-    return pi / 4 * (outer**2 - inner**2), pi / 64 * (outer**4 - inner**4)
-
-
-def _cubic_element(rotor, i, precision):
-    A, second = _section(rotor, i, precision)
-    L, E, rho = (precision(getattr(rotor, name)[i]) for name in ("length", "youngs_modulus", "density"))
-    scale = np.array([1, L, 1, L], dtype=precision)
-    scale = np.outer(scale, scale)
-    stiffness = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=precision)
-    moving = np.array(
-        [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]], dtype=precision
-    )
-    turning = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]], dtype=precision)
+def _cubic_element(rotor, i):
+    A, second = _section(rotor, i)
+    L, E, rho = rotor.length[i], rotor.youngs_modulus[i], rotor.density[i]
+    scale = np.outer([1, L, 1, L], [1, L, 1, L])
+    stiffness = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+    moving = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
+    turning = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]])
     K = E * second / L**3 * scale * stiffness
     M = rho * A * L / 420 * scale * moving
     R = rho * second / (30 * L) * scale * turning

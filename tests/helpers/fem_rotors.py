@@ -29,37 +29,6 @@ def uniform(n, *, length=1.0, diameter=0.1, **others):
     return fem.Rotor(np.full(n, length / n), diameter, density=7850.0, **others)
 
 
-def refined(rotor, times):
-    """The same rotor with each element cut into equal parts."""
-
-    def renumbered(item):
-        return {"node": times * (item.node - 1) + 1}
-
-    return fem.Rotor(
-        np.repeat(rotor.length, times) / times,
-        *(
-            np.repeat(getattr(rotor, name), times)
-            for name in ("outer_diameter", "inner_diameter", "youngs_modulus", "density")
-        ),
-        discs=[fem.Disc(mass=disc.mass, **renumbered(disc)) for disc in rotor.discs],
-        supports=[
-            fem.Support(stiffness=s.stiffness, damping=s.damping, **renumbered(s)) for s in rotor.supports
-        ],
-    )
-
-
-def mirrored(rotor):
-    last = rotor.n_nodes + 1
-    return fem.Rotor(
-        *(
-            getattr(rotor, name)[::-1]
-            for name in ("length", "outer_diameter", "inner_diameter", "youngs_modulus", "density")
-        ),
-        discs=[fem.Disc(last - disc.node, disc.mass) for disc in rotor.discs],
-        supports=[fem.Support(last - s.node, s.stiffness, s.damping) for s in rotor.supports],
-    )
-
-
 @st.composite
 def rotors(draw, elements=(2, 20), damped=True):
     """Rotors as machines have them: 2 or 3 supports, some discs, some sections hollow."""

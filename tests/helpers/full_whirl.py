@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem import reference, solve
+from fem import reference, solve_modes
 from fem.assembly import Planes, project
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
@@ -28,7 +28,7 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
     scale = reference(P, speeds, 1)[1]
     if P.planes * P.A.size <= _DENSE:
         Q = project(P, np.eye(P.A.size))
-        whirl = solve(Q, speeds, n, scale)
+        whirl = solve_modes(Q, speeds, n, scale)
         there = np.isfinite(whirl.values[0])
         shapes = Q.expand(whirl.vectors[0, there])
         return whirl.values[0, there], shapes, whirl.real[0], int(whirl.still[0])

@@ -9,7 +9,7 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import cells, disk, excel_workbook, instruments, problems, toml_file
+from rotorid.files import cells, disk, excel_workbook, instruments, problems, settings
 from rotorid.files.job_models import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
@@ -26,8 +26,8 @@ MB = 10**6
         ("a file, and a workbook unpacked", f"{disk.MOST_BYTES // MB} MB"),
         ("a file, and a workbook unpacked", f"{excel_workbook.MOST_UNPACKED // MB} MB"),
         ("cells of a table", f"{cells.MOST_CELLS:,}"),
-        ("a TOML file", f"{toml_file.MOST_BYTES // MB} MB"),
-        ("names in a list or table of a model", f"{toml_file.MOST_NAMES:,}"),
+        ("a TOML file", f"{settings.MOST_BYTES // MB} MB"),
+        ("names in a list or table of a model", f"{settings.MOST_NAMES:,}"),
         (
             "characters of an expression, and how deep it nests",
             f"{expressions.MAX_LENGTH:,}, {expressions.MAX_DEPTH}",

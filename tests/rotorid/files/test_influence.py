@@ -14,7 +14,6 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 import fem
 from balancing import (
-    Gaussian,
     Labels,
     Reading,
     ReadingErrors,
@@ -63,6 +62,7 @@ def test_meaning(stored):
     labels = influence.labels
     assert (labels.vibration_unit, labels.weight_unit, labels.phase) == ("um_pp", "g", "lead")
     assert (influence.has_baseline, influence.known_errors) == (False, False)
+    assert list(influence_frame(influence).columns) == [*HEADER[:4], "phase_lead_deg"]
 
 
 def test_phase_convention_of_the_table_wins_over_that_of_the_job(stored, tmp_path):
@@ -98,6 +98,14 @@ def test_a_table_comes_back_with_one_standard_deviation(tmp_path, suffix, phase,
     np.testing.assert_allclose(new[..., 0], new[..., 1])
     np.testing.assert_allclose(new.mean(axis=-1), old.mean(axis=-1), rtol=1e-12)
     assert not again.has_baseline
+
+
+def test_balance_writes_measured_coefficients_for_people_and_without_loss(tmp_path, cli):
+    runs, weights = write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
+    influence = estimate_influence(read_trials(runs, weights))
+    for name in ("fan influence.csv", "w.json"):
+        assert cli("balance", runs, weights, "--output", tmp_path / name).code == 0
+        np.testing.assert_allclose(read_influence(tmp_path / name).W, influence.W, rtol=1e-13)
 
 
 def test_names_with_signs_and_readings_without_a_unit_survive(stored, tmp_path):
@@ -187,16 +195,13 @@ def test_of_several_it_would_be_no_influence(tmp_path, rows, words):
 def test_a_model_keeps_its_error(tmp_path):
     supports = (fem.Support(1, 1e7, 1e4), fem.Support(5, 1e7, 1e4))
     rotor = fem.Rotor(np.full(4, 0.25), 0.05, supports=supports)
-    model = model_influence(
-        rotor, {"A": 2, "B": 4}, {"x": 1, "y": (5, 90.0)}, [100.0, 300.0], relative_error=0.1
-    )
-    again = round_trip(tmp_path / "influence.json", model)
-    np.testing.assert_allclose(again.channels(), model.channels(), rtol=1e-14)
-    assert (again.reading, again.labels) == (Reading(), model.labels)
+    places = {"A": 2, "B": 4}, {"x": 1, "y": (5, 90.0)}
+    model = model_influence(rotor, *places, [100.0, 300.0], relative_error=0.1)
     model = with_parameters(model, 0.2j * model.W[None], 0.1)
     again = round_trip(tmp_path / "influence.json", model)
     covariance = model.channels()
     np.testing.assert_allclose(again.channels(), covariance, rtol=1e-12, atol=1e-14 * covariance.max())
+    assert (again.reading, again.labels) == (Reading(), model.labels)
     assert_same_columns(again, model)
 
 
@@ -252,33 +257,15 @@ def test_json_keeps_everything_that_is_known_of_errors(tmp_path, job, phase):
     assert abs(other.draws - stored.draws).max() > 1e-3 * abs(stored.draws).max()
 
 
-def test_job_with_sensors_in_another_order(tmp_path):
-    made = trials()
-    influence = estimate_influence(made)
-    write_influence(tmp_path / "influence.json", influence)
-    lines = [["run", "speed_rad_s", "sensor", "amplitude_um_pp", "phase_deg"]]
-    for c in (3, 1):
-        size, phase = LABELS.vibration(made.mean[0, 1, c])
-        lines.append(["now", 200.4, f"s{c}", float(size), float(phase)])
-    write_csv(tmp_path / "now.csv", lines)
-    job = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json")
-    assert job.influence.sensors == job.trials.sensors == ("s3", "s1")
+def test_a_job_takes_its_sensors_and_speeds_in_its_own_order(stored, tmp_path):
+    fast = [[2000, *row[1:3], 3 * row[3], row[4], 0.1] for row in TABLE[1:]]
+    whole = stored([[*HEADER, "std_um_pp_per_g"], *([*row, 0.2] for row in TABLE[1:]), *fast])
+    now = write_csv(tmp_path / "now.csv", [RUNS[0], *(["now", 2004, *row[2:]] for row in RUNS[2:0:-1])])
+    job = job_from_files([now], influence=tmp_path / "influence.csv")
+    assert job.influence.sensors == job.trials.sensors == ("B", "A")
     np.testing.assert_array_equal(job.influence.speeds, job.trials.speeds)
-    np.testing.assert_allclose(job.influence.W, influence.W[1:2, [3, 1]], rtol=1e-9)
-    expected = influence.channels()[1][[3, 1]][None, ..., 2:, 2:]
-    np.testing.assert_allclose(
-        job.influence.channels()[..., 2:, 2:], expected, rtol=1e-9, atol=1e-12 * abs(expected).max()
-    )
-
-
-def test_without_errors_nothing_is_added(tmp_path):
-    known = estimate_influence(trials())
-    nothing = np.full(known.baseline.shape, np.nan)
-    influence = replace(known, baseline=nothing, errors=Gaussian.none(*known.W.shape))
-    columns = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_lead_deg"]
-    assert list(influence_frame(influence).columns) == columns
-    again = round_trip(tmp_path / "influence.json", influence)
-    assert (again.known_errors, again.reading) == (False, Reading())
+    np.testing.assert_allclose(job.influence.W, whole.W[1:, ::-1], rtol=1e-14)
+    np.testing.assert_allclose(job.influence.channels(), whole.channels()[1:, ::-1], rtol=1e-14)
 
 
 def without(key):

@@ -15,8 +15,8 @@ from timedomain_cases import motion_in, state_space_of
 
 import fem
 from rotorid.files import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
+from rotorid.files.settings import toml_bytes
 from rotorid.files.small_model import equations_of
-from rotorid.files.toml_file import toml_bytes
 from rotorid.identify import identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.reduction import reduce

@@ -214,7 +214,6 @@ def test_a_schema_has_every_key_in_every_unit():
         ("rotor", ROTOR + "[material]\npoisson_ratio = 0.6"),
         ("rotor", ROTOR + "[[disc]]\nnode = 2\nmass_kg = -1"),
         ("rotor", ROTOR + "[[bearing]]\nnode = 1\nkind = 'seel'"),
-        ("rotor", ROTOR + "[[bearing]]\nnode = 1\npedestal_stiffness_N_per_m = [1, 2, 3]"),
         ("job", 'phase = "lagg"'),
         ("job", "speed_tolerance_percent = 21"),
         ("job", "rotr = 'rotor.csv'"),

@@ -10,8 +10,8 @@ from timedomain_cases import motion_in, state_space_of
 import fem
 from fem import state_space as of_motion
 from rotorid.files import read_ode_model, read_rotor
+from rotorid.files.settings import toml_bytes
 from rotorid.files.small_model import equations_of
-from rotorid.files.toml_file import toml_bytes
 from rotorid.reduction import reduce, small_model
 from rotorid.samples import sample_data
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from cases import each_of
-from fem_rotors import machines, refined, rotor23, rotors, uniform
+from fem_rotors import machines, rotor23, rotors, uniform
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
@@ -175,7 +175,7 @@ def test_weights_reach_the_regression_and_wrong_ones_are_refused():
 
 
 def test_400_elements_give_the_same_model():
-    fine = refined(rotor23(), 17)
+    fine = fem.refined(rotor23(), 17)
     result = compare_methods(fine, [17 * (node - 1) + 1 for node in MASTERS])
     coarse = compare_methods(rotor23(), MASTERS)
     assert fine.n_elements == 391

@@ -94,23 +94,21 @@ def straight_line(seed=0, scatter=0.3):
 def test_unstated_errors_give_student_intervals_from_the_residuals():
     K, Y = straight_line()
     estimate = least_squares(K, Y)
-    x = K[:, 1]
-    slope_std = np.sqrt(estimate.residuals @ estimate.residuals / 10 / ((x - x.mean()) ** 2).sum())
-    assert estimate.std[1] == pytest.approx(slope_std, rel=1e-12)
-    assert estimate.coverage_factor == pytest.approx(2.228138852, rel=1e-9)  # t(0.975, 10), tables
-    assert estimate.ci95[1, 1] - estimate.values[1] == pytest.approx(2.228138852 * slope_std, rel=1e-9)
-    assert not estimate.errors_stated
-    assert estimate.chi_square is None
+    spread = np.sqrt(estimate.residuals @ estimate.residuals / 10 / np.sum((K[:, 1] - 2.5) ** 2))
+    assert estimate.std[1] == pytest.approx(spread, rel=1e-12)
+    assert estimate.ci95[1, 1] - estimate.values[1] == pytest.approx(
+        2.228138852 * spread, rel=1e-9
+    )  # t, tables
+    assert (estimate.errors_stated, estimate.chi_square) == (False, None)
 
 
 def test_stated_errors_give_normal_intervals_whatever_the_residuals():
     K, Y = straight_line(scatter=30.0)
     estimate = least_squares(K, Y, sigma=0.3)
-    x = K[:, 1]
-    slope_std = 0.3 / np.sqrt(((x - x.mean()) ** 2).sum())
-    assert estimate.std[1] == pytest.approx(slope_std, rel=1e-12)
-    assert estimate.coverage_factor == pytest.approx(1.959963984540054, rel=1e-12)
-    assert estimate.chi_square == pytest.approx((estimate.residuals / 0.3) @ (estimate.residuals / 0.3))
+    spread = 0.3 / np.sqrt(np.sum((K[:, 1] - 2.5) ** 2))
+    assert estimate.std[1] == pytest.approx(spread, rel=1e-12)
+    assert np.ptp(estimate.ci95[1]) == pytest.approx(2 * 1.959963984540054 * spread, rel=1e-12)
+    assert estimate.chi_square == pytest.approx(np.sum((estimate.residuals / 0.3) ** 2))
     assert "times as large as the stated errors explain" in estimate.summary()
 
 
@@ -133,15 +131,10 @@ def test_stated_errors_weight_rows_as_the_inverse_of_their_squares():
 
 def test_a_row_of_weight_zero_is_left_out():
     K, Y = straight_line()
-    weights = np.ones(12)
-    weights[3] = 0.0
-    spoilt = Y.copy()
-    spoilt[3] = 1e6
-    kept = np.arange(12) != 3
-    np.testing.assert_allclose(
-        least_squares(K, spoilt, weights=weights).values, least_squares(K[kept], Y[kept]).values, rtol=1e-10
-    )
-    assert least_squares(K, spoilt, weights=weights).dof == 9
+    spoilt, kept = np.where(np.arange(12) == 3, 1e6, Y), np.arange(12) != 3
+    estimate = least_squares(K, spoilt, weights=kept)
+    np.testing.assert_allclose(estimate.values, least_squares(K[kept], Y[kept]).values, rtol=1e-10)
+    assert estimate.dof == 9
 
 
 def test_opposite_columns_are_named_with_what_is_determined():
@@ -182,50 +175,42 @@ def test_a_zero_column_is_not_determined_and_the_rest_is():
 def test_determined_combinations_keep_their_value_along_the_null_space(n, seed):
     """Adding a null vector to the truth changes Y by nothing, so no reported value may change."""
     rng = np.random.default_rng(seed)
+    null = np.append(rng.integers(1, 3, n - 1), -1.0)
     K = rng.integers(-2, 3, size=(3 * n, n)).astype(float)
-    K[:, -1] = K[:, 0] * 2 - (K[:, 1] if n > 2 else 0)
+    K[:, -1] = K[:, :-1] @ null[:-1]
     truth = rng.normal(size=n)
-    null = np.zeros(n)
-    null[0], null[-1] = -2.0, 1.0
-    if n > 2:
-        null[1] = 1.0
     one, two = least_squares(K, K @ truth), least_squares(K, K @ (truth + 7 * null))
     np.testing.assert_allclose(one.values, two.values, atol=1e-8)
-    assert np.isnan(one.values[np.abs(null) > 0]).all()
     for a in one.combinations:
         assert a.coefficients @ null == pytest.approx(0, abs=1e-9)
         assert a.value == pytest.approx(a.coefficients @ truth, abs=1e-8)
 
 
 @each_of(
-    ("kwargs", "message"),
+    ("K", "Y", "more", "message"),
     [
-        ({"K": [1.0, 2.0], "Y": [1.0, 2.0]}, "K must be"),
-        ({"K": [[1.0], [2.0]], "Y": [1.0]}, "K must be"),
-        ({"K": np.zeros((0, 2)), "Y": np.zeros(0)}, "K must be"),
-        ({"K": [[np.nan]], "Y": [1.0]}, "finite"),
-        ({"K": [[1.0]], "Y": [np.inf]}, "finite"),
-        ({"K": [[1.0]], "Y": [1.0], "names": ["a", "b"]}, "different names"),
-        ({"K": [[1.0, 2.0]], "Y": [1.0], "names": ["a", "a"]}, "different names"),
-        ({"K": [[1.0]], "Y": [1.0], "sigma": 0.0}, "greater than zero"),
-        ({"K": [[1.0]], "Y": [1.0], "sigma": [1.0, 2.0]}, "one entry per row"),
-        ({"K": [[1.0]], "Y": [1.0], "sigma": np.nan}, "finite"),
-        ({"K": [[1.0]], "Y": [1.0], "weights": [-1.0]}, "not negative"),
-        ({"K": [[1.0]], "Y": [1.0], "weights": [0.0]}, "not all 0"),
-        ({"K": [[1.0]], "Y": [1.0], "weights": [1.0], "sigma": 1.0}, "not both"),
+        ([1.0, 2.0], [1.0, 2.0], {}, "K must be"),
+        ([[1.0], [2.0]], [1.0], {}, "K must be"),
+        (np.zeros((0, 2)), np.zeros(0), {}, "K must be"),
+        ([[1.0]], [np.inf], {}, "finite"),
+        ([[1.0]], [1.0], {"names": ["a", "b"]}, "different names"),
+        ([[1.0]], [1.0], {"sigma": 0.0}, "greater than zero"),
+        ([[1.0]], [1.0], {"sigma": np.eye(2)}, "one finite entry per row"),
+        ([[1.0]], [1.0], {"weights": [-1.0]}, "not negative"),
+        ([[1.0]], [1.0], {"weights": [0.0]}, "not all 0"),
+        ([[1.0]], [1.0], {"weights": [1.0], "sigma": 1.0}, "not both"),
     ],
 )
-def test_bad_input_is_refused_with_a_reason(kwargs, message):
+def test_bad_input_is_refused_with_a_reason(K, Y, more, message):
     with pytest.raises(ValueError, match=message):
-        least_squares(kwargs.pop("K"), kwargs.pop("Y"), **kwargs)
+        least_squares(K, Y, **more)
 
 
 def test_correlation():
     K, Y = straight_line()
-    estimate = least_squares(K, Y, names=["a", "b"])
-    np.testing.assert_allclose(np.diag(estimate.correlation), 1.0)
-    x = K[:, 1]
-    assert estimate.correlation[0, 1] == pytest.approx(-x.mean() / np.sqrt((x**2).mean()), rel=1e-9)
+    r = -2.5 / np.sqrt(np.mean(K[:, 1] ** 2))
+    R = least_squares(K, Y).correlation
+    np.testing.assert_allclose(R, [[1, r], [r, 1]], rtol=1e-12)
 
 
 def test_gain_is_the_least_squares_solution_of_every_matrix():
@@ -236,18 +221,15 @@ def test_gain_is_the_least_squares_solution_of_every_matrix():
         np.testing.assert_allclose(G @ y, unstretch(least_squares(matrix, y).values), rtol=1e-9)
 
 
-@pytest.mark.parametrize("number", [float, complex])
+@pytest.mark.parametrize("number", [1.0, 1.0 + 0.5j])
 def test_plain_solution_is_that_of_the_kernel(number):
     rng = np.random.default_rng(5)
-    A = rng.normal(size=(9, 3)).astype(number) * [1e-6, 1.0, 1e9]
-    y = rng.normal(size=9).astype(number)
-    if number is complex:
-        A, y = A + 1j * A[::-1], y + 1j * y[::-1]
-    found = solution(A, y)
-    assert found.dtype == number
+    A, y = number * rng.normal(size=(9, 3)) * [1e-6, 1.0, 1e9], number**2 * rng.normal(size=9)
     expected = least_squares(A, y).solution
-    np.testing.assert_allclose(found, expected if number is float else unstretch(expected), rtol=1e-10)
-    np.testing.assert_allclose(solution(A, np.stack((y, 2 * y), axis=1))[:, 1], 2 * found, rtol=1e-10)
+    expected = unstretch(expected) if isinstance(number, complex) else expected
+    solved = solution(A, np.stack((y, 2 * y), axis=1))
+    assert solved.dtype == type(number)
+    np.testing.assert_allclose(solved, np.outer(expected, [1, 2]), rtol=1e-10)
 
 
 def test_plain_solution_of_too_few_equations_is_the_shortest_in_scaled_unknowns():

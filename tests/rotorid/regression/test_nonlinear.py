@@ -173,38 +173,28 @@ def test_a_robust_loss_shrugs_off_gross_errors(stated):
 @pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_spread_of_a_robust_estimate_is_the_spread_of_repetitions(loss):
     K, _ = line(m=60)
-    rng = np.random.default_rng(11)
-    values, stds = [], []
-    for _ in range(200):
-        y = K @ [1.0, 2.0] + rng.standard_t(3, 60)
-        fit = nonlinear_least_squares(
-            lambda x, y=y: K @ x - y, lambda x: K, [1, 2], names="ab", sigma_stated=False, loss=loss
-        )
-        values.append(fit.values)
-        stds.append(fit.std)
-    ratio = np.sqrt(np.mean(np.square(stds), axis=0)) / np.std(values, axis=0)
+    noise = np.random.default_rng(11).standard_t(3, (200, 60))
+    run = {"names": "ab", "sigma_stated": False, "loss": loss}
+    fits = [
+        nonlinear_least_squares(lambda x, e=e: K @ (x - [1, 2]) - e, lambda x: K, [1, 2], **run)
+        for e in noise
+    ]
+    std = np.sqrt(np.mean([fit.std**2 for fit in fits], axis=0))
     # 200 repetitions know a standard deviation to 5 %
-    np.testing.assert_array_less(np.abs(np.log(ratio)), 0.2)
+    np.testing.assert_allclose(std, np.std([fit.values for fit in fits], axis=0), rtol=0.2)
 
 
 @pytest.mark.parametrize("loss", ["linear", "huber"])
 def test_what_the_functions_return_stays_as_it_is(loss):
-    K, _ = line(m=20)
-    y = K @ [1.0, 2.0] + np.random.default_rng(1).standard_t(2, 20)
-    last = {}
+    K, y = line(m=20)
+    K.flags.writeable = False
 
     def residual(x):
-        last["given"] = K @ x - y
-        last["kept"] = last["given"].copy()
-        return last["given"]
+        r = K @ x - y
+        r.flags.writeable = False
+        return r
 
-    def jacobian(x):
-        np.testing.assert_array_equal(last["given"], last["kept"])
-        return K
-
-    kept = K.copy()
-    nonlinear_least_squares(residual, jacobian, [0, 0], names="ab", sigma_stated=False, loss=loss)
-    np.testing.assert_array_equal(K, kept)
+    nonlinear_least_squares(residual, lambda x: K, [0, 0], names="ab", sigma_stated=False, loss=loss)
 
 
 def test_no_convergence_is_said():

@@ -8,7 +8,7 @@ import pytest
 from rotorid.commands.fit import FitOptions
 from rotorid.commands.fit import fit as work
 from rotorid.files import read_harmonic_model, read_ode_model
-from rotorid.identify import AmplitudeErrors, harmonic_model, identify
+from rotorid.identify import harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
@@ -81,24 +81,19 @@ def test_the_normal_matrix_is_that_of_the_data():
 @pytest.mark.parametrize("sigma", [None, 0.3])
 @pytest.mark.parametrize("method", ["levenberg-marquardt", "gauss-newton"])
 def test_a_ridge_multiplies_the_diagonal_of_the_normal_matrix(method, sigma):
-    y, start = readings(), np.array([0.5, -1.0, 2.0])
-    found = fit(
-        line({}), record(y, sigma), ridge=0.3, method=method, start=dict(zip("abc", start, strict=True))
-    )
+    y, start = readings(), {"a": 0.5, "b": -1.0, "c": 2.0}
+    found = fit(line({}), record(y, sigma), ridge=0.3, method=method, start=start)
     M = K.T @ K
     D = 0.3 * np.diag(np.diag(M))
-    assert found.values == pytest.approx(np.linalg.solve(M + D, K.T @ y + D @ start), rel=1e-8)
+    expected = np.linalg.solve(M + D, K.T @ y + D @ [*start.values()])
+    assert found.values == pytest.approx(expected, rel=1e-8)
     assert found.estimate.covariance is None
-    assert not found.reliable
-    (words,) = (w for w in found.warnings if "ridge" in w)
-    assert "biases the estimate" in words
-    told = found.to_dict()["ridge"]
-    assert told["lambda"] == 0.3
-    weight = 1.0 if sigma is None else sigma
-    left = np.linalg.lstsq(K, y)[1][0]
-    assert told["residual_rms"]["without"] == pytest.approx(np.sqrt(left / 25) / weight, rel=1e-8)
-    assert told["residual_rms"]["with"] == pytest.approx(found.residual_rms / weight, rel=1e-8)
-    assert told["condition_number"]["with"] < told["condition_number"]["without"]
+    assert sum("biases the estimate" in words for words in found.warnings) == 1
+    part = found.to_dict()["ridge"]
+    assert part["lambda"] == 0.3
+    rms = [np.sqrt(np.mean((y - K @ x) ** 2)) / (sigma or 1.0) for x in (np.linalg.lstsq(K, y)[0], expected)]
+    assert [*part["residual_rms"].values()] == pytest.approx(rms, rel=1e-8)
+    assert part["condition_number"]["with"] < part["condition_number"]["without"]
 
 
 def test_a_ridge_is_a_number_above_0_without_a_prior():
@@ -110,12 +105,11 @@ def test_a_ridge_is_a_number_above_0_without_a_prior():
 def test_a_prior_that_the_data_contradict_is_named():
     found = fit(line({"b": (2.0, 0.1), "c": (1.2, 0.5)}), record(readings()))
     (words,) = (w for w in found.warnings if "contradict the prior" in w)
-    assert words.startswith(
-        "the data and the other priors contradict the prior b"
-    )  # not c, that b pulls away
     assert np.abs(found.prior.away).min() > 3
-    assert f"b = 2 ± 0.1 by {abs(found.prior.away[0]):.2g} standard" in words
-    assert found.prior.away[0] < -5
+    # not c, that b pulls away
+    assert words.startswith(
+        f"the data and the other priors contradict the prior b = 2 ± 0.1 by {-found.prior.away[0]:.2g} st"
+    )
     assert not any("stated errors" in w for w in found.warnings)  # those of the data are right
 
 
@@ -158,14 +152,6 @@ def test_copies_for_each_record_have_the_prior_of_their_parameter():
     assert found.values[1:] == pytest.approx([2.0, 2.0], abs=0.02)
 
 
-def test_a_prior_needs_errors_to_be_weighed_by():
-    y = readings()
-    with pytest.raises(ValueError, match="weighed against the errors of the records: state them"):
-        fit(line(KNOWN), record(y, None))
-    with pytest.raises(ValueError, match="a robust loss would discount it"):
-        fit(line(KNOWN), record(y), loss="huber")
-
-
 def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
     model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
     w, start = np.array([8.0, 9.0, 11.0]), {"c": 1200.0, "b": 30.0}
@@ -181,25 +167,14 @@ def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
     assert some.to_dict()["ridge"]["parameters"]["c"]["value"] == 1200.0
 
 
-def test_identify_says_what_it_needs():
+@pytest.mark.parametrize(
+    ("name", "words"), [("c", "weighed against the errors of the amp"), ("d", "d is no parameter")]
+)
+def test_identify_says_what_a_prior_needs(name, words):
     model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
     data = experiments(model, [9.0, 11.0], {"X": [0.05 - 0.05j, -0.02 - 0.03j], "F": 10.0})
-    with pytest.raises(ValueError, match="weighed against the errors of the amplitudes"):
-        identify(model, data, prior={"c": (1.0, 1.0)})
-    with pytest.raises(ValueError, match="prior: d is no parameter"):
-        identify(model, data, prior={"d": (1.0, 1.0)})
-
-
-def test_a_prior_chooses_among_values_that_can_be_exchanged():
-    """Two time constants in a row: only their sum and product are determined; a prior of one tells which."""
-    model = harmonic_model(["(T1*p + 1)*(T2*p + 1)*X = F"], estimate=["T1", "T2"])
-    w = np.array([0.5, 1.0, 2.0])
-    X = 1 / ((0.5j * w + 1) * (0.8j * w + 1))
-    data = experiments(model, w, {"X": X, "F": 1.0}, errors=AmplitudeErrors(0.01, 0.01))
-    assert np.isnan(identify(model, data).values).all()
-    found = identify(model, data, prior={"T1": (0.6, 0.1)})
-    assert found.values == pytest.approx([0.5, 0.8], rel=0.05)
-    assert found.identifiable
+    with pytest.raises(ValueError, match=words):
+        identify(model, data, prior={name: (1.0, 1.0)})
 
 
 def test_a_bound_is_no_fault_of_the_prior_and_its_misfit_is_not_hidden():
@@ -217,18 +192,6 @@ def test_a_bound_is_no_fault_of_the_prior_and_its_misfit_is_not_hidden():
     assert found.to_dict()["prior"]["parameters"]["k"]["data_share"] is None
 
 
-def test_the_other_outputs_tell_of_a_prior(tmp_path):
-    folder, path = sample_data() / "fit" / "quasilinearization", tmp_path / "prior.toml"
-    text = (folder / "model.toml").read_text(encoding="utf-8")
-    path.write_text(f"{text}\n[prior]\ntheta1 = [1.0, 0.004]\n", encoding="utf-8")
-    start = {"theta1": 1.0, "theta2": -1.0, "theta3": -1.0}
-    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start))
-    sheet = found.sheet().decode()
-    assert "% from the data" in sheet.partition("<script")[0]
-    assert any("rows of [prior]" in note for note in found.equations.notes)
-    assert not work(folder / "model.toml", folder / "record_noisy.csv").equations.notes
-
-
 MODEL = """outputs = { y = "a + b*t" }
 estimate = { a = 0.0, b = 0.0 }
 [prior]
@@ -240,9 +203,7 @@ estimate = { a = 0.0, b = 0.0 }
     [
         ("b = 1.0", r"two numbers: .*\[value, standard deviation above 0\]"),
         ("b = [1.0, 0.0]", "a number of 1e-30 or more"),
-        ("b = [1.0, 1e-320]", "a number of 1e-30 or more"),
         ("b = [1.0, inf]", "a finite number"),
-        ('b = [1.0, "two"]', "standard deviation above 0"),
         ("b = [true, 2]", "standard deviation above 0"),
         ("bb = [1.0, 0.5]", r"bb is none \(did you mean 'b'\?\)"),
     ],

@@ -20,29 +20,19 @@ def several(M=12, k=4, n=2, between=2.0, within=0.5, error=0.1, seed=3):
 
 
 def test_variances_are_those_of_the_analysis_of_variance():
-    M, k = 12, 4
-    y, error, group = several(M, k)
-    means = y.reshape(M, k, 2).mean(axis=1)
-    inside = np.sum((y.reshape(M, k, 2) - means[:, None]) ** 2, axis=(0, 1)) / (M * (k - 1))
-    outside = k * np.sum((means - means.mean(axis=0)) ** 2, axis=0) / (M - 1)
-    found = random_effects(y, error, group)
-    assert found.mean == pytest.approx(means.mean(axis=0))
-    assert np.diag(found.within) == pytest.approx(inside - 0.1**2, rel=1e-9)
-    assert np.diag(found.between) == pytest.approx((outside - inside) / k, rel=1e-9)
+    y, error, group = several(M=12, k=4)
+    each = y.reshape(12, 4, 2)
+    inside = each.var(axis=1, ddof=1).mean(axis=0)
+    outside = 4 * each.mean(axis=1).var(axis=0, ddof=1)
+    effects = random_effects(y, error, group)
+    assert effects.mean == pytest.approx(y.mean(axis=0))
+    assert np.diag(effects.within) == pytest.approx(inside - 0.1**2, rel=1e-9)
+    assert np.diag(effects.between) == pytest.approx((outside - inside) / 4, rel=1e-9)
 
 
 def test_one_job_a_group_has_no_scatter_within():
     y, error, _ = several(k=1)
     assert not random_effects(y, error, np.arange(len(y))).within.any()
-
-
-def test_many_groups_give_back_what_was_drawn():
-    C = np.array([[4.0, 1.5, 0, 0], [1.5, 1.0, 0, 0], [0, 0, 2.0, -1.0], [0, 0, -1.0, 1.0]])
-    y = np.random.default_rng(1).multivariate_normal(np.arange(4.0), C, 20000)
-    error = np.zeros((len(y), 2, 2, 2))
-    found = random_effects(y, error, np.arange(len(y)))
-    assert found.between == pytest.approx(C, abs=0.1)
-    assert found.new_group == pytest.approx(found.between * (1 + 1 / 20000))
 
 
 def test_shrinkage_is_that_of_schaefer_and_strimmer():
@@ -55,12 +45,6 @@ def test_shrinkage_is_that_of_schaefer_and_strimmer():
     variance = n / (n - 1) ** 3 * np.sum((w - w.mean(axis=0)) ** 2, axis=0)
     keep = 1 - min(1.0, variance[other].sum() / np.sum((w.sum(axis=0) / 8)[other] ** 2))
     assert shrunk(x, 8) == pytest.approx(np.where(other, keep * S, S))
-
-
-def test_negative_variances_are_none():
-    y, error, group = several(M=20, k=1, n=4, between=0.3, error=1.0)
-    found = random_effects(y, 2 * error / 0.1**2 * 0.3**2, group)
-    assert np.linalg.eigvalsh(found.between).min() > -1e-12
 
 
 def test_errors_as_large_as_the_scatter_leave_no_more_than_the_scatter():
