@@ -38,7 +38,7 @@ COLUMNS = (
     *("runs", "sensor", "plane", "speed_rad_s", "radius_m", "re", "im", "std"),
 )
 """Of the table: `job` is the path of the job below the tree, `runs` the SHA-256 of its readings."""
-_DATE = re.compile(r"(?<!\d)\d{4}-\d\d-\d\d(?!\d)")
+_DATE = re.compile(r"([\s_-]*\d{4}-\d\d-\d\d)*[\s_-]*")
 _SHEET = re.compile(rb'<(?:\w+:)?sheet\s[^>]*?\bname="([^"]*)"')
 
 
@@ -136,7 +136,7 @@ def runs_of(job: Job) -> str:
 def machine_of(job: Job) -> str:
     """As the job says; else its folder, or the first above it whose name is not a date alone."""
     folders = (folder.name for folder in _printable(job.files[0].resolve()).parents)
-    return job.settings.machine or next((name for name in folders if _DATE.sub("", name).strip(" _-")), "")
+    return job.settings.machine or next((name for name in folders if not _DATE.fullmatch(name)), "")
 
 
 def _printable(path: Path) -> Path:

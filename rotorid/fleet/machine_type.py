@@ -139,18 +139,13 @@ class MachineType:
     def why_odd(self, record: MachineRecord) -> str:
         """What would make a record fit the type best, in words; "" where nothing tried does."""
         W, std, share = record.W, record.std, self.mean / np.abs(self.mean) ** 2
-        theta = np.angle(np.sum(np.conj(W) * share))
-        angles = np.angle(np.sum(W * share, axis=(0, 1)))
+        lag = W.conj() * np.exp(1j * np.angle(np.sum(W * share, axis=(0, 1))))
+        theta = np.angle(np.sum(W.conj() * share))
         degrees = round(np.degrees(theta))
         mark = f"{'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
         changes = [
             (f"its phases {mark}", W * np.exp(1j * theta), std, 1),
-            (
-                "its phases were of the other sense (lag for lead)",
-                W.conj() * np.exp(1j * angles),
-                std,
-                len(angles),
-            ),
+            ("its phases were of the other sense (lag for lead)", lag, std, len(self.planes)),
         ]
         for names, axis, what in ((self.sensors, 1, "sensors"), (self.planes, 2, "planes")):
             for a, b in combinations(range(len(names)), 2):
@@ -280,11 +275,10 @@ def records_at(cells: pd.DataFrame, grid: Grid) -> list[MachineRecord]:
     cells = cells.assign(speed=off.argmin(axis=1))[alike & (off.min(axis=1) <= DEFAULT_TOLERANCE / 100)]
     if grid.weight_kind == "mass":  # that at another radius does as much more, or less
         usual = cells.groupby("plane")["radius_m"].transform("median")
-        wanted = (
-            cells["plane"].map(dict(zip(grid.planes, grid.radii, strict=True))).astype(float).fillna(usual)
-        )
-        factor = (wanted / cells["radius_m"].fillna(usual)).fillna(1.0)
-        cells[values] = cells[values].mul(factor, axis=0)
+        radii = dict(zip(grid.planes, grid.radii, strict=True))
+        wanted = cells["plane"].map(radii).astype(float).fillna(usual)
+        factor = wanted / cells["radius_m"].fillna(usual)
+        cells[values] = cells[values].mul(factor.fillna(1.0), axis=0)
     wide = cells.drop_duplicates(["job", *keys]).pivot(index=["machine", "job"], columns=keys, values=values)
     every = pd.MultiIndex.from_product([values, range(len(grid.speeds)), grid.sensors, grid.planes])
     wide = wide.reindex(columns=every).dropna()

@@ -185,10 +185,11 @@ def _figure(ratios: pd.DataFrame) -> Figure:
 
     def draw(ax: Axes) -> None:
         plain(ax)
-        ax.ecdf(ratios["ratio_0"].dropna(), orientation="horizontal", label="as built", **look(0))
+        curves = {"as built": ratios["ratio_0"]}
         if ratios.shape[1] > 1:
-            last = ratios.ffill(axis=1).iloc[:, -1].dropna()
-            ax.ecdf(last, orientation="horizontal", label="after the last correction", **look(1))
+            curves["after the last correction"] = ratios.ffill(axis=1).iloc[:, -1]
+        for k, (name, values) in enumerate(curves.items()):
+            ax.ecdf(values.dropna(), orientation="horizontal", label=name, **look(k))
         ax.axhline(1.0, color="black", linewidth=0.8, label="limit")
         ax.set(yscale="log", ylabel="largest reading over its limit", xlabel="share of machines below")
         plain_numbers(ax)
