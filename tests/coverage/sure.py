@@ -16,7 +16,6 @@ PROGRAMS = {
     "balance": ("coverage_balance.py", 2500),
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
-    "fleet of six machines": ("coverage_fleet.py", 20, 1, 6),
     "identify": ("coverage_identify.py", 500),
     "runup": ("coverage_runup.py", 1, 200),
 }
