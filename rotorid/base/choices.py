@@ -54,10 +54,10 @@ def suggest(name: str, choices: Iterable[str]) -> str | None:
     First one that only has its unit more, then a similar one, then the only one that begins so.
     """
     word, spelt = name.casefold(), {each.casefold(): each for each in reversed([*choices])}
-    unit_missing = [each for each in spelt if each.startswith(f"{word}_")][-1:]
-    begun = [each for each in spelt if len(name) > 2 and each.startswith(word)]
-    only = begun if len(begun) == 1 else []
-    nearest = unit_missing or difflib.get_close_matches(word, spelt, n=1, cutoff=0.6) or only
+    begun = [each for each in spelt if each.startswith(word)]
+    unit_missing = [each for each in begun if each.startswith(f"{word}_")][-1:]
+    only = begun if len(begun) == 1 and len(name) > 2 else []
+    nearest = unit_missing or difflib.get_close_matches(word, spelt, n=1) or only
     return spelt[nearest[0]] if nearest else None
 
 

@@ -95,15 +95,14 @@ def listing(names: Iterable[str], conjunction: str = "or") -> str:
 
 def table(rows: list[list[str]], left: int = 1, width: int = WIDTH) -> str:
     """Columns right-aligned, except for the first `left` ones; names are cut where the width needs it."""
-    columns = len(rows[0])
-    widths = [max(len(r[i]) for r in rows) for i in range(columns)]
-    names = left - 1
-    widths[names] = max(min(widths[names], width - 2 * columns - (sum(widths) - widths[names])), 8)
+    widths, name = [max(map(len, column)) for column in zip(*rows, strict=True)], left - 1
+    over = sum(widths) + 2 * len(widths) - width
+    widths[name] = max(widths[name] - max(over, 0), 8)
     lines = []
     for row in rows:
-        cells = [cut(cell, widths[i]) for i, cell in enumerate(row)]
-        cells = [f"{x:<{widths[i]}}" if i < left else f"{x:>{widths[i]}}" for i, x in enumerate(cells)]
-        lines.append(("  " + "  ".join(cells)).rstrip())
+        cells = [cut(cell, wide) for cell, wide in zip(row, widths, strict=True)]
+        shown = [f"{cell:{'<' if i < left else '>'}{widths[i]}}" for i, cell in enumerate(cells)]
+        lines.append(("  " + "  ".join(shown)).rstrip())
     return "\n".join(lines)
 
 

@@ -218,10 +218,6 @@ def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
     path = tmp_path / "model.toml"
     path.write_text(MODEL + "b = [1, 0.5]\n", encoding="utf-8")
     assert dict(read_ode_model(path).prior) == {"b": (1.0, 0.5)}
-    time = 'M = [["m"]]\nC = [["b"]]\nK = [["c"]]\n[force]\ny1 = "u"\n[estimate]\nb = 1\nc = 2\nx0 = 1\n'
-    more = '[known]\nm = 1\n[initial]\ny1 = "x0"\n[prior]\nc = [2, 0.1]\nx0 = [1, 1]\n'
-    path.write_text('inputs = ["u"]\n' + time + more, encoding="utf-8")
-    assert read_harmonic_model(path).prior == {"c": (2.0, 0.1)}
 
 
 def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():
