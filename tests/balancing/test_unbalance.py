@@ -93,15 +93,6 @@ def test_ridge_is_nearer_to_a_smooth_unbalance_than_the_smallest_one(rotor):
     assert found.own_share.max() < 1
 
 
-def test_readings_within_their_errors_show_no_unbalance():
-    covariance = np.tile(np.eye(2), (4, 1, 1))
-    found = estimate_unbalance(
-        np.diag([1.0, 2, 3, 4]), [0.1, 0.1j, 0.1, 0], method="ridge", errors=drawn(covariance)
-    )
-    assert np.abs(found.unbalance).max() < 1e-9
-    assert found.warnings == ("the readings lie within their errors: they show no unbalance at all",)
-
-
 @pytest.mark.parametrize("method", ["minimum-norm", "ridge"])
 def test_readings_that_no_unbalance_here_explains(method):
     W, Y = np.array([[1.0], [1.0], [1.0]]), np.array([1.0, 2.0, 3.0])
