@@ -81,8 +81,8 @@ def _identify() -> Pictures:
     from rotorid.identify.plots_records import figure_fit
 
     return {
-        Identification: lambda found, ax: figure_identification(found),
-        Fit: lambda found, ax: figure_fit(found),
+        Identification: lambda result, ax: figure_identification(result),
+        Fit: lambda result, ax: figure_fit(result),
     }
 
 

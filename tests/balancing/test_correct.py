@@ -118,16 +118,6 @@ def test_the_covariance_of_weights_and_of_a_check_run_against_simulated_jobs():
     assert np.mean(np.sqrt(np.mean(np.abs(check) ** 2, axis=1)) < c.check_rms) > 0.93
 
 
-def test_where_nothing_is_known_of_errors_nothing_is_stated_of_them():
-    measured = estimate_influence(bruel_kjaer())
-    c = correct(stored(measured.W, measured.baseline))
-    assert not c.errors_known
-    assert not c.region_known
-    assert np.isnan([*c.mass_std, *c.angle_std, *c.covariance.ravel(), c.check_rms, *c.within.ravel()]).all()
-    document = c.to_dict()
-    assert document["corrections"][0]["mass_std"] is document["residuals"][0]["after_covariance"] is None
-
-
 # weights of readings, limits, ridge, removal
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, synthetic
 
-from balancing import ReadingErrors, correct, estimate_influence
+from balancing import Labels, ReadingErrors, correct, estimate_influence
+from balancing.tables import largest_readings
 
 ERRORS = ReadingErrors(0.02, np.deg2rad(1))
 
@@ -62,3 +63,9 @@ def test_planes_that_are_told_apart_have_their_own_weights():
     c = correct(estimate_influence(bruel_kjaer(errors=ERRORS)))
     assert c.combination == ""
     assert c.sentence().startswith("Mount these weights: rms ")
+
+
+def test_the_largest_readings_come_first():
+    before, after = np.array([[3e-6, 2e-6]]), np.array([[2e-7, 1e-6]])
+    words = largest_readings(Labels("um", 1e6), np.array([100 * np.pi]), ("DE", "NDE"), before, after)
+    assert words == ", µm peak: NDE at 3000 rpm 2.00 → 1.00; DE at 3000 rpm 3.00 → 0.200."

@@ -43,17 +43,29 @@ def test_repeats_give_the_errors_where_none_are_stated():
     assert np.allclose(mean[1:], one[1:] / 30, rtol=0.05)
 
 
-@pytest.mark.parametrize(("factor", "enlarged"), [(0.3, False), (1.0, False), (3.0, True)])
-def test_stated_errors_hold_unless_repeats_contradict_them(factor, enlarged):
-    stated = ReadingErrors(0.01, 0.02)
-    reading = reading_of(many(0.01 * factor, stated, 5, across=0.02 * factor))
-    assert (reading.source == "stated, enlarged by repeats") is enlarged
-    if enlarged:
-        assert reading.errors.amplitude == pytest.approx(0.03, rel=0.1)
-        assert reading.errors.phase == pytest.approx(2 * reading.errors.amplitude)
-        assert "times as much as the stated errors" in reading.warnings[0]
-    else:
-        assert reading == (stated, "stated", (), np.inf)
+@pytest.mark.parametrize(
+    ("stated", "scatter", "errors", "source"),
+    [
+        ((0.01, 0.02), (0.003, 0.006), (0.01, 0.02), "stated"),
+        ((0.01, 0.02), (0.01, 0.02), (0.01, 0.02), "stated"),
+        ((0.01, 0.02), (0.03, 0.06), (0.03, 0.06), "stated, enlarged by repeats"),
+        ((0.01, 0.0), (0.01, 0.02), (0.01, 0.02), "stated, enlarged by repeats"),  # one was not stated
+        ((0.01, 0.0, 1e-9), (0.01, 0.0), (0.01, 0.0), "stated"),
+    ],
+)
+def test_stated_errors_hold_unless_repeats_contradict_them(stated, scatter, errors, source):
+    reading = reading_of(many(scatter[0], ReadingErrors(*stated), 9, across=scatter[1]))
+    assert reading.source == source
+    assert (reading.errors.amplitude, reading.errors.phase) == pytest.approx(errors, rel=0.1)
+    assert any("times as much as the stated errors" in w for w in reading.warnings) == (errors[0] > stated[0])
+
+
+def test_equal_repeats_say_nothing_about_the_errors():
+    exact, _, _ = synthetic(np.random.default_rng(1))
+    repeats = np.repeat(exact.readings, 3, axis=0)
+    reading = reading_of(replace(exact, readings=repeats))
+    assert reading.errors == ASSUMED
+    assert "equal to the last digit" in reading.warnings[0]
 
 
 def test_errors_that_an_instrument_measured():

@@ -25,11 +25,6 @@ def test_defaults_and_order():
     assert from_list([0.0, 1.0]).taken.tolist() == [0, 0]
 
 
-def test_largest_weight_counts_what_is_mounted():
-    holes = from_list([0.0, np.pi], [0.02], taken=[0.03, 0], max_weight=0.03)
-    assert holes.allows([0.0, -0.02, 0.01, -0.06]).tolist() == [True, True, False, True]
-
-
 @each_of(
     ("angles", "options", "message"),
     [

@@ -146,6 +146,7 @@ def test_a_hole_takes_away_what_the_integral_over_its_depth_says(diameter, depth
     found = drill(target, 0.1, diameter)
     assert found.tip_depth == pytest.approx(depth, rel=1e-9)
     assert found.mass == pytest.approx(integral(lambda _: 1.0), rel=1e-9)
+    assert found.to_dict(GRAMS)["unbalance_kg_m"] == pytest.approx(abs(target))
     light = drill(target * 2700 / STEEL, 0.1, diameter, 2700.0)
     assert (light.depth, light.mass) == pytest.approx((found.depth, found.mass * 2700 / STEEL), rel=1e-9)
 
@@ -180,6 +181,7 @@ def test_what_cannot_be_is_refused(call, words):
 def test_two_masses_make_the_target_in_two_mirrored_ways(target, a, b):
     found = two_positions(target, a, b)
     np.testing.assert_allclose(found.weights().sum(axis=1), [target, target], rtol=1e-9, atol=1e-15)
+    assert found.to_dict(GRAMS)["masses"] == pytest.approx([1e3 * a, 1e3 * b])
     if target:
         mirrored = np.exp(1j * (2 * np.angle(target) - found.angles[0]))
         np.testing.assert_allclose(np.exp(1j * found.angles[1]), mirrored, atol=1e-7)

@@ -178,7 +178,7 @@ def test_an_element_of_a_thousandth_of_its_neighbour_is_computed():
     np.testing.assert_allclose(fem.critical_speeds(on_ends(short), 2).frequencies, fine, rtol=1e-8)
 
 
-@pytest.mark.parametrize("lengths", [[0.25, 1e-9, 0.25], [8e-5, 0.25], [0.25, 1e-9, 1e-9, 0.25]])
+@pytest.mark.parametrize("lengths", [[0.25, 1e-9, 0.25], [8e-5, 0.25]])
 def test_much_shorter_elements_are_refused(lengths):
     with pytest.raises(ValueError, match=r"element [12]: length .* 1/3000 of its longer neighbour"):
         on_ends(lengths)

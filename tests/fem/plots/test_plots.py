@@ -80,6 +80,8 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     np.testing.assert_allclose(marks.get_xdata(), RPM * np.array([380.95, 421.05]))
     words = sorted((text for text in above.texts if "δ" in text.get_text()), key=lambda text: text.xy)
     assert [text.get_text() for text in words] == ["3638 rpm, δ = 0.30", "4021 rpm, δ = 0.19"]
+    (first, low), (second, high) = (text.xy for text in words)  # below their marks, and not over each other
+    assert (low < first, high <= second, high - low >= 0.0499 * above.get_ylim()[1]) == (True, True, True)
     np.testing.assert_allclose(below.get_lines()[1].get_ydata(), whirl().log_decrements[:, 1])
     assert below.get_ylim()[0] < -0.1
     for ax in (above, below):
@@ -119,6 +121,14 @@ def test_bode_shows_amplitude_phase_peaks_and_the_operating_range():
     assert phase[0] == pytest.approx(-0.38, abs=0.05)  # undamped below, half a turn behind above
     assert phase[steady][-1] == pytest.approx(-176.0, abs=0.5)
     check_hygiene(above.figure)
+
+
+def test_amplitudes_over_speed():
+    response = fem.unbalance_response(rotor23(2e4), {12: 1e-3}, np.linspace(1, 700, 50))
+    ax = plot(response)
+    assert labels(ax)[:2] == ["node 2", "node 22"]
+    np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), 1e6 * np.abs(response.at(2)))
+    assert labels(plot(response, nodes=[5])) == ["node 5"]
 
 
 def readings_of(speeds, *Z, windows=()):
