@@ -76,7 +76,7 @@ def _escaped(line: str) -> str:
     return out
 
 
-def _take_literally(*event: Any) -> None:
+def _take_literally(*event: Any) -> None:  # noqa: ANN401 - what autodoc hands over
     event[-1][:] = plain(event[-1])
 
 

@@ -144,12 +144,16 @@ class Answered(ABC):
 def together(answers: Iterable[Answer]) -> Answer:
     """Answers beside each other as one: their judgements first."""
     each = list(answers)
+
+    def all_of(field: str) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(words for one in each for words in getattr(one, field)))
+
     return Answer(
-        "\n".join(one.judgement for one in each if one.judgement),
-        "\n\n".join(one.numbers for one in each if one.numbers),
-        tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
-        tuple(dict.fromkeys(note for one in each for note in one.notes)),
-        tuple(block for one in each for block in one.tables),
+        "\n".join(filter(None, (one.judgement for one in each))),
+        "\n\n".join(filter(None, (one.numbers for one in each))),
+        all_of("warnings"),
+        all_of("notes"),
+        all_of("tables"),
         "; ".join(dict.fromkeys(one.more for one in each if one.tables)),
         to_mount=any(one.to_mount for one in each),
     )

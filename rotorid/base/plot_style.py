@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.text import RPM
 
@@ -103,10 +102,11 @@ def legend_above(
 
 def legend_below(figure: Figure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
     """One legend for several axes, below all of them; what two of them name alike stands there once."""
-    pairs = [pair for ax in axes for pair in zip(*reversed(ax.get_legend_handles_labels()), strict=True)]
-    look: dict[str, Any] = {"loc": "outside lower center", "ncols": columns, "frameon": False}
-    shown = dict(pairs)
-    figure.legend(list(shown.values()), list(shown), fontsize=TEXT, title_fontsize=TEXT, **look, **options)
+    shown: dict[str, Any] = {}
+    for ax in axes:
+        shown |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    options |= {"loc": "outside lower center", "ncols": columns, "frameon": False}
+    figure.legend([*shown.values()], [*shown], fontsize=TEXT, title_fontsize=TEXT, **options)
 
 
 def plain(ax: Axes) -> None:
@@ -144,18 +144,16 @@ def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
 
 def rad_s_above(ax: Axes) -> None:
     """A second scale, rad/s, above one in revolutions per minute."""
-    top = ax.secondary_xaxis("top", functions=(times(1 / RPM), times(RPM)))
-    top.set_xlabel("speed, rad/s", fontsize=TEXT)
-    top.tick_params(labelsize=TEXT)
+    _second(ax.secondary_xaxis, "top", RPM).set_xlabel("speed, rad/s", fontsize=TEXT)
 
 
 def scale_beside(ax: Axes, unit: float, label: str) -> None:
     """A second scale right of the first: of values in this unit."""
-    right = ax.secondary_yaxis("right", functions=(times(1 / unit), times(unit)))
-    right.set_ylabel(label, fontsize=TEXT)
-    right.tick_params(labelsize=TEXT)
+    _second(ax.secondary_yaxis, "right", unit).set_ylabel(label, fontsize=TEXT)
 
 
-def times(factor: float) -> Callable[[ArrayLike], ArrayLike]:
-    """A change of units, for a second scale."""
-    return lambda value: np.asarray(value, float) * factor
+def _second(axis: Callable[..., _AxesBase], side: str, unit: float) -> _AxesBase:
+    """A second scale of values in a unit."""
+    scale = axis(side, functions=(lambda x: np.asarray(x) / unit, lambda x: np.asarray(x) * unit))
+    scale.tick_params(labelsize=TEXT)
+    return scale

@@ -205,8 +205,7 @@ def _fill(sheet: Any, table: Table) -> None:  # noqa: ANN401
         for place, value in enumerate(row, start=1):
             written = sheet.cell(number, place)
             if isinstance(value, str):
-                written.value = one_line(value)
-                written.data_type = "s"  # never a formula
+                written.value, written.data_type = one_line(value), "s"  # never a formula
             elif isinstance(value, float):  # of which openpyxl would keep 16 digits
                 written.value, written.data_type = repr(value), "n"
             else:

@@ -378,7 +378,7 @@ def _has_columns(
             f"a header row with the names of columns, separated by , or ; or tabs: {possible}{names}{seems}"
         )
         problems.drop(grid.source)  # that rows are longer than a title is no news
-        problems.add(*place, None, None, expected)
+        problems.add(*place, unknown[0] if stems else None, None, expected)
         return False
     if missing and not problems.of(grid.source):
         needed = listing([one.names[0] for one in missing], "and")

@@ -13,7 +13,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -188,16 +188,16 @@ def _read_arrays(path: Path) -> Sampled:
     """
     from scipy.io import loadmat, whosmat
 
-    if path.suffix.lower() == ".npz":
+    numpy = path.suffix.lower() == ".npz"
+    if numpy:
         with zipfile.ZipFile(path) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
     else:
         size = sum(int(np.prod(shape, dtype=float)) * 8 for _, shape, _ in whosmat(path))
     if size > LARGEST:
         raise refusal(path, f"arrays of at most {LARGEST // 10**9} GB, not {size / 1e9:.3g} GB")
-    stored = (
-        np.load(path, allow_pickle=False) if path.suffix.lower() == ".npz" else loadmat(path, squeeze_me=True)
-    )
+    with np.load(path, allow_pickle=False) if numpy else nullcontext(loadmat(path, squeeze_me=True)) as file:
+        stored = dict(file)
     arrays = {name: np.squeeze(np.asarray(values)) for name, values in stored.items() if name[:2] != "__"}
     numbers = {name: array * 1 for name, array in arrays.items() if array.dtype.kind in "biuf" and array.size}
     channels = {name: array for name, array in numbers.items() if array.ndim == 1}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from pydantic import BeforeValidator, Field, PlainValidator
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files.attached import whole
-from rotorid.files.problems import Problems
+from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.settings import (
     MOST_NAMES,
     NotNegative,
@@ -222,9 +223,10 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     `[estimate]` has starting values, which are the `start` here. `inputs` are the exciting amplitudes, and
     `[force]` says where they act; without both there is a force amplitude f_x7 on every coordinate x7, and
     those not in the table are 0. An output that is a number times a displacement is measured in place of it;
-    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither. Explicit time,
-    constant loads, nonlinear terms and parameters of initial values alone are refused. An amplitude that
-    `[outputs]` do not show, or that is not measured, is predicted.
+    other linear outputs add equations. `[initial]` plays no part, `speed_rad_s` neither; a
+    parameter of initial values alone is left out, with a warning. Explicit time, constant loads and
+    nonlinear terms are refused. An amplitude that `[outputs]` do not show, or that is not measured, is
+    predicted.
 
     Parameters
     ----------
@@ -239,10 +241,24 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     ------
     InputError
         With the problems of the file, each with its key.
+
+    Warns
+    -----
+    TableWarning
+        Where a parameter of a model in time has no influence on amplitudes.
     """
 
     def read(file: ModelFile) -> HarmonicFile:
-        equations, inputs = _of_amplitudes(file) if file.M else (file.equations, file.inputs)
+        equations, inputs = file.equations, file.inputs
+        if file.M:
+            equations, inputs = _of_amplitudes(file)
+            used = {*_TOKEN.findall(" ".join(equations))}
+            if lost := listing(sorted(file.estimate.keys() - used), "and"):
+                words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
+                warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
+            tables = {name: getattr(file, name) for name in ("estimate", "bounds", "start", "prior")}
+            kept = {name: {k: v for k, v in table.items() if k in used} for name, table in tables.items()}
+            file = file.model_copy(update=kept)
         if not equations:
             raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
         model = harmonic_model(
@@ -250,7 +266,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         )
         if file.M:
             strange = {*model.signals, *model.varying} - {*file.names, *file.outputs, *model.inputs}
-            for name in sorted(strange | {*file.per_record}):
+            for name in sorted(strange | (file.estimate.keys() & {*file.per_record})):
                 raise ValueError(
                     f"{name} has no meaning for amplitudes: M, C and K hold parameters and known numbers; "
                     "what changes with the time t must be a measured input"

@@ -35,7 +35,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from rotorid.base.choices import did_you_mean
+from rotorid.base.choices import did_you_mean, suggest
 from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
@@ -282,12 +282,13 @@ class Settings(BaseModel):
             return list(ctx["error"].args)
         keys, usual, steps = cls.known_keys(), str(error["loc"][0]), error["loc"][1:]
         words, key = keys.get(usual, Key()).expected, table.keys.get(usual)
-        if key is None:
-            return [table.problem(usual, words)]
+        names = [name for each in keys.values() for name in each.names]
+        if key is None:  # one message where it is only misspelt
+            meant = {suggest(written, names) for written in table.keys if written not in keys}
+            return [] if meant.intersection(keys[usual].names) else [table.problem(usual, words)]
         inside = table.data[key] if isinstance(table.data[key], dict) else {}
         key = ".".join([key, *(str(step) for step in steps if step in inside)])
         if kind == "extra_forbidden":
-            names = [name for each in keys.values() for name in each.names]
             near = did_you_mean(usual, names)
             words = f"a known key{near}; known are {listing(names, 'and') or 'none yet'}"
             if not (table.name or near or len(table.keys) > 1):

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Answered, Column
+from rotorid.base.answer import COLUMNS, Answer, Answered, Column, rows
 from rotorid.base.arrays import AnyArray, FloatArray
-from rotorid.base.json import cell, plain
+from rotorid.base.json import plain
 from rotorid.base.text import error_figures, listing, percent, sentence, table
 
 WORD_TOLERANCE = 1e-7
@@ -121,10 +121,10 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
-    cells = (cell(column.values) for column in parameter_columns(names, numbers))
+    each = (row.values() for row in rows(parameter_columns(names, numbers)))
     return {
         name: {"value": value, "std": std, "ci95": None if low is None else [low, high]}
-        for name, value, std, low, high in zip(*cells, strict=True)
+        for name, value, std, low, high in each
     }
 
 
@@ -305,9 +305,9 @@ def unit_columns(A: AnyArray) -> tuple[AnyArray, FloatArray]:
     return A / scale[..., None, :], scale
 
 
-def echelon(rows: FloatArray) -> list[FloatArray]:
+def echelon(space: FloatArray) -> list[FloatArray]:
     """Reduced row echelon form with clean zeros; columns are compared after scaling to unit length."""
-    A, scale = unit_columns(rows)
+    A, scale = unit_columns(space)
     pivots: list[int] = []
     for column in range(A.shape[1]):
         more = [*pivots, column]

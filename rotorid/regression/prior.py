@@ -148,19 +148,19 @@ class PriorEffect:
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
-        each = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
-        keys = ("value", "std", "data_share", "deviation")
+        rows = self.rows
+        each = zip(rows.parameters, rows.value, rows.std, self.share, self.away, strict=True)
         part = {
-            "lambda": self.rows.ridge or None,
+            "lambda": rows.ridge or None,
             "parameters": {
-                name: dict(zip(keys, row, strict=True))
-                for name, row in zip(self.rows.parameters, each, strict=True)
+                name: {"value": value, "std": std, "data_share": share, "deviation": away}
+                for name, value, std, share, away in each
             },
             "data_alone": self.alone or None,
             "condition_number": self.condition_number,
             "residual_rms": self.residual_rms,
         }
-        return plain({"ridge" if self.rows.ridge else "prior": part})
+        return plain({"ridge" if rows.ridge else "prior": part})
 
 
 def effect(
@@ -173,26 +173,26 @@ def effect(
     if not len(rows):
         return None
     moves = np.array([name not in at_bounds for name in rows.names])
-    free = K * moves
-    nothing = np.zeros(len(K) + len(rows))
+    free, nothing = K * moves, np.zeros(len(K) + len(rows))
     alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=JACOBIAN_RCOND)
     both = least_squares(rows.below(K), nothing, names=rows.names, rcond=JACOBIAN_RCOND)
     std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=JACOBIAN_RCOND).std
     assert std is not None
     share = np.nan_to_num(1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        away = rows.residual(theta) / np.sqrt(share)
+    away = np.divide(
+        rows.residual(theta), np.sqrt(share), out=np.full(len(share), np.nan), where=share > SILENT
+    )
     step, rank = solution_and_rank(free, -r, rcond=JACOBIAN_RCOND)
     best = r + free @ step
-    rms = [float(np.sqrt(np.mean(each**2))) for each in (best, r)]
+    rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (best, r))
     return PriorEffect(
         rows=rows,
         share=np.where(moves[rows.place], share, np.nan),
-        away=np.where(share > SILENT, away, np.nan),
+        away=away,
         alone="" if alone.full_rank else alone.describe_rank(),
         lost=tuple(name for name in alone.undetermined if name not in both.undetermined),
         rank=rank,
         best=best,
         condition_number={"without": alone.condition_number, "with": both.condition_number},
-        residual_rms=dict(zip(("without", "with"), rms, strict=True)),
+        residual_rms={"without": rms, "with": full_rms},
     )

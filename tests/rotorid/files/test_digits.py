@@ -75,13 +75,8 @@ def trials(tmp_path):
 
 def test_steps_of_arrays(trials):
     assert replace(trials, steps=None).steps is None
-    assert (replace(trials, steps=0 * STEPS).steps == 0).all()
-    assert not trials.steps.flags.writeable
-    for wrong in (STEPS[0], STEPS[..., :1], np.ones((2, 3, 3, 1, 2))):
+    for wrong in (STEPS[0], STEPS[..., :1], -STEPS, np.nan * STEPS, np.inf * STEPS):
         with pytest.raises(ValueError, match="steps must be finite, of shape"):
-            replace(trials, steps=wrong)
-    for wrong in (-STEPS, np.nan * STEPS, np.inf * STEPS):
-        with pytest.raises(ValueError, match="finite"):
             replace(trials, steps=wrong)
 
 

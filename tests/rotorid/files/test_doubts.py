@@ -17,12 +17,6 @@ from rotorid.files import (
     write_influence,
 )
 
-SHAFT = [
-    ["length_m", "diameter_m", "support_stiffness_N_per_m", "youngs_modulus_Pa", "density_kg_per_m3"],
-    [1.0, 0.1, 1e8, 2.1e11, 7800],
-    [1.0, 0.1, 1e8, 2.1e11, 7800],
-]
-
 
 @pytest.fixture
 def files(tmp_path):

@@ -143,6 +143,13 @@ def test_the_floor_covers_the_measured_error_on_average():
         ("= 2.0", "= -2", "slow_roll.A.amplitude", "-2", "0 or more"),
         (" = 2.0", "_mm_s = 2", "slow_roll.A.amplitude_mm_s", "2", "an amplitude in um_pp"),
         ("= 2.0", "= 2\namplitude_um = 1", "slow_roll.A.amplitude_um", "1", "one key of them"),
+        (
+            "e = 2.0",
+            "e_um_pk = 2",
+            "slow_roll.A.amplitude_um_pk",
+            "2",
+            "(did you mean 'amplitude_um'",
+        ),
         ("phase_deg = 35\n", "", "slow_roll.A.phase_deg", None, "the phase at slow speed"),
         (VECTORS, "[slow_roll]\n", "slow_roll", "a table", "a list with at least 1: vectors, [slow_roll."),
         (VECTORS, "slow_roll = 3\n", "slow_roll", "3", "a table, [slow_roll]: vectors, [slow_roll.SENSOR]"),

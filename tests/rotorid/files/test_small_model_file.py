@@ -112,7 +112,7 @@ def test_units_defaults_and_sums(tmp_path):
         ("nodes = [1, 5, 9]", "", r"key nodes: expected different whole numbers from 1 up, nodes ="),
         ("[1, 5, 9]", "[1, 5, 5]", r"a node 1, 5 or 5 or a station"),
         ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: found '0', expected a number of 1 or more"),
-        ("masses_kg", "mass_kg", r"key masses_kg: expected a mass for each node"),
+        ("masses_kg", "mass_kg", r"key mass_kg: .*did you mean 'masses_kg'"),
         ("80.5, 12", "80.5", r"masses: 3 finite numbers for 3 nodes"),
         ("80.5", "-80.5", r"masses: 0 or more"),
         ("80.5", "nan", r"key masses_kg: found 'nan', expected a finite number"),
