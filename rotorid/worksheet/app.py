@@ -21,7 +21,7 @@ from starlette.routing import Route
 
 from rotorid.worksheet.job_files import Conflict
 from rotorid.worksheet.page import ACTIONS, View
-from rotorid.worksheet.session import Session
+from rotorid.worksheet.session import Refused, Session
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {
@@ -77,9 +77,11 @@ async def trial(session: Session, given: Given) -> str:
 
 
 async def runs(session: Session, given: Given) -> str:
-    """Picture of the runs of one sensor at one speed."""
+    """Picture of the runs of one sensor at one speed; nothing as long as nothing can be read."""
     place = [given.get(key, "") for key in ("speed", "sensor")]
-    return str(await session.drawing.ask("channel", session.files.job.name, *place))
+    with contextlib.suppress(Refused):
+        return str(await session.drawing.ask("channel", session.files.job.name, *place))
+    return ""
 
 
 async def convention(session: Session, given: Given) -> str:

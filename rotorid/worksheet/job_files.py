@@ -110,10 +110,9 @@ class JobFiles:
                     break
                 self._stamps[path] = stamp
         for path, before in ((self.job.parent / name, time) for name, time in (read or {}).items()):
-            changed = path.stat().st_mtime_ns if path.exists() else 0
-            if path not in self._held and changed != self._stamps.get(path, before):
-                self._noticed.append(path.name)
             if path not in self._held:
+                changed = path.stat().st_mtime_ns if path.exists() else 0
+                self._noticed += [path.name] * (changed != self._stamps.get(path, before))
                 self._stamps[path] = changed
         names, self._noticed = list(dict.fromkeys(self._noticed)), []
         return names
@@ -180,8 +179,8 @@ class JobFiles:
         before, self._held = self._held, {}
         self.done, self.undone = [], []
         self.now = self._job()
-        both = self._held.keys() & before.keys()
-        self._noticed += [path.name for path in before if path in both and self._held[path] != before[path]]
+        changed = (path for path, data in before.items() if self._held.get(path, data) != data)
+        self._noticed += [path.name for path in changed]
 
     def _content(self, path: Path) -> bytes | None:
         """What is held of a file, which is read where nothing is."""

@@ -34,7 +34,7 @@ _PLANE = (
     ("radius_", "radius, mm", "radius_mm"),
     ("holes", "holes", "holes"),
     ("first_hole", "first hole, °", "first_hole_deg"),
-    ("available_", "pieces, {unit}", "available_{weight}"),
+    ("available_", "pieces, {unit}", "available_{pieces}"),
     ("per_", "per hole", "per_hole"),
     ("stock", "stock", "stock"),
 )
@@ -101,7 +101,7 @@ class View:
     chosen
         Phase and angles, if the job says both.
     empty
-        Whether there are rows of runs in which no reading stands.
+        Ids of rows of runs in which no reading stands.
     problems
         Of the files.
     """
@@ -118,8 +118,7 @@ class View:
         self.runs, weighed = self.values("run", "runs", "weights"), self.values("run", "weights")
         self.baseline = next((run for run in self.runs if run not in weighed), "baseline")
         rows = self.rows.get("runs", [])
-        self.empty = any(not row.get("amplitude", "-") + row.get("phase", "-") for row in rows)
-        self.error_heads = list(ERRORS.values())
+        self.empty = [row["id"] for row in rows if not row.get("amplitude", "-") + row.get("phase", "-")]
         self.problems = [self._problem(one, files) for one in results.problems]
 
     def values(self, what: str, *keys: str) -> list[str]:
@@ -167,28 +166,19 @@ class View:
             for n, row in enumerate(self.of_run(key, run), start=1)
         ]
 
-    def of_planes(self) -> tuple[list[str], list[Line]]:
-        """Headings, and the settings of each plane."""
-        words = {"unit": self.unit("weight", "weights") or "g", "weight": self.column("weight", "weights")}
-        pieces = {**words, "weight": re.sub("^(mass|unbalance)_", "", words["weight"])}
-        keys = [
-            (begin, head.format(**words), usual.format(**(pieces if begin == "available_" else words)))
-            for begin, head, usual in _PLANE
-        ]
-        lines: list[Line] = [
-            (one, [self._setting(("planes", one), *key) for key in keys], []) for one in self.planes
-        ]
-        return [key[1] for key in keys], lines
-
-    def limits(self) -> list[Line]:
-        """Of the sensors."""
-        cells = [self._setting(("sensors", one), "limit", "largest", "limit") for one in self.sensors]
-        return [("largest", cells, [])] if cells else []
-
-    def errors(self) -> list[Line]:
-        """Stated errors."""
+    def machine(self) -> list[tuple[list[str], list[Line]]]:
+        """Settings of planes, sensors and errors: headings, and lines of cells."""
+        weight, unit = self.column("weight", "weights"), self.unit("weight", "weights")
+        pieces = re.sub("^(mass|unbalance)_", "", weight)
+        names = {"unit": unit, "weight": weight, "pieces": pieces}
+        keys = [[part.format(**names) for part in each] for each in _PLANE]
+        planes: list[Line] = [(one, self._settings(("planes", one), keys), []) for one in self.planes]
+        limits = [cell for one in self.sensors for cell in self._settings(("sensors", one), [["limit"] * 3])]
+        errors = self._settings(("errors",), [[key, words, key] for key, words in ERRORS.items()])
         return [
-            ("standard", [self._setting(("errors",), key, word, key) for key, word in ERRORS.items()], [])
+            (["planes", *(words for _, words, _ in keys)], planes),
+            (["sensors", *self.sensors], [("largest", limits, [])] if limits else []),
+            (["errors", *ERRORS.values()], [("standard", errors, [])] if self.rows else []),
         ]
 
     def trials(self) -> list[str]:
@@ -224,12 +214,15 @@ class View:
         edit = {"table": key, "row": row["id"], "column": column}
         return Cell(name, row[what], f"{what}, {row['run']}, {place}", edit, bool(closed), why)
 
-    def _setting(self, top: Sequence[str], begin: str, label: str, usual: str) -> Cell:
-        there = setting(self.job.settings, top)
-        key = [*top, next((key for key in there or () if key.startswith(begin)), usual)]
-        edit = {"key": key, "typed": True}
-        text = text_of(setting(self.job.settings, key))
-        return Cell(".".join(key), text, f"{label}, {top[-1]}", edit, bool(self.job.read_only))
+    def _settings(self, top: Sequence[str], keys: Iterable[Sequence[str]]) -> list[Cell]:
+        """Cells of settings by how a key begins, its words, and the key where there is none yet."""
+        there, cells = setting(self.job.settings, top), list[Cell]()
+        names = there if isinstance(there, dict) else {}
+        for begin, words, usual in keys:
+            key = [*top, next((key for key in names if key.startswith(begin)), usual)]
+            text, edit = text_of(setting(self.job.settings, key)), {"key": key, "typed": True}
+            cells.append(Cell(".".join(key), text, f"{words}, {top[-1]}", edit, bool(self.job.read_only)))
+        return cells
 
     def _problem(self, one: Mapping[str, Any], files: JobFiles) -> Problem:
         """A problem of a file, with the cell of the page."""
@@ -293,10 +286,8 @@ def check_run(view: View, fields: Fields) -> list[Edit]:
     answer = view.results.answer
     if answer is None or fields["of"] != answer["judgement"]:
         raise ValueError("the answer has changed meanwhile: look at it, then say again what was mounted")
-    unit, column = answer["unit"], view.column("weight", "weights")
-    if not column.endswith(unit):
-        column = f"{'unbalance' if '_' in unit else 'mass'}_{unit}"
-    header = ["run", "plane", column, "angle_deg"]
+    unit = answer["unit"]
+    header = ["run", "plane", f"{'unbalance' if '_' in unit else 'mass'}_{unit}", "angle_deg"]
     if any(row["action"] == "remove" for row in answer["to_mount"]):
         header.append("action")  # without it all would be added
     made: list[Edit] = [{"create": "check", "header": view.job.tables["runs"].header}]
@@ -312,14 +303,12 @@ def check_run(view: View, fields: Fields) -> list[Edit]:
 def remove_run(view: View, fields: Fields) -> list[Edit]:
     """Without a run, its readings and weights."""
     keys = [key for key in view.rows if key.startswith("check") == fields["table"].startswith("check")]
-    rows = [(key, row["id"]) for key in keys for row in view.of_run(key, fields["run"])]
-    return [{"table": key, "delete": row} for key, row in reversed(rows)]
+    return [{"table": key, "delete": row["id"]} for key in keys for row in view.of_run(key, fields["run"])]
 
 
 def remove_empty(view: View, fields: Fields) -> list[Edit]:
     """Without the rows of runs in which no reading stands."""
-    rows = [row["id"] for row in view.rows["runs"] if not row["amplitude"] + row["phase"]]
-    return [{"table": "runs", "delete": row} for row in reversed(rows)]
+    return [{"table": "runs", "delete": row} for row in view.empty]
 
 
 def _as_baseline(view: View, key: str, run: str) -> list[Edit]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,10 +17,7 @@ if TYPE_CHECKING:
 
     from balancing import Trials
     from rotorid.base.arrays import FloatArray
-    from rotorid.files.cells import Grid
     from rotorid.files.columns import Table
-
-_NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?")
 
 
 class Channel(NamedTuple):
@@ -147,7 +143,7 @@ def runs_so_far(job: Path) -> RunsSoFar:
     sources, _ = tables_of(written, settings)
     slow = sources.get("slow_roll", settings.slow_roll)
     cells = read_grid(sources["runs"], "runs", problems) if "runs" in sources else None
-    grids = None if cells is None else read_runs_grids(_readable(cells), conventions, problems)
+    grids = None if cells is None else read_runs_grids(cells, conventions, problems)
     grid = joined(grids, problems)
     table = None if grid is None else make_table(grid, COLUMNS, Problems())
     if grid is None or table is None:
@@ -170,22 +166,12 @@ def runs_so_far(job: Path) -> RunsSoFar:
             channels.append(Channel(table.shown("speed", rows[0]), trials.sensors[0], trials, covariance))
     weights = sources.get("weights")
     there = None if weights is None else read_grid(weights, "weights", Problems(), may_be_empty=True)
-    at = there.header.index("run") if there and "run" in there.header else None
-    names = set() if there is None or at is None else {str(row[at]) for _, row in there.rows}
+    names = set()
+    if there is not None and "run" in there.header:
+        names = {str(row[there.header.index("run")]) for _, row in there.rows}
     runs = [*dict.fromkeys(filter(None, table.texts("run")))]
     baseline = next((run for run in runs if run not in names), None)
     return RunsSoFar(baseline, tuple(run for run in runs if run in names), tuple(channels))
-
-
-def _readable(grid: Grid) -> Grid:
-    """Without the rows in which a number is still missing, or is none."""
-    names = ("speed", "amplitude", "phase")
-    places = [k for k, head in enumerate(grid.header) if head.partition("_")[0] in names]
-
-    def good(cell: object) -> bool:
-        return not isinstance(cell, str) or _NUMBER.fullmatch(cell) is not None
-
-    return replace(grid, rows=tuple(row for row in grid.rows if all(good(row[1][k]) for k in places)))
 
 
 def _rows_by_channel(table: Table, tolerance_percent: float) -> list[list[int]]:

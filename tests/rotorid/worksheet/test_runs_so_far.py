@@ -31,7 +31,7 @@ def as_balanced(job):
         np.testing.assert_allclose(one.covariance[:, 0, 0], covariance[:, s, c], rtol=1e-9)
 
 
-@pytest.mark.parametrize("sample", ["turbo_job", "bk_two_plane", "left_in"])
+@pytest.mark.parametrize("sample", ["turbo_job", "left_in"])
 def test_a_finished_job_has_the_readings_and_regions_of_its_trials(sample):
     as_balanced(sample_data() / sample / "job.toml")
 
