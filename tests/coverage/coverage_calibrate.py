@@ -69,7 +69,7 @@ class Machine(NamedTuple):
     def unknowns(self, *, exact: bool = False) -> list[Unknown]:
         """What `rotorid calibrate --estimate "bearing[*].*" --prior "…=20%"` takes as unknown."""
         prior = "bearing[*].k*=20%, bearing[*].c*=20%"
-        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, "", exact=exact)
+        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, exact=exact)
 
 
 class Truth(NamedTuple):

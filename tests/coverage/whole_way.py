@@ -1,6 +1,6 @@
 """Does a job end as well as it begins? Drawn machines are balanced to the end, as a fitter would.
 
-Run `python tests/coverage/whole_way.py [machines] [mistakes]` (400, 200). Trial runs, the pieces that
+Trial runs, the pieces that
 `balance --split` proposes, a check run of exactly these, the trim as pieces beside them, a check run again.
 A machine: 2 or 3 planes of 8–24 holes, coarse or fine pieces, 2–6 sensors, 1 or 2 speeds, errors of 1–3 % in
 each reading, stated, estimated by two spare runs, or assumed; half of them with limits of 5–40 % of the
@@ -12,9 +12,7 @@ alike) leave the way at once, and others are drawn.
 
 from __future__ import annotations
 
-import sys
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -35,7 +33,6 @@ SOURCES = ("stated", "stated, spare runs", "spare runs", "assumed")
 MISTAKES = ("mirrored", "one hole off", "forgotten")
 MATTERS = 4.0
 """Distance of what a mistake does from zero, in standard deviations of a check run (all readings)."""
-KEPT = {None: "no limits", True: "last readings within their limits", False: "last readings above a limit"}
 SPLIT = BalanceOptions(split=True)
 REFINED = BalanceOptions(refine=True)
 
@@ -254,40 +251,3 @@ def ways(count: int, seed: int = 1) -> Iterator[Way]:
 def mistakes(count: int, seed: int = 2) -> Iterator[Mistaken]:
     """So many mistakes, of every kind in turn."""
     return (mistake(np.random.default_rng([seed, k]), MISTAKES[k % 3]) for k in range(count))
-
-
-def main(machines: int = 400, wrong: int = 200) -> None:
-    """Print the tables."""
-    every = list(ways(machines))
-    print(
-        f"a. {machines} machines: not as predicted, first and last check; the refined region holds the truth"
-    )
-    for name in (*SOURCES, "all"):
-        some = [way for way in every if name in (way.machine.source, "all")]
-        first, last = (sum(w.explained[k] is False for w in some) for k in (0, 1))
-        covered = 100 * np.mean([way.covered for way in some if way.covered is not None])
-        print(f"{name:<24}{first:4d}{last:4d} of {len(some):3d}{covered:7.1f} %")
-    print(f"something was mounted twice: {sum(way.twice for way in every)}")
-    print("\nb. What is left to do after the first check run, and after the last")
-    for kept, name in KEPT.items():
-        some = [way for way in every if way.kept is kept]
-        each = (", ".join(_counts([way.words[k] for way in some])) for k in (0, 1))
-        print(f"{name}, {len(some)}\n  first: {next(each)}\n  last: {next(each)}")
-    found = list(mistakes(wrong))
-    print(
-        f"\nc. {wrong} mistakes: how many matter; of these noticed, and named with the plane; what is to do"
-    )
-    for kind in MISTAKES:
-        some = [one for one in found if one.kind == kind and one.matters]
-        noticed, named = sum(one.noticed for one in some), sum(one.named for one in some)
-        every_one = sum(one.kind == kind for one in found)
-        words = ", ".join(_counts([one.word for one in some]))
-        print(f"{kind:<16}{len(some):3d} of {every_one:3d}{noticed:4d}{named:4d}  {words}")
-
-
-def _counts(words: Sequence[str]) -> list[str]:
-    return [f"{word} {count}" for word, count in Counter(words).most_common()]
-
-
-if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:]))

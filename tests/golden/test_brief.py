@@ -76,21 +76,6 @@ def test_an_answer_fits_a_terminal_and_begins_with_the_judgement(printed):
     }
 
 
-@pytest.mark.parametrize(
-    ("output", "words"),
-    [
-        ("Mount these weights: rms 3 → 1.\n" + 12 * "more\n", "13 lines"),
-        ("Mount these weights: rms 3 → 1.\n" + 101 * "x", "101 columns"),
-        ("Corrections\nMount these weights.", "no judgement: Corrections"),
-        ("Mount these weights: rms 3 → 1 (with any weights 0).", "says "),
-        ("Mount these weights: 3 g_mm", "a token for a unit: Mount these weights: 3 g_mm"),
-    ],
-)
-def test_what_does_not_fit_is_found(output, words):
-    assert complaints(["balance", "job.toml"], output)[0].startswith(words)
-    assert not complaints(["balance", "job.toml"], "Mount these weights: rms 3 → 1.\n" + 11 * "more\n")
-
-
 JOBS = {
     "job.toml": {"planes": ("left", "right")},
     "checked.toml": {"limit": ("2",)},

@@ -170,16 +170,6 @@ class Sheet:
         return {element.key for element in self.shown}
 
 
-def rows_of(sheet, caption):
-    """Cells of the table with this caption, tags taken away."""
-    table = next(part for part in sheet.text.split("<table")[1:] if f"<caption>{caption}" in part)
-    body = table.split("<tbody>")[1].split("</tbody>")[0]
-    return [
-        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)]
-        for row in body.split("</tr>")[:-1]
-    ]
-
-
 def read_sheet(html):
     """Take a sheet apart without a browser."""
     text = html.decode("utf-8")

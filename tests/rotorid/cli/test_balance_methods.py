@@ -9,7 +9,6 @@ from rotorid.samples import sample_data
 
 TURBO = sample_data() / "turbo_job"
 JOB = TURBO / "job.toml"
-MODEL = sample_data() / "model_job" / "job.toml"
 METHODS = ("least-squares", "weighted", "minmax")
 FEW_DRAWS = [pytest.param(m, marks=pytest.mark.full if m == "weighted" else ()) for m in METHODS]
 """The methods, of which `make test` leaves out the one whose errors are drawn, 4 s for each limit."""
@@ -160,35 +159,6 @@ def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):
     job = job_with(tmp_path, '[sensors."probe 4"]\nlimit = 0.2\n')
     found = answers(job, "--speeds", "1220,3600", "--method", "least-squares")
     assert any("predicted to pass its limit" in w for w in found["warnings"])
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("method", FEW_DRAWS)
-def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
-    job = job_with(tmp_path, "")
-    job.write_text((TURBO / "holes.toml").read_text() + '\n[sensors."probe 4"]\nweight = 0\n')
-    free = answers(job, "--split", "--method", method)
-    size = max(r["after"] for r in free["mounting"]["residuals"] if r["sensor"] == "probe 4")
-    held = answers(job, "--split", "--method", method, "--limit", f"probe 4={1.1 * size}")
-    assert max(r["after"] for r in held["mounting"]["residuals"] if r["sensor"] == "probe 4") <= 1.1 * size
-
-
-@pytest.mark.parametrize(
-    ("args", "words"),
-    [
-        (("balance", JOB, "--method", "magic"), "one of weighted, least-squares, minmax"),
-        (("balance", JOB, "--coefficients", "guessed"), "one of measured, computed, combined"),
-        (("balance", JOB, "--coefficients", "computed"), "rotor"),
-        (("balance", JOB, "--max-mass", "heavy"), "heavy"),
-        (("balance", JOB, "--planes", ""), "names with commas"),
-        (("balance", JOB, "--ridge", "0"), "above 0"),
-        (("unbalance", JOB, "--stations", "6"), "rotor"),
-        (("unbalance", MODEL, "--stations", "6,6"), "only once"),
-    ],
-)
-def test_options_that_cannot_be_meant(cli, args, words):
-    outcome = cli(*args)
-    assert (outcome.code, words in outcome.err) == (2, True)
 
 
 @pytest.mark.full

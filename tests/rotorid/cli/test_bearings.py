@@ -89,20 +89,6 @@ def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
     assert not (tmp_path / "out.toml").exists()
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
-        (("--speeds", "3000rpm", "--output", "linear.toml"), "needs two speeds at least (--speeds)"),
-        ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
-    ],
-)
-def test_bad_options(cli, options, words):
-    outcome = cli("bearings", ROTOR, *options)
-    assert outcome.code == 2
-    assert words in outcome.err
-
-
 def test_the_linear_rotor_does_not_overwrite_its_own_shaft(cli, tmp_path):
     """Of a rotor in linear_shaft.csv, --output linear.toml would be written over what is read."""
     write_rotor(tmp_path / "linear.toml", read_rotor(ROTOR))

@@ -1,15 +1,10 @@
 """Options of `rotorid fit`, standard deviations in records, and what a page shows of several records."""
 
-import re
-
 import numpy as np
-import pandas as pd
 import pytest
-from book.records import intact_record
 from cases import each_of
 
 from rotorid.files import read_ode_model, read_record
-from rotorid.identify.fit_records import fit
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "fit"
@@ -54,33 +49,6 @@ def test_starting_values_and_iterations(cli):
     assert options == {"start": "m1=10, c1=0.2"}
 
 
-@each_of(
-    ("arguments", "said"),
-    [
-        (("--start", "lambd=2"), "--start: 'lambd' is no parameter of the model (did you mean 'lambda'?)"),
-        (("--start", "q=2"), "parameters are lambda and x0"),
-        (("--start", "lambda"), "'lambda' is no NAME=VALUE"),
-        (("--start", "lambda=2,5"), "'5' is no NAME=VALUE"),
-        (("--start", "lambda=nan"), "lambda = 'nan' is no number"),
-        (("--start", "lambda="), "lambda = '' is no number"),
-        (("--start", "x0=1,x0=2"), "x0 stands twice"),
-        (("--method", "gauss-newtom"), "did you mean 'gauss-newton'?"),
-        (("--sigma", "y=1"), "--sigma: 'y' is no output of the model; outputs are x"),
-        (("--sigma", "x=-1"), "--sigma: x = -1 is no number above 0; use y1=0.01,y2=0.02"),
-        (("--sigma", "much"), "--sigma: x = much is no number above 0"),
-        (("--sigma", "1,2"), "'1' is no NAME=VALUE; use y1=0.01,y2=0.02"),
-        (("--integrator", "euler"), "--integrator 'euler' is not known"),
-        (("--tolerance", "1e-3"), "--tolerance belongs to --method gauss-newton or quasilinearization"),
-        (("--tolerance", "-2", "--method", "gauss-newton"), "a number above 0, not -2"),
-    ],
-)
-def test_options_that_cannot_be_meant_are_refused(cli, arguments, said):
-    outcome = cli("fit", *files("limit_cycle"), *arguments)
-    assert outcome.code == 2
-    assert outcome.out == ""
-    assert said in re.sub(r"\s+", " ", outcome.err)
-
-
 def test_a_start_outside_the_bounds(cli, tmp_path):
     model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
     refused(cli("fit", model, record, "--start", "a=7"), "--start: a = 7 is outside its bounds 0 to 5")
@@ -103,23 +71,6 @@ def test_the_same_record_twice(cli, tmp_path):
     refused(cli("fit", model, record, link), "given twice")
     missing = tmp_path / "no.csv"
     refused(cli("fit", model, missing, missing), "given twice")
-
-
-@pytest.mark.parametrize("separator", [",", ";"])
-def test_intact_printed_values_of_f_weighted_by_their_rounding(cli, tmp_path, separator):
-    """383 values of six series with gaps, each with the standard deviation of its rounding."""
-    intact, path = intact_record(), tmp_path / "printed.csv"
-    deviations = {f"{name}_std": s for name, s in intact.sigma.items()}
-    table = pd.DataFrame({"t_s": intact.t, **intact.outputs, **deviations})
-    table.to_csv(path, index=False, sep=separator, decimal="," if separator == ";" else ".")
-    found = cli("fit", files("three_masses")[0], path, "--allow-missing", "--json").json
-    model = read_ode_model(files("three_masses")[0])
-    direct = fit(model, intact)
-    np.testing.assert_allclose(list(values(found).values()), direct.values, rtol=1e-9)
-    deviations = [entry["std"] for entry in found["parameters"].values()]
-    np.testing.assert_allclose(deviations, direct.std, rtol=1e-6)
-    read = read_record(path, model, allow_missing=True)
-    assert sum(np.isfinite(samples).sum() for samples in read.outputs.values()) == 383
 
 
 def with_std(rows, header="t_s,y,z,y_std,z_std"):

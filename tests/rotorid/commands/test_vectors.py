@@ -81,21 +81,6 @@ def test_command_line(cli, tmp_path):
     assert {entry["run"] for entry in document["runs"]} == {"as_found", "trial_left", "trial_right"}
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--unit", "um"), "a tacho channel, without which there is no phase: --tacho NAME"),
-        (("--tacho", "9"), "a channel of this name"),
-        (("--tacho", "1", "--orders", "0"), "--orders takes whole numbers from 1 to 20"),
-        (("--tacho", "1", "--speeds", "9000rpm"), "there is no speed of 9000 rpm"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_message(cli, words, message):
-    result = cli("vectors", SAMPLE / "run_up.wav", *words)
-    assert result.code == 2
-    assert message in result.err.replace("\n", " ")
-
-
 def test_pulses_that_are_alike_do_not_compare_records(tmp_path):
     for name in "ab":
         write(tmp_path / f"{name}.wav", pulses=2)
