@@ -21,7 +21,7 @@ from starlette.routing import Route
 
 from rotorid.worksheet.job_files import Conflict
 from rotorid.worksheet.page import ACTIONS, View
-from rotorid.worksheet.session import Refused, Session
+from rotorid.worksheet.session import Session
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {
@@ -57,8 +57,8 @@ async def edit(session: Session, given: Given) -> dict[str, Any]:
 
 async def do(session: Session, given: Given) -> dict[str, Any]:
     """What a button does."""
-    if given["do"] in ("undo", "redo"):
-        getattr(session.files, given["do"])()
+    if given["do"] == "undo":
+        session.files.undo()
     else:
         session.files.apply(ACTIONS[given["do"]](View(session.files, session.results), given))
     session.changed()
@@ -68,29 +68,16 @@ async def do(session: Session, given: Given) -> dict[str, Any]:
 async def trial(session: Session, given: Given) -> str:
     """A proposed trial weight."""
     if "with_job" in given:
-        return str(await session.drawing.ask("trial", session.files.job.name, {}))
+        return str(await session.front.ask("trial", session.files.job.name, {}))
     options: dict[str, Any] = {key: text.replace(",", ".") for key, text in given.items() if text}
     options |= {key: options[key] + unit for key, unit in _UNITS.items() if key in options}
     if "reading_phase" in options:
         options["reading_phase"] = float(options["reading_phase"])
-    return str(await session.drawing.ask("trial", None, options))
-
-
-async def runs(session: Session, given: Given) -> str:
-    """Picture of the runs of one sensor at one speed; nothing as long as nothing can be read."""
-    place = [given.get(key, "") for key in ("speed", "sensor")]
-    with contextlib.suppress(Refused):
-        return str(await session.drawing.ask("channel", session.files.job.name, *place))
-    return ""
-
-
-async def convention(session: Session, given: Given) -> str:
-    """Two drawings of how angles and phases count."""
-    return str(await session.drawing.ask("convention", given["phase"], given["angles"]))
+    return str(await session.front.ask("trial", None, options))
 
 
 ROUTES: Mapping[str, Callable[[Session, Given], Awaitable[dict[str, Any] | str]]] = {
-    **{f"/{one.__name__}": one for one in (state, edit, do, trial, runs, convention)},
+    **{f"/{one.__name__}": one for one in (state, edit, do, trial)},
     "/picture": lambda session, given: session.drawn("picture"),
     "/sheet": lambda session, given: session.drawn("sheet"),
 }

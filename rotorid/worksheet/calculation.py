@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import errno
 import functools
-import math
 import os
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from balancing import Labels
     from rotorid.commands.balance import Balance
     from rotorid.files import Job
-    from rotorid.worksheet.runs_so_far import Effect
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
 _NOT_TO_DO = re.compile(
@@ -83,8 +80,6 @@ class Results(NamedTuple):
 
     Attributes
     ----------
-    effects
-        Of the trial weights, as `runs_so_far.Effect`.
     problems, refused
         Of the files, as `Problem` with their `text`; why there is no answer.
     answer, asked
@@ -95,7 +90,6 @@ class Results(NamedTuple):
         What is being computed; another number for another answer.
     """
 
-    effects: tuple[Effect, ...] = ()
     problems: tuple[dict[str, Any], ...] = ()
     refused: str = ""
     answer: dict[str, Any] | None = None
@@ -106,16 +100,13 @@ class Results(NamedTuple):
 
 
 def whole_job(job: str, version: int) -> Results:
-    """What the finished rows say, the answer or the problems of the files, and what takes longer.
+    """The answer or the problems of the files, and what takes longer.
 
     While a check run is being typed, or is wrong, the answer is that of the runs before it.
     """
     from rotorid.files.problems import InputError
-    from rotorid.worksheet.runs_so_far import runs_so_far
 
     seen = Results()
-    with suppress(ValueError, OSError):  # the balance says it, too
-        seen = seen._replace(effects=tuple(runs_so_far(Path(job)).effects()))
     for asked in (Asked(job, version), Asked(job, version, checked=False)):
         try:
             made = _balance(asked)[0]
@@ -248,13 +239,6 @@ def _table(
     return Table(name, (*(one for one in columns if any(one.texts)), *more))
 
 
-def channel(job: str, speed: str, sensor: str) -> str:
-    """Polar picture of the runs of one sensor at one speed."""
-    from rotorid.worksheet.runs_so_far import runs_so_far
-
-    return _svg(runs_so_far(Path(job)).figure(speed, sensor), f"Runs of {sensor} at {speed}")
-
-
 def picture(asked: Asked) -> str:
     """Weights and readings before and after, or discs with pieces in their holes."""
     made = _balance(asked)[0]
@@ -280,19 +264,6 @@ def trial(job: str | None, options: dict[str, Any]) -> str:
     return words + Markup(_svg(made.figure(), answer.judgement) if to_draw else "")
 
 
-def convention(phase: str, angles: str) -> str:
-    """Two drawings: how the angles of weights count, and what a phase is."""
-    from balancing import Labels
-    from balancing.plots import weight_figure
-    from rotorid.files.conventions import as_angles, as_phase
-    from rotorid.report.conventions_explained import phase_figure
-
-    labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
-    weight, title = labels.weight_from(1.0, math.radians(60.0)), f"phase {phase}, angles {angles}"
-    turning = _svg(weight_figure(labels, complex(weight)), f"The rotor from its end: {title}")
-    return turning + _svg(phase_figure(labels), f"A reading over time: {title}")
-
-
 def _svg(figure: Figure, title: str) -> str:
     from rotorid.report.page import inline_svg
 
@@ -300,5 +271,5 @@ def _svg(figure: Figure, title: str) -> str:
 
 
 REQUESTS: Mapping[str, Callable[..., Any]] = {
-    one.__name__: one for one in (whole_job, balanced, channel, picture, sheet, trial, convention)
+    one.__name__: one for one in (whole_job, balanced, picture, sheet, trial)
 }

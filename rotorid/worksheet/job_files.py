@@ -74,8 +74,8 @@ class JobFiles:
         Its file.
     now
         What its files say.
-    done, undone
-        What files held before each step that can be undone, and after each that can be done again.
+    done
+        What files held before each step that can be undone.
     """
 
     def __init__(self, given: Path) -> None:
@@ -84,7 +84,6 @@ class JobFiles:
         self._stamps: dict[Path, object] = {}
         self._noticed: list[str] = []
         self.done: list[Files] = []
-        self.undone: list[Files] = []
         self.now = self._job()
 
     def place(self, file: str, row: int | None) -> tuple[str, str] | None:
@@ -137,28 +136,21 @@ class JobFiles:
             changed = {table.path: table.data() for table in draft.tables.values() if table.changed}
             with suppress(_OutsideError):
                 if step := self._write({self.job: draft.text, **changed}):
-                    self.done, self.undone = [*self.done[1 - MOST_STEPS :], step], []
+                    self.done = [*self.done[1 - MOST_STEPS :], step]
                 return
             self._reload()
         raise ValueError("another program goes on changing the files of the job: try again in a moment")
 
     def undo(self) -> None:
         """Go back to the files before the last step; ValueError where that is impossible."""
-        self._go(self.done, self.undone, "undo")
-
-    def redo(self) -> None:
-        """Go forth to the files that were undone; ValueError where that is impossible."""
-        self._go(self.undone, self.done, "redo")
-
-    def _go(self, steps: list[Files], others: list[Files], word: str) -> None:
-        if not steps:
-            raise ValueError(f"there is nothing to {word}")
+        if not self.done:
+            raise ValueError("there is nothing to undo")
         try:
-            others.append(self._write(steps[-1]))
+            self._write(self.done[-1])
         except _OutsideError as error:
             self._reload()
-            raise ValueError(f"{error} was changed by another program after that step: no {word}") from None
-        steps.pop()
+            raise ValueError(f"{error} was changed by another program after that step: no undo") from None
+        self.done.pop()
 
     def _read(self, path: Path) -> bytes | None:
         """What a file holds now; ValueError if it is outside of the folder or cannot be read."""
@@ -177,7 +169,7 @@ class JobFiles:
     def _reload(self) -> None:
         """Take what is on disk; what another program has changed is noticed, and ends undo."""
         before, self._held = self._held, {}
-        self.done, self.undone = [], []
+        self.done = []
         self.now = self._job()
         changed = (path for path, data in before.items() if self._held.get(path, data) != data)
         self._noticed += [path.name for path in changed]

@@ -29,6 +29,17 @@ _WORDS = {
     "check_weights": "weights of the check run",
     "max_weight": "largest",
 }
+CONVENTIONS = (
+    ("phase", "lag", "Phase lag: the rotor turns by it from the pulse to the next peak (most instruments)"),
+    ("phase", "lead", "Phase lead: the rotor turns by it from a peak to the next pulse"),
+    ("angles", "with rotation", "Angles from the mark with the rotation"),
+    (
+        "angles",
+        "against rotation",
+        "Angles from the mark against the rotation: rising for a fixed pointer",
+    ),
+)
+"""Choices of the page: the setting, its value, what it means."""
 _PLANE = (
     ("max_", "largest, {unit}", "max_{weight}"),
     ("radius_", "radius, mm", "radius_mm"),
@@ -79,6 +90,7 @@ def _template() -> Template:
     loader = PackageLoader("rotorid.worksheet", "page")
     pages = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     pages.filters["words"] = in_words
+    pages.globals["CONVENTIONS"] = CONVENTIONS
     return pages.get_template("body.html")
 
 
@@ -98,10 +110,6 @@ class View:
         Of each table: its columns by what they hold, and its rows so, each with its `id` and `place`.
     sensors, planes, runs, baseline
         Names that occur; the run without weights.
-    chosen
-        Phase and angles, if the job says both.
-    empty
-        Ids of rows of runs in which no reading stands.
     problems
         Of the files.
     """
@@ -112,13 +120,9 @@ class View:
         self.rows = {key: [*self._rows(key)] for key in self.job.tables}
         self.sensors = self.values("sensor", "runs", "check")
         stated = setting(self.job.settings, ["planes"])
-        ways = tuple(setting(self.job.settings, [key]) for key in ("phase", "angles"))
-        self.chosen = ways if all(ways) else None
         self.planes = _each([*(stated if isinstance(stated, dict) else ()), *self.values("plane", "weights")])
         self.runs, weighed = self.values("run", "runs", "weights"), self.values("run", "weights")
         self.baseline = next((run for run in self.runs if run not in weighed), "baseline")
-        rows = self.rows.get("runs", [])
-        self.empty = [row["id"] for row in rows if not row.get("amplitude", "-") + row.get("phase", "-")]
         self.problems = [self._problem(one, files) for one in results.problems]
 
     def values(self, what: str, *keys: str) -> list[str]:
@@ -306,11 +310,6 @@ def remove_run(view: View, fields: Fields) -> list[Edit]:
     return [{"table": key, "delete": row["id"]} for key in keys for row in view.of_run(key, fields["run"])]
 
 
-def remove_empty(view: View, fields: Fields) -> list[Edit]:
-    """Without the rows of runs in which no reading stands."""
-    return [{"table": "runs", "delete": row} for row in view.empty]
-
-
 def _as_baseline(view: View, key: str, run: str) -> list[Edit]:
     rows = [row for row in view.of_run("runs", view.baseline) if row["place"] == row["speed"]]
     return [_reading(key, view.names["runs"], run, row["speed"], row["sensor"]) for row in rows]
@@ -322,6 +321,6 @@ def _reading(key: str, names: Mapping[str, str], run: str, speed: str, sensor: s
 
 
 ACTIONS: Mapping[str, Callable[[View, Fields], list[Edit]]] = {
-    one.__name__: one for one in (setup, new_run, check_run, remove_run, remove_empty)
+    one.__name__: one for one in (setup, new_run, check_run, remove_run)
 }
 """What the buttons of the page do."""

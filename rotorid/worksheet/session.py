@@ -94,14 +94,14 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    drawing
-        The process that draws; beside it are one that answers at once, and one that may take its time.
+    front, aside
+        The process that answers at once, and the one that may take its time.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.drawing, self.aside = self._workers = [Worker(files.job.parent) for _ in range(3)]
+        self.front, self.aside = self._workers = [Worker(files.job.parent) for _ in range(2)]
         self._notice = ""
         self.results = Results()
         self._news, self._left = asyncio.Event(), False
@@ -146,7 +146,7 @@ class Session:
         asked = self.results.asked
         if asked is None:
             raise ValueError("there is no answer yet")
-        worker = self.aside if asked.split or asked.refine else self.drawing  # which may take long
+        worker = self.aside if asked.split or asked.refine else self.front
         return str(await worker.ask(do, asked))
 
     def _publish(self, **results: Any) -> None:  # noqa: ANN401

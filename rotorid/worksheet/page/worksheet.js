@@ -1,6 +1,6 @@
 /* The worksheet's page: it shows the HTML that the server sends, and sends every cell that changes.
 A cell has its change as `data-edit`, a button its edits as `data-edits` or what it does as `data-do`; what has
-`data-keep` is filled here, what has `data-picture` by a drawing of that address. */
+`data-keep` is filled here. */
 const $ = (id) => document.getElementById(id);
 const typed = new Map(); // id of a cell → its change, until the page has it; with `why` if it was refused
 const queue = []; // what is still to be sent, in order
@@ -8,7 +8,6 @@ let token = location.hash.slice(1);
 let version = -1;
 let online = true;
 let savedWords = "all is saved";
-let channel = ""; // speed and sensor of the cell that was entered last
 
 /* Make elements as they come from the server; focus stays, and what is being typed. */
 function morph(old, now) {
@@ -64,7 +63,7 @@ async function refresh(after) {
   if (first) restoreTrial();
   showSaved();
   showConflicts();
-  document.querySelectorAll("[data-picture]").forEach(draw);
+  draw();
 }
 
 async function away({ status }) {
@@ -148,18 +147,15 @@ function showSaved() {
   $("saved").className = online ? "" : "why";
 }
 
-async function draw(slot) {
-  let address = slot.dataset.picture;
-  if (!slot.checkVisibility()) return;
-  if (address && slot.id === "polar") address += channel;
+async function draw() {
+  const slot = $("overview");
+  const address = slot.dataset.picture;
   if (slot.drawn === address) return;
   slot.drawn = address;
-  if (!address) return slot.replaceChildren(); // no old picture stands beside new numbers
-  await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
-  if (slot.drawn !== address) return;
-  const svg = await ask(address).then((drawing) => drawing.text(), () => "");
-  if (slot.drawn === address && svg) slot.innerHTML = svg;
-  else if (slot.drawn === address) slot.drawn = null; // the next state asks again
+  slot.replaceChildren(); // no old picture stands beside new numbers
+  const svg = address && (await ask(address).then((drawing) => drawing.text(), () => ""));
+  if (slot.drawn === address) slot.innerHTML = svg;
+  if (!svg) slot.drawn = null; // the next state asks again
 }
 
 /* What a person does. */
@@ -192,7 +188,6 @@ document.addEventListener("change", ({ target }) => {
   save([changeOf(target, target.value.trim())]);
   target.saved = target.value;
 });
-document.addEventListener("toggle", () => document.querySelectorAll("[data-picture]").forEach(draw), true);
 document.addEventListener("keydown", (event) => {
   const { target, key } = event;
   const step = { Enter: 1, ArrowDown: 1, ArrowUp: -1 }[key];
@@ -203,14 +198,8 @@ document.addEventListener("keydown", (event) => {
     if (next) next.select(event.preventDefault());
   } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && (!target.matches("input") || isIdle(target))) {
     event.preventDefault();
-    act("/do", { do: event.shiftKey ? "redo" : "undo" });
+    act("/do", { do: "undo" });
   }
-});
-document.addEventListener("focusin", ({ target }) => {
-  const [table, , speed, sensor] = target.id.split("|");
-  if (!/^(runs|check)$/.test(table)) return;
-  channel = `&speed=${encodeURIComponent(speed)}&sensor=${encodeURIComponent(sensor)}`;
-  draw($("polar"));
 });
 document.addEventListener("paste", (event) => {
   const { target } = event;

@@ -157,7 +157,7 @@ class SharedJobs:
 
 def _shown(state):
     """What the files of a job say in its state."""
-    return state["cells"], "The job says: phase lead, angles with" in state["words"]
+    return state["cells"], 'id="phase lead" aria-pressed="true"' in state["html"]
 
 
 def _put_back(folder, sample):

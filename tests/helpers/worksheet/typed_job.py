@@ -19,7 +19,8 @@ def type_job(window, sample, radius=None):
     window.type('[name="sensors"]', ", ".join(row["sensor"] for row in own[names[0]]))
     window.type('[name="speeds"]', runs[0]["speed_rpm"])
     window.push("#setup button")
-    window.push('[id="convention lead with rotation"]', SPACE)
+    window.push('[id="phase lead"]', SPACE)
+    window.push('[id="angles with rotation"]', SPACE)
     for name in names:
         card = f'[id="run {name}"]' if name != names[0] else "#baseline"
         mounted = [row for row in weights if row["run"] == name]

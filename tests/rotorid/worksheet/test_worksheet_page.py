@@ -64,8 +64,6 @@ def test_a_job_typed_by_keyboard_from_an_empty_folder(tmp_path, serve, windows, 
     window.wait(lambda: window.texts("#trial-answer p"), "a trial weight")
     served.settled()
     window.wait(lambda: not window.text("#busy"), "all is computed")
-    # two drawings each, which no edit takes away
-    window.wait(lambda: len(window.texts("#conventions svg")) == 8, "what the conventions mean")
 
     assert {path.name for path in folder.iterdir()} == {"job.toml", "runs.csv", "weights.csv"}
     settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
@@ -213,7 +211,7 @@ def test_nothing_sticks_out_and_axe_finds_nothing_serious(tmp_path, serve, share
     window.open(served.address)
     if job != "new":
         window.wait(lambda: window.numbers() and not window.text("#busy"), "all is computed")
-        window.wait(lambda: window.texts("#polar svg") and window.texts("#overview svg"), "the pictures")
+        window.wait(lambda: window.texts("#overview svg"), "the picture")
     window.driver.execute_script(axe.read_text(encoding="utf-8"))
     for width, height in SIZES.items():
         window.browser.resize(width, height)

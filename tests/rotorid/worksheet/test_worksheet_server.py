@@ -94,7 +94,6 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
         ("/edit", {}),
         ("/do", {"do": "no such"}),
         ("/do", {"do": "check_run", "of": "another answer"}),
-        ("/convention?phase=up&angles=down", None),
         ("/trial", {"no_such": "1"}),
         ("/edit", "[" * 100_000),
         ("/edit", '{"edits": null}'),
@@ -152,12 +151,7 @@ def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, s
 def test_what_there_is_to_look_at_and_to_print(shared):
     served = shared("holes.toml")
     served.settled()
-    for path in ("/picture", "/runs?speed=1220&sensor=probe%201"):
-        status, text = served.ask(path)
-        assert (status, text[:4]) == (200, "<svg"), path
-    for phase, side in itertools.product(("lead", "lag"), ("with", "against")):
-        status, text = served.ask(f"/convention?phase={phase}&angles={side}%20rotation")
-        assert (status, text.count("<svg")) == (200, 2)
+    assert served.ask("/picture")[1].startswith("<svg")
     assert "2 × 150" in served.ask("/sheet")[1]
 
 
@@ -254,7 +248,7 @@ def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, sha
     else:
         runs.symlink_to(runs if kind == "loop" else tmp_path / "outside.csv")
     now = served.noticed(state["version"])
-    assert (now["numbers"], "trial 1: good" in now["words"]) == ({}, False)
+    assert now["numbers"] == {}
     assert "runs.csv" in now["words"]
     (runs.rmdir if kind == "folder" else runs.unlink)()
     runs.write_text(text)
