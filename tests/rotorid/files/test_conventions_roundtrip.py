@@ -15,7 +15,7 @@ from tables_data import write_csv
 from whirl_rotors import machine
 
 import fem
-from balancing import compare_check, correct, estimate_influence, model_influence
+from balancing import correct, estimate_influence, model_influence
 from rotorid.files import read_job, write_rotor
 
 SPEEDS_RPM = (1500, 4200)
@@ -177,23 +177,3 @@ def test_the_same_weight_at_the_same_place(folder, motion, phase, unit, style):
             np.testing.assert_allclose(found.weights, EXPECTED, rtol=1e-6)
             np.testing.assert_allclose(shop.place(found), EXPECTED, rtol=1e-6)
             assert np.abs(found.after).max() < 1e-6 * np.abs(found.before).max()
-        assert by_trials.labels.conventions()["angles"] == style.partition(",")[0].replace(
-            "with", "with rotation"
-        ).replace("against", "against rotation")
-
-
-@pytest.mark.parametrize("slow_roll", SLOW_ROLLS)
-@pytest.mark.parametrize("style", ["against", "clockwise, free end"])
-def test_the_check_run_shows_a_balanced_rotor(folder, motion, style, slow_roll):
-    """Run-out is subtracted from the check run too; what was mounted is the proposed correction."""
-    shop = Shop(folder, motion, "lag", "um_pp", style, SENSOR_ANGLES[1], 65.0, slow_roll)
-    write_csv(folder / "check.csv", shop.table(["check"]))
-    grams, angle = np.abs(EXPECTED) * 1e3, np.degrees(np.angle(EXPECTED))
-    rows = [["check", n, float(g), shop.angle(a)] for n, g, a in zip(PLANES, grams, angle, strict=True)]
-    write_csv(folder / "mounted.csv", [["run", "plane", "mass_g", "angle_deg"], *rows])
-    job = shop.job('check = "check.csv"\ncheck_weights = "mounted.csv"\n')
-    np.testing.assert_allclose(job.check.weights, [EXPECTED], rtol=1e-12)
-    assert np.abs(job.check.readings).max() < 1e-9 * np.abs(job.trials.readings).max()
-    influence = estimate_influence(job.trials)
-    compared = compare_check(correct(influence), job.check, influence)
-    assert np.abs(compared.difference).max() < 1e-9 * np.abs(compared.before).max()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, csv_text, the_only, write_book, write_csv
 
 from balancing import correct, estimate_influence
 from rotorid.files import (
-    InputError,
     influence_frame,
     job_from_files,
     read_job,
@@ -36,18 +35,6 @@ def test_a_title_above_the_header_is_named(tmp_path, files, title):
     assert "a header row with the names of columns" in problem.expected
 
 
-def test_different_values_and_scattered_rows():
-    from rotorid.files import Problem
-
-    problems = [Problem("f.csv", row, "a", str(row), "a number") for row in (2, 3, 5, 7, 9, 11)]
-    assert str(InputError(problems)) == (
-        "f.csv, rows 2, 3, 5 and others (6 in all), column a: found '2', '3', '5' and so on, "
-        "expected a number"
-    )
-    many = [Problem("f.csv", row, f"c{row}", None, "x") for row in range(100)]
-    assert str(InputError(many)).splitlines()[20:] == ["and 80 more problems"]
-
-
 def test_control_characters_in_the_name_of_a_file(tmp_path, files):
     job = tmp_path / "job.toml"
     job.write_text('runs = ".\\runs.csv"\nweights = "weights.csv"\n', encoding="utf-8")
@@ -57,18 +44,6 @@ def test_control_characters_in_the_name_of_a_file(tmp_path, files):
     assert "\r" not in str(problem)
     [problem] = complaints(read_trials, "no\x1b[31m.csv", files[1])
     assert str(problem).startswith("no\\x1b[31m.csv: expected a file that exists")
-
-
-def test_text_with_decimal_commas_in_a_workbook(tmp_path, files):
-    # one number shows that 9,487 is not nine thousand; and a point beside it is not passed over
-    mixed = replaced(replaced(RUNS, 2, "amplitude_um_pp", "9,487"), 3, "amplitude_um_pp", "13,5")
-    read = read_trials(write_book(tmp_path / "runs.xlsx", {"runs": mixed}), files[1])
-    assert abs(read.readings[0, 0, 0, 0]) == pytest.approx(9.487 * 0.5e-6)
-    points = replaced(mixed, 4, "amplitude_um_pp", "4.9")
-    the_only(
-        complaints(read_trials, write_book(tmp_path / "runs.xlsx", {"runs": points}), files[1]),
-        "runs.xlsx", 4, "amplitude_um_pp", "4.9", "a number with a decimal comma, as elsewhere",
-    )  # fmt: skip
 
 
 @pytest.fixture
@@ -116,13 +91,3 @@ def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
     assert c["mass"] == pytest.approx(2.951e6, rel=1e-3)
     read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.json")
     assert read.trials.labels.weight_unit == "g"
-
-
-def test_a_weights_table_without_rows_and_stored_coefficients(tmp_path, lag):
-    write_csv(tmp_path / "none.csv", WEIGHTS[:1])
-    read = job_from_files(
-        [tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.json"
-    )
-    c = correct(read.influence, read.trials)
-    np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
-    assert not c.mounted.weights.any()

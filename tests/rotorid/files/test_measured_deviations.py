@@ -73,27 +73,11 @@ def test_nothing_is_assumed_then(read):
     assert reading_of(read(errors=ReadingErrors(0.01))).source == "stated"
 
 
-def test_another_unit_of_the_same_kind(read):
-    head = replaced(MEASURED, 1, "amplitude_std_um_pp", "amplitude_std_um")
-    peak = [head[0], *([*row[:5], row[5] / 2, row[6]] for row in MEASURED[1:])]
-    np.testing.assert_allclose(read(peak).covariance, read().covariance, rtol=1e-12)
-
-
-def test_at_amplitude_zero_it_is_alike_in_all_directions(read):
-    zero = replaced(MEASURED, 2, "amplitude_um_pp", 0.0)
-    np.testing.assert_allclose(
-        read(zero).covariance[:, :, 0, 0, 0, 0], (0.025e-6) ** 2 * np.eye(2), rtol=1e-12
-    )
-
-
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
         ("amplitude_std_um_pp", 0, "a standard deviation above 0: nothing is measured exactly"),
-        ("phase_std_deg", 0, "a standard deviation above 0"),
-        ("phase_std_deg", -0.5, "a standard deviation above 0"),
         ("amplitude_std_um_pp", "", "a number"),
-        ("phase_std_deg", "few", "a number"),
     ],
 )
 def test_none_is_zero_negative_or_missing(read, column, value, words):
@@ -114,13 +98,6 @@ def test_the_unit_of_another_quantity(read):
     the_only(
         complaints(read, wrong), "runs.csv", 1, "amplitude_std_mm_s", None, "that of the amplitude, um_pp"
     )
-
-
-def test_a_table_of_vectors_is_a_runs_table(read):
-    plain, vectors = read(), read(VECTORS)
-    np.testing.assert_array_equal(vectors.readings, plain.readings)
-    np.testing.assert_array_equal(vectors.covariance, plain.covariance)
-    assert vectors.warnings == plain.warnings
 
 
 def test_balance_names_them(job, cli):

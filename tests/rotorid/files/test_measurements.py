@@ -58,12 +58,6 @@ def test_units(table, column, value, omega):
     assert rows.signals["X"] == pytest.approx([15e-6j])  # a positive phase leads
 
 
-def test_excel_with_decimal_commas(table):
-    rows = table("sep=;\nexperiment;frequency_rad_s;F_re;X_re;X_im;note\nA;10;10;0;-0,1;x\n")
-    assert rows.signals["X"] == pytest.approx([-0.1j])
-    assert rows.names == ("A",)
-
-
 def test_blank_amplitudes_were_not_measured(table):
     rows = table("frequency_rad_s,F_re,X_amplitude,X_phase_deg,Y_re,Y_im\n1,1,,,2,3\n2,1,0,,,\n", TWO)
     np.testing.assert_array_equal(np.isnan(rows.signals["X"]), [True, False])
@@ -80,11 +74,6 @@ def test_without_a_force_it_is_a_free_vibration(table, text):
     np.testing.assert_array_equal(rows.signals["F"], [0])
 
 
-def test_a_model_with_its_own_excitation_is_never_free(table):
-    rotor = harmonic_model(["(m*p**2 + c)*Z = -U*p**2"], known={"m": 1.0, "U": 2.0}, estimate=["c"])
-    assert not table("speed_rpm,Z_re\n60,1\n", rotor).free.any()
-
-
 def test_an_absent_output_is_named(table):
     with pytest.warns(TableWarning, match="no Y"):
         rows = table("frequency_rad_s,F_re,X_re,X_im\n1,1,2,3\n", TWO)
@@ -98,24 +87,17 @@ HEAD = "frequency_rad_s,F_re,X_re,X_im\n"
     ("text", "messages"),
     [
         ("frequency_rad_s,F_re,X_re,X_imag\n1,1,2,3\n", ["X_imag", "did you mean 'X_im'"]),
-        ("frequency_rad_s,F_re\n1,1\n", ["measured amplitudes", "X_amplitude and X_phase_deg, or X_re"]),
         ("F_re,X_re,X_im\n1,2,3\n", ["one column frequency_rad_s, frequency_Hz or speed_rpm"]),
         ("frequency_Hz,speed_rpm,F_re,X_re\n1,60,2,3\n", ["speed_rpm", "one column frequency"]),
         (HEAD + "1,1,x,3\n", ["row 2", "X_re", "'x'"]),
         (HEAD + "1,1,2,\n", ["row 2", "X_im", "as X_re has"]),
-        (HEAD + "-1,1,2,3\n", ["frequency_rad_s", "0 or more"]),
         (HEAD + "1,0,2,3\n", ["row 2", "X_im", "an amplitude of F that excites"]),
-        ("frequency_rad_s,X_re,X_im\n1,2,3\n", ["X_im", "an amplitude of F that excites"]),
-        (HEAD + "1,1,,\n", ["in at least one row"]),
         ("frequency_rad_s,F_re,X_amplitude\n1,1,2\n", ["X_phase_deg"]),
-        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg,X_re\n1,1,2,3,4\n", ["not some of both"]),
-        ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,-2,3\n", ["0 or more"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,400\n", ["-360 to 360"]),
         ("frequency_rad_s,F_re,X_amplitude,X_phase_deg\n1,1,2,\n", ["as X_amplitude has"]),
         ("frequency_rad_s,F_re,X_re_furlong\n1,1,2\n", ["no unit (the model's own) or one of m, "]),
         ("experiment,frequency_rad_s,F_re,X_re,X_im\na,1,1,2,3\na,2,1,2,3\n", ["row 3", "repeat"]),
         ("experiment,repeat,frequency_rad_s,F_re,X_re\na,1,1,1,2\na,1,1,1,2\n", ["row 3", "another name"]),
-        ("", ["empty"]),
     ],
 )
 def test_complaints_name_file_row_and_column(table, text, messages):
@@ -154,27 +136,15 @@ def test_a_model_file(model_file):
     "old, new, words",
     [
         ("equations", "equation", "key equation: .*did you mean 'equations'"),
-        ("X = F", "X == F", "equation 1.*character"),
-        ("X = F", "X", "needs one ="),
         ('["(m', '["n = 1", "(n', "equation 2.* n"),
         ("X = F", "X*X = F", "equation 1.*linear"),
         ('["c", "b"]', '["c", "k"]', "k .*stands in no equation"),
-        ('["c", "b"]', "[]", "key estimate.*a list of different names"),
-        ('["c", "b"]', '["c", "p"]', "p is d/dt"),
         ('["c", "b"]', '["c", "b", "m"]', "known value m: m is already a parameter"),
-        ("10.0", '"ten"', "key known.m.*a number"),
         ("m = 10.0", "m = 10.0, sin = 1.0", "known value 'sin' is no name"),
         ('b"]\n', 'b"]\ninputs = ["G"]\n', "G is no signal"),
         ('b"]\n', 'b"]\n[bounds]\nd = [0, 1]\n', "key bounds.*names of estimate; d is none"),
         ('b"]\n', 'b"]\n[bounds]\nc = [1, 1]\n', r"key bounds.*\[lowest, highest\] of c"),
-        (
-            'b"]\n',
-            'b"]\n[bounds]\nc = [0, 1]\n[start]\nc = 2\n',
-            "key bounds.*starting value between",
-        ),
         ('b"]\n', 'b"]\n[errors]\n', "not negative, and one greater than zero"),
-        ('b"]\n', 'b"]\n[errors]\nphase_deg = -1\n', "key errors.phase_deg"),
-        ("equations = [", "equations = [3, ", "key equations.*a text in quotes"),
     ],
 )
 def test_complaints_about_a_model_file_name_the_key(model_file, old, new, words):
@@ -189,12 +159,10 @@ EVIL = "__import__('pathlib').Path('{}').touch()"
     "text",
     [
         'equations = ["EVIL = F"]\nestimate = ["c"]\n',
-        'equations = ["c*X = EVIL"]\nestimate = ["EVIL"]\n',
         'equations = ["c*X = F"]\nestimate = ["c"]\ninputs = ["EVIL"]\n',
         'equations = ["c*X = F"]\nestimate = ["c"]\n[known]\n"EVIL" = 1\n',
         'equations = ["c*X = F"]\nestimate = ["c"]\n[bounds]\nc = ["EVIL", 1]\n',
         'estimate = ["c"]\nM = [["EVIL"]]\nK = [["c"]]\ncoordinates = ["EVIL"]\n',
-        'estimate = ["c"]\nM = [[1]]\nK = [["c"]]\ninputs = ["EVIL"]\nforce = { y1 = "EVIL" }\n',
         'estimate = ["c"]\nM = [[1]]\nK = [["c"]]\noutputs = { "EVIL" = "y1", z = "EVIL" }\n',
     ],
 )

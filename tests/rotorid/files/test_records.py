@@ -65,15 +65,10 @@ def test_a_model_file_with_everything(model):
         ("-k*x - c*v + u", "-k*x - c*v + w", "state v: .*w is not defined here"),
         ("-k*x - c*v + u", "-kk*x - c*v + u", r"kk is not defined here \(did you mean .k"),
         ("-k*x - c*v + u", "__import__('os')", "state v: .*_ cannot stand here"),
-        ("[outputs]", "[output]", r"key output: .*did you mean 'outputs'"),
         ('x = "x0"\n', "", "the value of the state x is missing"),
         ('x = "x0"\n', 'x = "u"\n', "initial x: .*u is not defined here"),
-        ("k = 2\n", 'k = "two"\n', "key estimate.k: .*a number"),
         ("c = [0, inf]", "c = [1, 2]", "key bounds: .*of c, .*starting value"),
-        ("c = [0, inf]", "c = [2, 1]", "key bounds: .*lowest, highest"),
         ('inputs = ["u"]', 'inputs = ["u", "x"]', "input x: x is already a state"),
-        ("g = 9.81", "k = 9.81", "known value k: k is already a parameter"),
-        ('y = "x"', "y = true", "key outputs.y: .*in quotes"),
     ],
 )
 def test_complaints_about_a_model_file_name_the_key(tmp_path, old, new, said):
@@ -102,7 +97,6 @@ def test_milliseconds_and_european_excel(tmp_path, model):
             r"row 4, column t_s: found '0.1', expected a time above 0.1 of row 3: sort",
         ),
         ("0.2,2,3,4", "0.2,,3,4", r"row 4, column y: found nothing .*--allow-missing"),
-        ("0.2,2,3,4", "0.2,nan,3,4", r"row 4, column y: found 'nan', expected a finite number"),
         ("0.2,2,3,4", "0.2,2,3,", r"row 4, column u: found nothing"),
         ("t_s,y,z,u", "t_s,y,zz,u", r"column zz: .*did you mean 'z'"),
         ("t_s,y,z,u", "t_s,y_mm,z,u", r"column y_mm: .*without a unit"),
@@ -161,12 +155,8 @@ def test_a_model_of_matrices(tmp_path):
 @each_of(
     ("old", "new", "said"),
     [
-        ('M = [["m1", 0], [0, 2.0]]', "M = [[1, 2]]", "key M: .*square matrices"),
-        ("[-1, 3]]", "[-1, true]]", "key K: .*a number, or an expression"),
         ('["a", "b"]', '["a"]', "key M: .*of one size, with a name for each row"),
-        ('b = "cos(t)"', 'b = "cos(w)"', "state v_b: .*w is not defined here"),
         ("a = 0.5", "c = 0.5", "initial: c is no state"),
-        ("[force]", "[states]\nx = 1\n[force]", "equations, matrices or states"),
     ],
 )
 def test_complaints_about_matrices(tmp_path, old, new, said):

@@ -145,29 +145,15 @@ def test_every_column_in_us_units_with_blank_cells(tmp_path, book):
     "row, column, value, words",
     [
         (3, "length_m", 0, "a length above 0 (0 only in the last row"),
-        (3, "diameter_m", 0, "a number above 0"),
-        (3, "diameter_m", "", "a number"),
-        (3, "mass_kg", -5, "0 or more"),
         (3, "support_stiffness_N_per_m", "rigid", "a number"),
-        (3, "support_stiffness_N_per_m", -1, "0 or more"),
         (4, "inner_diameter_mm", 115, "less than the outer diameter"),
-        (4, "inner_diameter_mm", -1, "0 or more"),
-        (4, "youngs_modulus_Pa", -1, "above 0"),
         (4, "poisson_ratio", -1, "above -1, up to 0.5"),
-        (4, "material_damping_s", -1, "0 or more"),
     ],
 )
 def test_bad_cells(table, row, column, value, words):
     wide = TABLE if column in TABLE[0] else [[*TABLE[0], column], *([*line, ""] for line in TABLE[1:])]
     problems = complaints(table, replaced(wide, row, column, value))
     the_only(problems, "rotor.csv", row, column, str(value), words)
-
-
-def test_an_element_much_shorter_than_its_neighbour(table):
-    short = [*TABLE, ["end", 0, 0, 2e7, 3]]
-    assert table(replaced(short, 3, "length_m", 1.1e-4)).supports[-1] == Support(4, 2e7)
-    problems = complaints(table, replaced(short, 3, "length_m", 1e-4))
-    the_only(problems, "rotor.csv", None, None, None, "element 2: length must be 1/3000 of its longer neigh")
 
 
 def test_missing_column_and_no_element(table):
@@ -198,15 +184,6 @@ def test_a_rotor_file(file):
     assert effects.material_damping.tolist() == [2e-5] * 3
 
 
-def test_files_of_a_rotor(file):
-    text = at_node_2("bearing", 'table = "b.csv"') + at_node_2("seal", 'table = "b.csv"')
-    assert [support.kind for support in file(text).supports] == ["bearing", "bearing", "seal"]
-    files = rotor_files(file.folder / "rotor.toml")
-    assert [path.name for path in files] == ["rotor.toml", "shaft.csv", "b.csv"]
-    for alone in ("shaft.csv", "none.toml"):
-        assert rotor_files(file.folder / alone) == (file.folder / alone,)
-
-
 @each_of(
     "material, model, shear",
     [
@@ -223,13 +200,9 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
 @each_of(
     "old, new, key, value, words",
     [
-        ("shear = false", 'shear = "none"', "model.shear", "none", "true or false, without quotes"),
         ("modulus_Pa = 2e11", "modulus = 2e11", "material.youngs_modulus", "200000000000.0", "did you mean"),
-        ("modulus_Pa = 2e11", "modulus_Pa = 0", "material.youngs_modulus_Pa", "0", "a number above 0"),
         ("ratio = 0.28", "ratio = 2", "material.poisson_ratio", "2", "a number up to 0.5"),
-        ("mass_kg = 4", "mass_lb = -4", "disc[1].mass_lb", "-4", "0 or more"),
         ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
-        ("mass_kg = 4", "width_m = 1", "disc[1].width_m", "1", "the disc's width and outer diameter"),
         (
             "mass_kg = 4",
             "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
@@ -246,12 +219,8 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
         ),
         ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
         ("node = 4", "node = 5", "bearing[1].node", "5", "a node from 1 to 4 or a station"),
-        ("node = 4", "node = 0", "bearing[1].node", "0", "a node: its number from 1"),
-        ("node = 4", "", "bearing[1].node", None, "a node: its number from 1"),
-        ("damping_N_s_per_m = 300", "damping = 3", "bearing[1].damping", "3", "'damping_N_s_per_m'?"),
         ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
         ('name = "thrust"', 'name = "12"', "station[1].name", "12", "a name, not a number"),
-        ('name = "thrust"', 'name = "a:b"', "station[1].name", "a:b", "without ':' and ','"),
         (
             "node = 1\n",
             'node = 1\n[[station]]\nname = "thrust"\nnode = 2',
@@ -339,24 +308,19 @@ def test_coefficients_over_speed(file):
     "lines, key, value, words",
     [
         ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "", None, "either stiffness_N_per_m, or both kxx_N_per_m"),
-        ((SCALAR, "cxx = 3", "cxy = 3"), "", None, "or both cxx_N_s_per_m and cyy_N_s_per_m"),
         (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx_N_per_m", "10000000.0", "kxx says it already"),
-        ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "stiffness of the pedestal"),
         (
             (SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"),
             "pedestal_stiffness_N_per_m",
             "[1, 2, 3]",
             "[x, y]",
         ),
-        ((SCALAR, "pedestal_stiffness_N_per_m = 0"), "", None, "leave out a rigid pedestal"),
-        ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),
         (
             ("kxx_N_per_mm = -5e7", "kyy = 5e7"),
             "kxx_N_per_mm",
             "-50000000.0",
             "0 or more; what pushes outwards",
         ),
-        (('table = "b.csv"', SCALAR), "", None, "either stiffness_N_per_m, or both"),
         (('table = "b.csv"', "kxx = 3"), "", None, "kxx_N_per_m once: "),
     ],
 )
@@ -369,11 +333,8 @@ def test_bad_bearings(file, lines, key, value, words):
     "table, row, column, value, words",
     [
         (replaced(SPEEDS, 3, "speed_rad_s", 100), 3, "speed_rad_s", "100", "above that of the row before"),
-        (replaced(SPEEDS, 2, "speed_rad_s", -1), 2, "speed_rad_s", "-1", "a speed of 0 or more"),
         (replaced(SPEEDS, 3, "kyy_N_per_m", -1), 3, "kyy_N_per_m", "-1", "is a [[seal]]"),
         (replaced(SPEEDS, 1, "kxx_N_per_m", "kxx"), 1, "kxx", "kxx", "one of the units N_per_m, "),
-        ([row[1:] for row in SPEEDS], 1, "speed_rpm", None, "a column speed_rpm, speed_rad_s or speed_Hz"),
-        (SPEEDS[:2], 2, "speed_rad_s", "100", "two speeds"),
     ],
 )
 def test_bad_tables_of_bearings(file, table, row, column, value, words):
@@ -426,10 +387,6 @@ def test_every_kind_of_force_in_field_units(file):
         ),
         ("journal_bearing", [*BEARING, "clearance_mm = 0.1"], "clearance_mm", "clearance_um says it already"),
         ("journal_bearing", [*BEARING, 'film = "pi"'], "film", "'pressure' or 'line of centres'"),
-        ("annular_seal", SEAL[:3], "clearance_um", "radial clearance"),
-        ("stop", ["gap_um = 9"], "stiffness_N_per_m", "of the contact"),
-        ("stop", STOP, "diameter_mm", "acts against the slip"),
-        ("internal_damping", ["damping_N_s_per_m = nan"], "damping_N_s_per_m", "a finite number"),
     ],
 )
 def test_bad_forces(file, kind, lines, key, words):

@@ -144,10 +144,6 @@ OPTIONS = {
         "expected a tacho channel, without which there is no phase: --tacho NAME "
         "(tacho in a file); the channels are KEY, B1X and B1Y",
     ),
-    "another tacho": (
-        {"tacho": "KEI"},
-        "column KEI: expected a channel of this name (did you mean 'KEY'?)",
-    ),
     "another sensor": (
         {"tacho": "KEY", "channels": {"B1YY": {}}},
         "B1YY: expected a channel of this name (did you mean 'B1Y'?); the channels are KEY, B1X and B1Y",
@@ -160,14 +156,9 @@ OPTIONS = {
         {"tacho": "KEY", "unit": "MM"},
         "column unit: found 'MM', expected the unit written mm",
     ),
-    "pp": ({"tacho": "KEY", "unit": "um_pp"}, "expected the unit of a sample, um, not um_pp"),
     "kinds": (
         {"tacho": "KEY", "unit": "V", "amplitude": "um"},
         "column B1X: found 'V', expected a unit that can become that of the amplitudes, um",
-    ),
-    "pulses": (
-        {"tacho": "KEY", "pulses": 0},
-        "column pulses: found '0', expected a number of 1 or more: pulses a turn",
     ),
 }
 
@@ -181,11 +172,8 @@ def test_options_that_cannot_be_are_explained(kind, folder):
 
 FILES = {
     'tacho = "KEY"\n': "key records: expected a file for each run",
-    'tacho = "KEY"\nrecords = []\n': "expected a table, [records]: a file for each run",
-    'tacho = "KEY"\nrecords = { a = "bas.npz" }\n': "bas.npz: expected a file that exists (did you mean",
     FILE + 'uni = "um"\n': "key channels.B1Y.uni: found 'um', expected a known key (did you mean 'unit'?)",
     FILE.replace("falling", "fallling"): "key edge: found 'fallling', expected 'leading', 'trailing'",
-    FILE.replace("high_pass_Hz", "high_pass_rpm"): "key channels.probe.high_pass_rpm",
 }
 
 
@@ -193,21 +181,6 @@ FILES = {
 def test_settings_that_cannot_be_are_explained(text, folder):
     message = complaint([settings(folder, text)])
     assert FILES[text] in message, message
-
-
-def test_units_in_names_and_settings_agree(tmp_path):
-    channels = {"KEY": drawn()["KEY"], "A_um": drawn()["B1X"]}
-    path = write(tmp_path / "a.npz", channels)
-    for unit in ("um", "mil", None):  # those of channels that state none
-        assert read_waveforms([path], {"tacho": "KEY", "unit": unit}).labels.vibration_unit == "um"
-    text = 'tacho = "KEY"\nrecords = { a = "a.npz" }\n[channels.A]\nunit = "mil"\n'
-    assert "column A_um: expected the unit um of its name, not mil" in complaint([settings(tmp_path, text)])
-    twice = write(tmp_path / "b.npz", {**channels, "A_mil": drawn()["B1Y"]})
-    assert "the channels are KEY, A_um and A_mil" in complaint(
-        [twice], {"tacho": "KEY", "channels": {"A": {}}}
-    )
-    only = write(tmp_path / "c.npz", {"KEY": drawn()["KEY"]})
-    assert "a channel besides that of the tacho" in complaint([only], {"tacho": "KEY"})
 
 
 def test_several_files(folder):
