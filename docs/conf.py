@@ -24,7 +24,7 @@ extensions = [
     "numpydoc",
     "myst_parser",
     "commands",
-    "pictures",
+    "plotted",
     "mathml",
     "names",
     "tables",

@@ -182,7 +182,7 @@ def test_outputs():
         ([-1.0, 5.0], {}, "not negative"),
         ([np.nan], {}, "finite"),
         (["a"], {}, "numbers"),
-        ([], {}, "one number or a list"),
+        ([], {}, "in one list"),
         ([10.0], {"bands": 1.0}, "part of the critical speed"),
         ([10.0], {"bands": -0.1}, "part of the critical speed"),
         ([10.0], {"bands": np.nan}, "part of the critical speed"),
