@@ -96,7 +96,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
             raise ValueError(f"{path}: no rotor file can be written, {lacking}")
         return rotor_file_bytes(path, calibrated.rotor)
 
-    columns = [Column(each.name, [*each.values]) for each in parameter_columns(names, every)]
+    numbers = parameter_columns(names, every)
     parts = [parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()]
     return Outcome(
         result=calibrated,
@@ -105,7 +105,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
         more=(*parts,),
         beyond="all numbers, with 95 %",
         short=True,
-        file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
+        file=Table("numbers", (*numbers, Column("data_share", calibrated.data_share))),
         files={".toml": rotor_files},
         keys=plain(document),
         warnings=calibrated.warnings,

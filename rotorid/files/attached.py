@@ -318,7 +318,7 @@ def support_tables(
             table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv")
             names = ["speed_rad_s", *(NAMES[name] for name in columns)]
             rows = [*zip(support.speeds, *columns.values(), strict=True)]
-            values["table"], files[table] = table.name, csv_bytes((), names, rows)
+            values["table"], files[table] = table.name, csv_bytes(names, rows)
         else:
             values |= {name: column[0] for name, column in columns.items()}
         if stand := support.pedestal:

@@ -421,7 +421,7 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         "calibration": _calibration_tables(rotor.calibration) if rotor.calibration else {},
     }
     return {
-        shaft: csv_bytes((), [*columns], [*zip(*columns.values(), strict=True)]),
+        shaft: csv_bytes([*columns], [*zip(*columns.values(), strict=True)]),
         **tables,
         path: toml_bytes({name: part for name, part in document.items() if part}),
     }

@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, figures
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
@@ -128,6 +126,8 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
 
 def _table(kind: MachineType) -> Table:
     """One row per speed, sensor and plane: mean coefficients, and one standard deviation of each kind."""
+    import numpy as np
+
     W = kind.mean.ravel()
     s, c, p = np.indices(kind.turn.shape).reshape(3, -1)
     tenths, digits = "{:.1f}".format, partial(figures, digits=3)
@@ -149,6 +149,8 @@ def _table(kind: MachineType) -> Table:
 
 def _typical(table: Table, name: str) -> str:
     """Root mean square over the coefficients, in words."""
+    import numpy as np
+
     columns = (column.values for column in table.columns if column.heading.startswith(name))
     percent, degrees = (float(np.sqrt(np.mean(np.asarray(values) ** 2))) for values in columns)
     if not percent:

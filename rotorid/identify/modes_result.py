@@ -345,6 +345,5 @@ class FittedModes:
         if self.undetermined:
             estimate = replace(estimate, values=estimate.values * np.nan, covariance=None)
         else:
-            table = self.file_table()
-            modes = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+            modes = self.file_table().records
         return dict(plain({**estimate.to_dict(), "modes": modes, "warnings": self.warnings}))

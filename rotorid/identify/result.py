@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import counted, percent, sentence
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.linear_start import LinearFit
@@ -128,11 +129,13 @@ class Identification(Answered, Uncertain):
             rows_of = [f"equation {e + 1}" for e in range(left.shape[1])]
         n, e = left.shape
         return (
-            Column("experiment", np.repeat(self.experiments.names, e), str),
-            Column("frequency_rad_s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format, "rad/s"),
-            Column("row", rows_of * n, str),
-            Column("re", left.real.ravel(), "{:.3g}".format, "left, re"),
-            Column("im", left.imag.ravel(), "{:.3g}".format, "left, im"),
+            Column("experiment", np.repeat(self.experiments.names, e)),
+            Column(
+                "frequency_rad_s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format, title="rad/s"
+            ),
+            Column("row", rows_of * n),
+            Column("re", left.real.ravel(), "{:.3g}".format, title="left, re"),
+            Column("im", left.imag.ravel(), "{:.3g}".format, title="left, im"),
         )
 
     @property
@@ -166,7 +169,7 @@ class Identification(Answered, Uncertain):
                 "condition_number": self.estimate.condition_number,
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
                 "correlation": None if correlation is None else by_name([*map(by_name, correlation)]),
-                "residuals": rows(self.residuals),
+                "residuals": records(self.residuals),
                 "normal_matrix": self.normal_matrix.to_dict(),
                 **(self.prior.to_dict() if self.prior else {}),
             }

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.answer import Column, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.regression.estimate import WORD_TOLERANCE, Estimate, unit_columns
 
 RCOND = 1e-12
@@ -299,7 +299,7 @@ class NormalMatrix:
         """As a table."""
         columns = (Column(n, row, "{:.6g}".format) for n, row in zip(self.names, self.matrix, strict=True))
         title = f"normal matrix of the last step, condition number {self.condition_number:.4g}"
-        return f"{title}\n{text((Column('', self.names, str), *columns), width=10_000)}"
+        return f"{title}\n{text((Column('', self.names), *columns), width=10_000)}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""

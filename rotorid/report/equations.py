@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Column, text
+from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.base.text import cut
 
 Expression = Any
@@ -95,7 +96,7 @@ class Equations:
         names = [cut(name, _LONGEST) for name in (*self.columns, f"| {right}")]
         values = (np.column_stack((self.matrix, self.right)) + 0.0).T
         numbers = [Column(*each, "{:.6g}".format) for each in zip(names, values, strict=True)]
-        first, wide = Column(f"{matrix} {unknowns} = {right}", self.rows, str), max(12, *map(len, names))
+        first, wide = Column(f"{matrix} {unknowns} = {right}", self.rows), max(12, *map(len, names))
         each = max((COLUMNS - 4 - max(map(len, self.rows))) // (wide + 2), 1)
         return [text((first, *numbers[k : k + each]), width=COLUMNS) for k in range(0, len(numbers), each)]
 

@@ -131,7 +131,7 @@ class Outcome(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
-        return frame(self.table())
+        return frame(self.table().columns)
 
     def written(self, path: Path) -> Written:
         """What `--output` writes to a file of this name."""

@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
 from rotorid.report.options import file_of
@@ -132,14 +130,14 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
     most = ratios.shape[1] - 1
     runs = [1, *range(planes + 2, planes + 2 + most)]
     met = [int((frame["runs_needed"] <= one).sum()) for one in runs]
-    ends = np.array([interval(k, n) for k in met])
+    low, high = zip(*(interval(k, n) for k in met), strict=True)
     columns = (
         Column("corrections", range(most + 1)),
         Column("runs", runs),
         Column("met", met),
-        Column("probability", np.divide(met, n), shown),
-        Column("low", ends[:, 0], shown),
-        Column("high", ends[:, 1], shown),
+        Column("probability", [k / n for k in met], shown),
+        Column("low", low, shown),
+        Column("high", high, shown),
     )
     table = Table("corrections", columns)
     head = f"The limit is met by {100 * met[0] / n:.4g} % as built"
@@ -153,10 +151,10 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
         good, count = int((held == 1).sum()), len(held)  # unknown where there is no region
         coverage[name] = {"held": good, "corrections": count}
         if count:
-            low, high = (f"{100 * end:.1f}" for end in interval(good, count))
+            ends = (f"{100 * end:.1f}" for end in interval(good, count))
             notes.append(
                 f"first corrections with {'a' if warned else 'no'} warning: {good} of {count} of the 95 % "
-                f"regions hold the true one ({low} to {high} %)"
+                f"regions hold the true one ({' to '.join(ends)} %)"
             )
     return Outcome(
         result=frame,
@@ -166,7 +164,7 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
         keys={
             **keys,
             "probability": met[-1] / n,
-            "interval": ends[-1].tolist(),
+            "interval": [low[-1], high[-1]],
             "rows": table.records,
             "coverage": coverage,
             "not_balanced": reasons,

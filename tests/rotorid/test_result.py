@@ -5,19 +5,19 @@ import json
 import numpy as np
 import pandas as pd
 
-from rotorid.base.answer import Column, frame, rows, text
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 
 COLUMNS = (
-    Column("plane", ("A", "B"), str),
-    Column("mass_g", np.array([1.25, np.nan]), "{:.2f}".format, "g"),
-    Column("covariance", np.array([[1.0, 0.0], [np.inf, 2.0]])),
-    Column("runs", np.array([3, 4]), str),
+    Column("plane", ("A", "B")),
+    Column("mass_g", np.array([1.25, np.nan]), "{:.2f}".format, title="g"),
+    Column("covariance", np.array([[1.0, 0.0], [np.inf, 2.0]]), None),
+    Column("runs", np.array([3, 4])),
 )
 
 
 def test_rows_are_json_and_nothing_is_null():
-    found = rows(COLUMNS)
+    found = records(COLUMNS)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert found == [
         {"plane": "A", "mass_g": 1.25, "covariance": [1.0, 0.0], "runs": 3},
@@ -39,8 +39,8 @@ def test_text_prints_the_columns_that_say_how():
 
 
 def test_an_empty_table_has_its_heading():
-    empty = (Column("plane", [], str), Column("g", [], str))
-    assert rows(empty) == []
+    empty = (Column("plane", []), Column("g", []))
+    assert records(empty) == []
     assert list(frame(empty).columns) == ["plane", "g"]
     assert text(empty) == "  plane     g"
 

@@ -61,14 +61,14 @@ def test_html_escapes_words_and_tells_where_a_number_comes_from():
 
 
 def test_a_frame_has_the_values():
-    table = frame(SPEEDS)
+    table = frame(SPEEDS.columns)
     assert list(table.columns) == ["mode", "whirl", "rpm"]
     np.testing.assert_array_equal(table["rpm"], [2980.123456789, -4.0, np.nan])
 
 
 def test_columns_are_one_dimensional_and_of_one_length():
     with pytest.raises(ValueError, match="one-dimensional"):
-        Column("shape", np.eye(2))
+        Table("shape", (Column("shape", np.eye(2)),))
     with pytest.raises(ValueError, match="one length"):
         Table("shapes", (Column("node", [1, 2]), Column("mode", [1.0])))
     with pytest.raises(ValueError, match="one length"):
