@@ -239,14 +239,16 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": path.name}
-    if path.suffix.lower() == ".toml":
+    data: Mapping[str, Any] = {"shaft": "table"}
+    alone = path.suffix.lower() != ".toml"
+    if not alone:
         data = problems.need(read_toml(path, problems))
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             raise InputError([Problem(str(path), None, "shaft", None, expected)])
     file = problems.need(read_settings(RotorFile, data, str(path), problems))
-    parts, stations = _shaft(path.parent / file.shaft, file.material), dict[str, int]()
+    shaft = path if alone else path.parent / file.shaft
+    parts, stations = _shaft(shaft, file.material), dict[str, int]()
     at = places(range(1, len(parts["length"]) + 2), stations)
 
     def name(item: Station) -> None:
