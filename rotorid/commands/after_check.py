@@ -61,21 +61,21 @@ def left_to_do(
     """
     from balancing import after_check_run, last_run, mount
 
-    runs, (result, known, *_) = job.check, solved
+    runs, (result, coefficients, *_) = job.check, solved
     assert runs is not None
     stop = "; ".join(result.contradictions)
     if not options.refine:
-        influence, baseline = known
+        influence, baseline = coefficients
         misplaced = check is not None and check.change is not None
         measured = baseline is None and influence.trials is not None and options.machine_type is None
         try:
             if misplaced:  # what is really there is not known, what it leaves is
-                known = influence, last_run(runs)
+                coefficients = influence, last_run(runs)
             elif measured:
-                known = choose(job, options.coefficients, refined=True)
+                coefficients = choose(job, options.coefficients, refined=True)
             else:
-                known = influence, runs
-            result = correct_job(job, known, result.planes, options)
+                coefficients = influence, runs
+            result = correct_job(job, coefficients, result.planes, options)
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
             there = runs.runs[-1], runs.planes, runs.weights[-1]
@@ -83,7 +83,7 @@ def left_to_do(
     no_pieces = ""
     if pieces is None and job.holes and not stop:
         try:
-            pieces = mount(result, *known, job.holes, on_top=True)
+            pieces = mount(result, *coefficients, job.holes, on_top=True)
         except ValueError as error:  # a trim at any angle
             no_pieces = f"; not as pieces: {error}"
     left = after_check_run(

@@ -195,25 +195,28 @@ def _listed(given: str | Sequence[float]) -> list[float]:
     return angles
 
 
-def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """What is mounted or taken away, place by place."""
-    mass = f"mass_{found['unit']}"
-    if "holes" in found:
+    mass = f"mass_{document['unit']}"
+    if "holes" in document:
         pieces = [
-            " + ".join(f"{one['count']} × {one['mass']:g}" for one in row["pieces"]) for row in found["holes"]
+            " + ".join(f"{one['count']} × {one['mass']:g}" for one in row["pieces"])
+            for row in document["holes"]
         ]
         return [
             {"hole": row["hole"], "angle_deg": row["angle_deg"], mass: row["mass"], "pieces": words}
-            for row, words in zip(found["holes"], pieces, strict=True)
+            for row, words in zip(document["holes"], pieces, strict=True)
         ]
-    if "solutions" in found:
+    if "solutions" in document:
         return [
             {"solution": k, "angle_deg": angle, mass: size}
-            for k, solution in enumerate(found["solutions"], start=1)
-            for angle, size in zip(solution["angles_deg"], found["masses"], strict=True)
+            for k, solution in enumerate(document["solutions"], start=1)
+            for angle, size in zip(solution["angles_deg"], document["masses"], strict=True)
         ]
     scaled = {"mass_g": "mass_kg", "radius_mm": "radius_m", "depth_mm": "depth_m"}
-    return [{"angle_deg": found["angle_deg"], **{name: 1e3 * found[key] for name, key in scaled.items()}}]
+    return [
+        {"angle_deg": document["angle_deg"], **{name: 1e3 * document[key] for name, key in scaled.items()}}
+    ]
 
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:

@@ -25,7 +25,7 @@ _START = "θ here is where the search begins: the answer predicts the amplitudes
 
 
 @singledispatch
-def equations_of(found: object) -> Equations:
+def equations_of(result: object) -> Equations:
     """What was solved to get this result; ValueError where it has no such equations."""
     raise ValueError("--show equations needs one model and its data: there is nothing else that was solved")
 
@@ -41,18 +41,18 @@ def _(model: HarmonicModel) -> Equations:
 
 
 @equations_of.register
-def _(found: Identification) -> Equations:
+def _(result: Identification) -> Equations:
     """K θ = Y of the linear regression: real and imaginary parts of the equations at p = iω."""
-    fit, tests = found.linear, found.experiments
+    fit, tests = result.linear, result.experiments
     if fit is None:
         raise ValueError("--show equations needs every amplitude of the equations: one is not measured")
-    model, once = found.model, len({*tests.frequencies.tolist()}) == len(tests)
+    model, once = result.model, len({*tests.frequencies.tolist()}) == len(tests)
     at = [
         f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
         for omega, name in zip(tests.frequencies, tests.names, strict=True)
     ]
     labels = [f"{PARTS[k % 2]} eq. {k // 2 + 1}, {at[i]}" for i, k in np.argwhere(fit.rows.used)]
-    notes = [_START] if found.method == "output-error" else []
+    notes = [_START] if result.method == "output-error" else []
     rows, solved = _rows_in_symbols(model, tests), fit.estimate
     title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(solved.names), 'unknown')}"
     names = "K", "θ", "Y"
@@ -102,55 +102,59 @@ def _unknown(symbolic: Mapping[Monomial, Polynomial]) -> Expression:
     return factor_terms(expression({times(m, k): x for m, part in symbolic.items() for k, x in part.items()}))
 
 
-def correction_equations(found: Correction) -> Equations:
+def correction_equations(result: Correction) -> Equations:
     """The stretched W D = −Y of all speeds and sensors, [S] (29)–(33), (40), in the units of the job."""
-    labels, planes, factors = found.labels, found.planes, np.ones(found.before.size)
-    W = found.influence.W.reshape(-1, len(planes))
+    labels, planes, factors = result.labels, result.planes, np.ones(result.before.size)
+    W = result.influence.W.reshape(-1, len(planes))
     notes = [
         f"D in {labels.weight_in}, Y in {labels.vibration_in or 'the unit of the readings'}; phases lead and "
         "angles count with the rotation, whatever the job writes"
     ]
-    if found.method == "weighted":
+    if result.method == "weighted":
         notes.append("the rows are before weighting, which follows from the errors of W and Y, and from D")
-    elif found.row_weights is not None:
-        factors = found.row_weights
+    elif result.row_weights is not None:
+        factors = result.row_weights
         notes.append("the rows are after weighting: times the weights of sensors and speeds")
-    if found.method != "least-squares" or found.active:
-        how = f"{found.method}, within limits" if found.active else found.method
+    if result.method != "least-squares" or result.active:
+        how = f"{result.method}, within limits" if result.active else result.method
         notes.append(f"D by another way ({how}): plain least squares of these rows may give other weights")
-    places = [f"{sensor}, {labels.speed_words(speed)}" for speed in found.speeds for sensor in found.sensors]
+    places = [
+        f"{sensor}, {labels.speed_words(speed)}" for speed in result.speeds for sensor in result.sensors
+    ]
     stacked = [f"{part} {place}" for place in places for part in PARTS]
     unknowns = [f"{part} {plane}" for plane in planes for part in PARTS]
     matrix = stretch(factors[:, None] * W * labels.vibration_scale / labels.weight_scale)
-    right = stretch(-factors * found.before.ravel() * labels.vibration_scale)
+    right = stretch(-factors * result.before.ravel() * labels.vibration_scale)
     title = f"W D = -Y of each reading, stretched, [S] (31)–(33), (40): {counted(len(stacked), 'real row')}"
-    weights = stretch(found.weights * labels.weight_scale)
+    weights = stretch(result.weights * labels.weight_scale)
     return Equations(title, (), ("W", "D", "-Y"), stacked, unknowns, matrix, right, weights, notes)
 
 
 @equations_of.register
-def _(found: Reduction) -> Equations:
+def _(result: Reduction) -> Equations:
     """The rows B m = D of formula (50), mode by mode, as `design` makes them."""
-    n, k, seals = len(found.nodes), found.modes, found.seal_stiffness
-    modes = found.rotor_frequencies[:k], found.rotor_shapes[:, :k]
-    B, D = design(found.compliance, *modes, seal_stiffness=seals, normalise=found.normalise, rows=found.rows)
-    notes = ["B in 1/kg, D without unit" if found.rows == "relative" else "B in m/N, D in s²"]
-    if found.nonnegative:
+    n, k, seals = len(result.nodes), result.modes, result.seal_stiffness
+    modes = result.rotor_frequencies[:k], result.rotor_shapes[:, :k]
+    B, D = design(
+        result.compliance, *modes, seal_stiffness=seals, normalise=result.normalise, rows=result.rows
+    )
+    notes = ["B in 1/kg, D without unit" if result.rows == "relative" else "B in m/N, D in s²"]
+    if result.nonnegative:
         notes.append("no mass may be below 0: plain least squares of these rows may give another answer")
-    labels = [f"mass at {node}, mode {mode + 1}" for mode in range(k) for node in found.nodes]
-    title, m = f"B m = D, [S] (50): {counted(n * k, 'row')}, {counted(n, 'unknown')}", found.masses
+    labels = [f"mass at {node}, mode {mode + 1}" for mode in range(k) for node in result.nodes]
+    title, m = f"B m = D, [S] (50): {counted(n * k, 'row')}, {counted(n, 'unknown')}", result.masses
     return Equations(title, (), ("B", "m", "D"), labels, m.names, B, D, m.solution, notes)
 
 
 @equations_of.register
-def _(found: Fit) -> Equations:
+def _(result: Fit) -> Equations:
     """[F] (3.6), (3.7), or of quasilinearization (2.17) to (2.28) of [Q]."""
-    return _sensitivities(found) if found.regression is None else _linear_about_last(found)
+    return _sensitivities(result) if result.regression is None else _linear_about_last(result)
 
 
-def _linear_about_last(found: Fit) -> Equations:
+def _linear_about_last(result: Fit) -> Equations:
     """f_x, f_θ, dG/dt and dD/dt in symbols, [Q] (2.17)–(2.22), and M θ = Y of the last step, (2.28)."""
-    model = found.model
+    model = result.model
     x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
     if model.inertia:
         raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
@@ -166,20 +170,28 @@ def _linear_about_last(found: Fit) -> Equations:
             terms = [*zip(slopes, G, strict=True), (usual(f.diff(theta)), 1)]
             rows.append(Row("G", [(1, Symbol(f"dG{i + 1}{j + 1}/dt"))], terms))
         D = [Symbol(f"D{p + 1}") - by for p, by in enumerate(x)]
-        known = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
-        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (known, 1)]))
-    K, Y = found.regression or (np.zeros((0, 0)), np.zeros(0))
+        constant = usual(f) - Add(*(usual(f.diff(theta)) * theta for theta in thetas))
+        rows.append(Row("D", [(1, Symbol(f"dD{i + 1}/dt"))], [*zip(slopes, D, strict=True), (constant, 1)]))
+    K, Y = result.regression or (np.zeros((0, 0)), np.zeros(0))
     labels = [f"M{j + 1}" for j in range(len(thetas))]
     title = "x = G θ + D about the last trajectory x, θ, [Q] (2.17)–(2.24), and M θ = Y, (2.28)"
     notes = ["G and D begin with G θ + D = x(t0); M and Y are those of the last iteration"]
     return Equations(
-        title, rows, ("M", "θ", "Y"), labels, model.parameters, K.T @ K, K.T @ Y, found.estimate.values, notes
+        title,
+        rows,
+        ("M", "θ", "Y"),
+        labels,
+        model.parameters,
+        K.T @ K,
+        K.T @ Y,
+        result.estimate.values,
+        notes,
     )
 
 
-def _sensitivities(found: Fit) -> Equations:
+def _sensitivities(result: Fit) -> Equations:
     """Sensitivities ∂x/∂θ of the states and ∂y/∂θ of the outputs, [F] (3.6), (3.7), in symbols."""
-    model, n = found.model, len(found.model.states)
+    model, n = result.model, len(result.model.states)
     x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
     E = Matrix(n, n, model.inertia) if model.inertia else eye(n)
     velocities = [Symbol(f"d{state}/dt") for state in x]
@@ -202,9 +214,9 @@ def _sensitivities(found: Fit) -> Equations:
                 outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
     rows, none = [*equations, *starts, *outputs], np.zeros((0, len(thetas)))
     title = f"Sensitivities, [F] (3.6), (3.7), of {counted(n, 'state')}"
-    notes = ["below these: the rows of [prior] or --ridge, (θ - value)/std = 0"] if found.prior else []
+    notes = ["below these: the rows of [prior] or --ridge, (θ - value)/std = 0"] if result.prior else []
     return Equations(
-        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values, notes
+        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], result.estimate.values, notes
     )
 
 

@@ -33,6 +33,7 @@ from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands.balance import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
 from rotorid.files import Conventions, Job
+from rotorid.files.job_models import Plane, Sensor
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
@@ -330,12 +331,12 @@ def distance(d: FloatArray, covariance: FloatArray) -> float:
 def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: ComplexArray) -> Balance:
     """Weights by this calibrated rotor, as `rotorid balance` finds them."""
     runs = trials(machine, speeds, readings, np.zeros((1, 2)))
-    nodes = dict(zip(runs.planes, machine.planes, strict=True))
-    places = dict(zip(PROBES, machine.sensors, strict=True))
-    conventions = Conventions()
-    return balance(
-        Job(runs, None, conventions, (), runs.planes, rotor=rotor, plane_nodes=nodes, sensor_places=places)
-    )
+    planes = {name: Plane(node=node) for name, node in zip(runs.planes, machine.planes, strict=True)}
+    sensors = {
+        name: Sensor(node=probe.node, angle_deg=probe.angle)
+        for name, probe in zip(PROBES, machine.sensors, strict=True)
+    }
+    return balance(Job(runs, None, Conventions(), (), planes, sensors, rotor=rotor))
 
 
 def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:

@@ -66,7 +66,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     forces = [JournalBearing(node, "", **BEARING) for node in (1, 5)]
     light = fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, density=0.0, forces=forces)
     found = bearings(light, BearingsOptions(speeds=[100.0]))
-    assert found.result.found[0].eccentricity == pytest.approx(0)
+    assert found.result.equilibria[0].eccentricity == pytest.approx(0)
     assert found.figure().axes[0].get_title().startswith("no load")
 
 
@@ -142,4 +142,6 @@ def test_a_shaft_that_rests_on_its_stop_is_told(cli, tmp_path):
     rigid = SmallModel((1,), [20.0], [200.0], np.zeros((1, 1)), forces=[film, ring])
     found = bearings(rigid, BearingsOptions(speeds=[100.0, 200.0]))
     assert "the shaft rests on the stop 'ring' at node 1" in found.warnings
-    assert found.result.found[0].position == pytest.approx([-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6)
+    assert found.result.equilibria[0].position == pytest.approx(
+        [-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6
+    )
