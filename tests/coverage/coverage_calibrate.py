@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from coverage_balance import normal, percent
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
@@ -175,11 +176,6 @@ CASES: dict[str, dict[str, Any]] = {
 
 WHOLE = ("four speeds", "one speed")
 """Cases in which the model lacks nothing."""
-
-
-def normal(random: Random, *shape: int) -> ComplexArray:
-    """Complex, of variance 1 in each direction."""
-    return np.asarray(random.standard_normal(shape) + 1j * random.standard_normal(shape))
 
 
 def third_bearing(random: Random, rotor: fem.Rotor) -> fem.Rotor:
@@ -378,11 +374,6 @@ def lacks(name: str, found: Sequence[Outcome]) -> str:
         [one.good for one in found],
     ]
     return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>10}" for column in columns)
-
-
-def percent(values: Sequence[Any]) -> str:
-    """Share of what is true."""
-    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if len(values) else "–"
 
 
 def main(seed: int = 1, machines: int = 510) -> None:
