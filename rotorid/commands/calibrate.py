@@ -122,8 +122,8 @@ def _part(calibrated: CalibratedRotor, which: BoolArray) -> tuple[tuple[str, ...
 
     part = Uncertain()
     part.values, part.errors_stated, part.dof = calibrated.values[which], True, 0
-    known = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
-    part.covariance = known[np.ix_(which, which)]
+    determined = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
+    part.covariance = determined[np.ix_(which, which)]
     return tuple(name for name, taken in zip(calibrated.names, which, strict=True) if taken), part
 
 
@@ -139,8 +139,8 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
         digits = 4
         if std > 0 and value:  # as many as stand before the second digit of the error
             digits = max(2 + int(np.floor(np.log10(abs(value))) - np.floor(np.log10(std))), 1)
-        known = f"{figures(value, digits)} ± {error_figures(std)}"
-        cells += [name, "not determined" if np.isnan(value) else known]
+        number = f"{figures(value, digits)} ± {error_figures(std)}"
+        cells += [name, "not determined" if np.isnan(value) else number]
     cells += [""] * (-len(cells) % 4)
     return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
 

@@ -110,9 +110,9 @@ def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
 
-    told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
-    told = re.sub(r"\*\*(\d+)(?![\w.])", lambda found: found[1].translate(_RAISED), told)
-    return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
+    written = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
+    written = re.sub(r"\*\*(\d+)(?![\w.])", lambda power: power[1].translate(_RAISED), written)
+    return re.sub(r"(?<!\*)\*(?!\*)", "·", written)
 
 
 def _decimals(expression: Expression) -> Expression:
@@ -125,7 +125,7 @@ def _decimals(expression: Expression) -> Expression:
 
 def _sum(terms: Terms) -> str:
     """Coefficient times factor, term by term; 0 and 1 are not written."""
-    told = []
+    products = []
     for pair in terms:
         parts = [*map(_decimals, pair)]
         if 0 in parts:
@@ -137,5 +137,5 @@ def _sum(terms: Terms) -> str:
         words = (
             _words(one) if plain else f"({_words(one)})" for one, plain in zip(inside, bare, strict=True)
         )
-        told.append(sign + ("·".join(words) or "1"))
-    return " + ".join(told).replace("+ -", "- ") or "0"
+        products.append(sign + ("·".join(words) or "1"))
+    return " + ".join(products).replace("+ -", "- ") or "0"

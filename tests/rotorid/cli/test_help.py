@@ -13,7 +13,7 @@ import rotorid.cli
 from rotorid.base.answer import COLUMNS
 from rotorid.samples import sample_data
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "docs" / "_ext"))
 
 from commands import all_commands, split_help
 

@@ -142,17 +142,6 @@ def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equation
         assert found.json["parameters"][name]["value"] == pytest.approx(one["value"], rel=1e-4), name
 
 
-def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
-    for place, nodes in (("best", [3, 11, 14]), ("compromise", [4, 10, 16]), ("book", [7, 12, 18])):
-        assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
-    few = cli("reduce", ROTOR, "--place", "compromise", "--candidates", "7,12,18,20", "--json").json
-    assert few["placement"]["considered"] == 4
-    document = cli("reduce", ROTOR, "--place", "compromise", "--json").json
-    assert document["nodes"] == [4, 10, 16]
-    assert document["placement"]["best_by_frequency"]["nodes"] == [3, 11, 14]
-    assert document["placement"]["book_rule"]["nodes"] == [7, 12, 18]
-
-
 def test_kept_supports_take_no_masses(cli, tmp_path):
     words = ("--place", "compromise", "--masses", 2, "--keep-supports", "--json")
     ranked = cli("reduce", MOTION / "rotor.toml", *words).json

@@ -12,13 +12,6 @@ from rotorid import read_rotor, write_rotor
 from rotorid.commands.critical import CriticalOptions, critical
 
 
-def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
-    document = cli("critical", files[0], "-n", 1, "--map", "--json").json["map"]
-    stiffness = document["stiffness_N_per_m"]
-    assert (stiffness[0], stiffness[-1]) == pytest.approx((2e7 / 100, 5e7 * 100))
-    np.testing.assert_allclose(np.diff(np.log(stiffness)), np.log(250 * 100) / (len(stiffness) - 1))
-
-
 def test_the_map_says_what_it_leaves_out(cli, tmp_path):
     rotor = fem.Rotor(
         [0.1] * 8,
