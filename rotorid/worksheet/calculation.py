@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotorid.base.tables import Column, Table, html
-from rotorid.base.text import figures
+from rotorid.base.text import Angles, Phase, figures
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -280,14 +280,13 @@ def trial(job: str | None, options: dict[str, Any]) -> str:
     return words + Markup(_svg(made.figure(), answer.judgement) if to_draw else "")
 
 
-def convention(phase: str, angles: str) -> str:
+def convention(phase: Phase, angles: Angles) -> str:
     """Two drawings: how the angles of weights count, and what a phase is."""
     from balancing import Labels
     from balancing.plots import weight_figure
-    from rotorid.files.conventions import as_angles, as_phase
     from rotorid.report.conventions_explained import phase_figure
 
-    labels = Labels(phase=as_phase(phase), angles=as_angles(angles))
+    labels = Labels(phase=phase, angles=angles)
     weight, title = labels.weight_from(1.0, math.radians(60.0)), f"phase {phase}, angles {angles}"
     turning = _svg(weight_figure(labels, complex(weight)), f"The rotor from its end: {title}")
     return turning + _svg(phase_figure(labels), f"A reading over time: {title}")

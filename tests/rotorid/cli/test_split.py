@@ -97,9 +97,9 @@ def test_drilling_takes_away_opposite(run, tmp_path):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        ("35@120 --drill 8mm", "expected a unit of weight"),
+        ("35@120 --drill 8mm", "expected one of the units kg, g"),
         ("35g --drill 8mm", "a weight at an angle in degrees"),
-        ("35gg@120 --drill 8mm", "expected a unit of weight"),
+        ("35gg@120 --drill 8mm", "expected one of the units kg, g"),
         ("-35g@120 --drill 8mm", "No such option"),
         ("35g@500 --drill 8mm", "no angle from -360 to 360"),
         ("1e999g@1 --drill 8mm", "expected a finite number"),
@@ -113,7 +113,7 @@ def test_drilling_takes_away_opposite(run, tmp_path):
         ("35g@120 --holes 0,90,360", "within one turn"),
         ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
         ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),
-        ("35g@120 --holes 4 --pieces 10", "expected a unit of weight"),
+        ("35g@120 --holes 4 --pieces 10", "expected one of the units kg, g"),
         ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),
         ("35g@120 --holes 4 --pieces 10g_mm", "converts only with --radius"),
         ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),

@@ -17,7 +17,7 @@ def read(text):
     problems = Problems()
     grid = parse_text("t.csv", text, problems)
     assert grid is not None
-    return grid, [list(cells) for _, cells in grid.rows], problems.of("t.csv")
+    return grid, [list(cells) for _, cells in grid.rows], [*problems]
 
 
 CELLS = st.text(alphabet="#ab1 '!?/NAé", max_size=6).map(str.strip)

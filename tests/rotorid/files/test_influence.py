@@ -121,10 +121,10 @@ def test_names_with_signs_and_readings_without_a_unit_survive(stored, tmp_path):
     ("row", "column", "value", "words"),
     [
         (1, HEADER[3], "influence", "influence_<vibration unit>_per_<weight unit>"),
-        (1, HEADER[3], "influence_um_per_gram", "a unit of weight: kg, g"),
+        (1, HEADER[3], "influence_um_per_gram", "one of the units kg, g"),
         (1, HEADER[3], "influence_um_pk_per_g", "um_pp (peak to peak)"),
         (2, HEADER[3], -1, "a coefficient of 0 or more"),
-        (2, "phase_deg", 400, "a phase from -360 to 360 degrees"),
+        (2, "phase_deg", 400, "an angle from -360 to 360 degrees"),
         (2, "speed_rpm", 0, "a speed above 0"),
     ],
 )

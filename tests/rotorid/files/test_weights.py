@@ -89,7 +89,7 @@ BAD = {
     "blank angle": ("mass_g,angle_deg", "2,", "row 2, column angle_deg: found nothing (a blank), expected a"),
     "too far": ("mass_g,angle_deg", "2,720", "row 2, column angle_deg: found '720', expected an angle from"),
     "two masses": ("mass_g,unbalance_g_mm,angle_deg", "2,2,3", "row 1, column unbalance_g_mm: found 'unbal"),
-    "unit": ("mass_gran,angle_deg", "2,3", "row 1, column mass_gran: found 'mass_gran', expected a unit of"),
+    "unit": ("mass_gran,angle_deg", "2,3", "row 1, column mass_gran: found 'mass_gran', expected one of the"),
     "g mm": ("unbalance_gmn,angle_deg", "2,3", "row 1, column unbalance_gmn: found 'unbalance_gmn', expect"),
     "no mass": ("angle_deg", "3", "row 1, column mass_g: expected a column mass_g"),
     "no angle": ("mass_g", "3", "row 1, column angle_deg: expected a column angle_deg"),
