@@ -300,19 +300,11 @@ def force_tables(forces: Iterable[NodeForce]) -> Written:
     return tables
 
 
-def support_tables(
-    supports: Sequence[Support], path: Path, *, ordered: bool = False
-) -> tuple[Written, dict[Path, bytes]]:
-    """Supports as tables of a file, in SI, and those over speed as files beside it.
-
-    Kinds are read one after another: where they are mixed (or `ordered`), all stand under `[[bearing]]`.
-    """
-    kinds = [support.kind for support in supports]
-    ordered = ordered or kinds != sorted(kinds)
+def support_tables(supports: Sequence[Support], path: Path) -> tuple[Written, dict[Path, bytes]]:
+    """Supports in order as tables `[[bearing]]`, in SI, and those over speed as files beside the file."""
     tables: Written = {}
     files: dict[Path, bytes] = {}
     for number, support in enumerate(supports, start=1):
-        section = "bearing" if ordered else support.kind
         values, columns = vars(support) | dict.fromkeys((*ENTRIES, "table")), _columns(support)
         if support.speeds:
             table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv")
@@ -323,7 +315,7 @@ def support_tables(
             values |= {name: column[0] for name, column in columns.items()}
         if stand := support.pedestal:
             values |= {f"pedestal_{name}": stand.xy(name) for name in ENTRIES} | {"pedestal_mass": stand.mass}
-        tables.setdefault(section, []).append(in_si(KEYS[section], values))
+        tables.setdefault("bearing", []).append(in_si(SupportKeys, values))
     return tables, files
 
 

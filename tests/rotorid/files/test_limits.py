@@ -27,7 +27,7 @@ def book(tmp_path):
 def words(path):
     problems = Problems()
     assert read_workbook(path, problems) is None
-    (problem,) = problems.of(str(path))
+    (problem,) = problems
     return problem.expected
 
 
