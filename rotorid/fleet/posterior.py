@@ -32,8 +32,8 @@ from balancing import (
 )
 from balancing.noise import Gaussian, Mounted, kind_sizes, run_noise
 from rotorid.base.text import counted
-from rotorid.fleet.jobs import kind_of, machine_of, read_fleet, runs_of, table_of
-from rotorid.fleet.machine_type import Grid, MachineType, records_at, type_of_fleet
+from rotorid.fleet.jobs import known_errors, machine_of, mounted_in, quantity_of, read_fleet, runs_of
+from rotorid.fleet.machine_type import Grid, MachineRecord, MachineType, type_of_fleet
 from rotorid.regression import unstretch
 
 if TYPE_CHECKING:
@@ -99,23 +99,23 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
     if not file or not name:
         raise ValueError(f"--type {address!r}: expected the table of a fleet and a type, FLEET.parquet:TYPE")
     fleet, trials, machine = read_fleet(Path(file)), job.trials, machine_of(job)
-    planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
-    radii = tuple(job.radii.get(plane, np.nan) for plane in planes)
-    grid = Grid(trials.speeds, trials.sensors, planes, radii, *kind_of(trials.labels))
-    # the job itself, by its runs, or at the same place as it was before it changed
-    place = f"/{job.files[0].resolve().as_posix()}"
-    here = fleet["job"].map(lambda path: place.endswith(f"/{path}")) & (fleet["machine"] == machine)
-    itself = fleet["job"][here | (fleet["runs"] == runs_of(job))]
-    kind = type_of_fleet(fleet, name, grid, itself.unique())
-    machines = len(kind.machines)
-    if not job.planes:  # nothing but a baseline: in the unit of the others' weights
-        unit, scale = kind.labels.weight_unit, kind.labels.weight_scale
-        trials = replace(trials, labels=replace(trials.labels, weight_unit=unit, weight_scale=scale))
     if refined:
         if job.check is None:
             raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
         trials = with_check_runs(trials, job.check)
-    influence, probability = update(kind.influence(trials.labels, machine), trials)
+    planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
+    mounted = tuple(mounted_in(job, plane) for plane in planes)
+    grid = Grid(trials.speeds, trials.sensors, quantity_of(trials.labels), planes, mounted)
+    # the job itself, by its runs, or at the same place as it was before it changed
+    place = f"/{job.files[0].resolve().as_posix()}"
+    here = fleet["job"].map(lambda path: place.endswith(f"/{path}")) & (fleet["machine"] == machine)
+    kind = type_of_fleet(fleet, name, grid, fleet["job"][here | (fleet["runs"] == runs_of(job))])
+    machines, labels = len(kind.machines), trials.labels
+    if not job.planes:  # nothing but a baseline: in the unit of the others' weights
+        unit, scale = kind.labels.weight_unit, kind.labels.weight_scale
+        labels = replace(labels, weight_unit=unit, weight_scale=scale)
+    trials = replace(trials, labels=labels)
+    influence, probability = update(kind.influence(labels, machine), trials)
     warnings, reason, earlier = list(influence.remarks.warnings), "", 0
     words = f"coefficients of the type {name!r}, {counted(machines, 'machine')}"
     if machines < ENOUGH and not trials.weights.any():
@@ -129,10 +129,9 @@ def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeK
             )
     if probability < LEVEL and np.isfinite(kind.limit):
         with suppress(ValueError):  # runs that do not give coefficients tell no reason
-            runs = table_of(replace(job, trials=trials, influence=None))
-            reason = next(map(kind.why_odd, records_at(runs, grid)), "")
-    remarks = Remarks(tuple(warnings), (words, *kind.notes))
-    influence = replace(influence, remarks=remarks)
+            measured = estimate_influence(local_runs(influence, trials))
+            reason = kind.why_odd(MachineRecord(machine, "", measured.W, known_errors(measured)))
+    influence = replace(influence, remarks=Remarks(tuple(warnings), (words, *kind.notes)))
     return TypeKnowledge(kind, influence, (*job.files, Path(file)), earlier, probability, reason)
 
 
