@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import Labels, ReadingErrors, Trials, UndeterminedError, estimate_influence
-from rotorid.fleet import MachineRecord, fit_type
+from rotorid.fleet.machine_type import MachineRecord, fit_type
 
 GRID = np.array([100.0]), ("x", "y"), ("L", "R")
 NOISE = 0.005

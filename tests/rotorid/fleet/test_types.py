@@ -11,7 +11,7 @@ from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import read_job
 from rotorid.fleet import FleetFitOptions, fleet_fit
 from rotorid.fleet.jobs import read_fleet
-from rotorid.fleet.posterior import type_coefficients
+from rotorid.fleet.machine_type import type_coefficients
 from rotorid.samples import sample_data
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
