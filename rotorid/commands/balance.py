@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
-    from rotorid.fleet.posterior import TypeKnowledge
+    from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotorid.base.choices import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files import Job
-    from rotorid.fleet.posterior import TypeKnowledge
+    from rotorid.fleet.machine_type import TypeKnowledge
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -203,7 +203,7 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     if options.machine_type is None:
         coefficients = choose(job, options.coefficients, refined=options.refine)
     else:
-        from rotorid.fleet.posterior import type_coefficients
+        from rotorid.fleet.machine_type import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         coefficients = of_type.influence, None

@@ -26,8 +26,7 @@ from balancing import (
     correct,
 )
 from balancing.regions import NORMAL_RADIUS
-from rotorid.fleet import MachineRecord, MachineType, fit_type, update
-from rotorid.fleet.posterior import LEVEL
+from rotorid.fleet.machine_type import LEVEL, MachineRecord, MachineType, fit_type, update
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
