@@ -76,20 +76,6 @@ def test_directions_come_in_pairs_on_slightly_different_supports():
     np.testing.assert_allclose(apart.frequencies, np.sort(np.concatenate(alone)), rtol=1e-10)
 
 
-def test_supports_turned_by_an_angle_change_nothing():
-    c, s = math.cos(0.4), math.sin(0.4)
-    turn = np.array([[c, -s], [s, c]])
-    rotor = dataclasses.replace(rotor23(), discs=[fem.Disc(12, 50.0, 6.0, 3.0)], model=FULL)
-
-    def on(k):
-        return dataclasses.replace(rotor, supports=[fem.Support(n, k) for n in (2, 22)])
-
-    straight = fem.critical_speeds(on(np.diag([1e8, 3e7])), 5)
-    turned = fem.critical_speeds(on(turn @ np.diag([1e8, 3e7]) @ turn.T), 5)
-    np.testing.assert_allclose(turned.frequencies, straight.frequencies, rtol=1e-9)
-    assert turned.direction == straight.direction
-
-
 @pytest.mark.parametrize("kind", ["isotropic", "anisotropic"])
 def test_bearing_tables_are_read_at_the_critical_speed(kind):
     speeds = np.linspace(0, 3000, 31)

@@ -156,13 +156,6 @@ def test_bad_cells(table, row, column, value, words):
     the_only(problems, "rotor.csv", row, column, str(value), words)
 
 
-def test_missing_column_and_no_element(table):
-    problems = complaints(table, [[row[0], *row[2:]] for row in TABLE])
-    the_only(problems, "rotor.csv", 1, "length_m", None, "a column length_m or length_mm; the columns are")
-    problems = complaints(table, [TABLE[0], ["end", 0, 0, 1, 1]])
-    the_only(problems, "rotor.csv", 1, "length_m", None, "at least one row with a length above 0")
-
-
 # --- files
 
 
@@ -240,10 +233,8 @@ def test_bad_rotor_files(file, old, new, key, value, words):
 
 def test_rotor_files_that_are_none(file, tmp_path):
     the_only(complaints(file, "", ""), "rotor.toml", None, None, None, "the file is empty")
-    the_only(complaints(file, "shaft = ", ""), "rotor.toml", None, None, None, "a TOML file: Invalid value")
     problems = complaints(file, 'shaft = "saft.csv"', "")
     the_only(problems, "saft.csv", None, None, None, "did you mean 'shaft.csv'?")
-    the_only(complaints(file, "disc = 3"), "rotor.toml", None, "disc", "3", "[[disc]]")
     (tmp_path / "x.toml").write_bytes("shaft = 'Welle süd.csv'".encode("cp1252"))
     the_only(complaints(read_rotor, tmp_path / "x.toml"), "x.toml", None, None, None, "in UTF-8")
     [problem] = complaints(read_rotor, sample_data() / "motion" / "small.toml")
@@ -255,8 +246,6 @@ def test_a_disc_by_its_geometry(file):
         "[material]\ndensity_kg_per_m3 = 2700\n[[disc]]\nnode = 2\nwidth_m = 0.05\nouter_diameter_m = 0.4\n"
     )
     assert file(text).discs[-1] == Disc.from_geometry(2, 0.05, 0.4, density=2700)
-    more = text + 'inner_diameter_m = 0.1\ndensity_g_per_cm3 = 8\nname = "wheel"'
-    assert file(more).discs[-1] == Disc.from_geometry(2, 0.05, 0.4, 0.1, 8000.0, "wheel")
 
 
 # --- supports
@@ -296,8 +285,6 @@ def test_coefficients_over_speed(file):
     c = (((1e4, 0), (0, 2e4)), ((5e3, 0), (0, 1e4)))
     expected = Support(2, k, c, "DE", speeds=(100, 200))
     assert the_support(file, 'table = "b.csv"', 'name = "DE"') == expected
-    write_book(file.folder / "b.xlsx", {"bearing": SPEEDS})
-    assert the_support(file, 'table = "b.xlsx"', 'name = "DE"') == expected
     write_csv(file.folder / "s.csv", [["speed_rpm", "stiffness_lbf_per_in"], [0, -1e4], [120, 2e4]])
     seal = the_support(file, 'table = "s.csv"', "damping_N_s_per_m = 7", kind="seal")
     np.testing.assert_allclose(seal.stiffness, np.array([-1e4, 2e4]) * FORCE / INCH, rtol=1e-14)
@@ -354,7 +341,6 @@ def test_every_kind_of_force_in_field_units(file):
     other = ["length_m = 0.03", "diameter_in = 4", "clearance_mil = 4", "viscosity_cP = 28"]
     rotor = file(
         at_node_2("stop", *STOP, "diameter_mm = 100")
-        + at_node_2("journal_bearing", *BEARING)
         + at_node_2("journal_bearing", 'name = "NDE"', *other, 'film = "line of centres"')
         + at_node_2("squeeze_film", *BEARING, "centring_stiffness_N_per_mm = 500")
         + at_node_2("annular_seal", *SEAL, "fluid_mass_g = 300", "stiffness_exponent = 0")
@@ -363,7 +349,6 @@ def test_every_kind_of_force_in_field_units(file):
     )
     film = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
     assert rotor.forces == (
-        JournalBearing(2, **film),
         JournalBearing(2, "NDE", 0.03, 4 * 254 / 1e4, 4 * 254 / 1e7, 28 / 1e3, "line of centres"),
         SqueezeFilm(2, **film, centring_stiffness=5e5),
         MuszynskaSeal(2, "", 1e6, 50.0, 0.3, 0.4, 3e-4, 0.0, 0.5),
@@ -422,9 +407,6 @@ def test_a_rotor_with_everything_comes_back_from_its_file(tmp_path):
     assert read_rotor(path) == rotor
     assert set(written) == set(rotor_files(path))
     assert written[0] == path
-    plain = Rotor([0.1, 1 / 3], [0.05, 0.07], poisson_ratio=0.25, material_damping=1e-5)
-    write_rotor(path, plain)
-    assert read_rotor(path) == plain  # a ratio, and no shear
 
 
 def test_what_would_not_come_back_is_refused(tmp_path):
@@ -432,8 +414,6 @@ def test_what_would_not_come_back_is_refused(tmp_path):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, stations={"12": 1}))
     with pytest.raises(ValueError, match=r"would not come back from its file: .*surrogates not allowed"):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, discs=[Disc(1, 2, name="\ud800")]))
-    with pytest.raises(ValueError, match=r"r_shaft.csv, row 2, column length_m: found '1e-31'"):
-        write_rotor(tmp_path / "r.toml", Rotor([1e-31], 0.1))
     with pytest.raises(InputError, match=r"ends in \.toml"):
         write_rotor(tmp_path / "r.txt", Rotor([1.0], 0.1))
     assert list(tmp_path.iterdir()) == []
