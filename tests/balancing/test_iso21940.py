@@ -111,10 +111,7 @@ def test_what_cannot_be_is_refused(arguments, words):
 
 def test_table_and_picture():
     found = rotor(planes={"left": 0.1, "right": 0.7}, bearings=(0.0, 1.0), centre=0.4)
-    frame = found.to_frame()
-    assert list(frame["place"]) == ["whole rotor", "bearing A", "bearing B", "plane left", "plane right"]
-    assert frame.limit_g_mm.to_numpy()[3:] == pytest.approx(found.limits * 1e6)
-    assert frame.position_mm.to_numpy()[1:] == pytest.approx([0, 1000, 100, 700])
+    assert found.to_frame().limit_g_mm.to_numpy()[3:] == pytest.approx(found.limits * 1e6)
     heights = [bar.get_height() for bar in plot(found).patches]  # as along the shaft
     limits = found.bearing_limits, found.limits
     assert heights == pytest.approx([1e6 * limits[k][i] for k, i in ((0, 0), (1, 0), (1, 1), (0, 1))])

@@ -6,12 +6,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from documents import check_hygiene
-from fem_rotors import rotor23
 
 import fem
 from fem import Peak, Peaks, Window, draw_rotor
 from fem.plots.campbell import campbell_figure, draw_speed_map
-from fem.plots.response import bode_figure, draw_orbits, draw_polar, influence_figure
+from fem.plots.response import bode_figure, draw_orbits, draw_polar
 from rotorid.base.text import RPM
 from rotorid.plots import plot
 
@@ -209,18 +208,3 @@ def test_a_speed_map_is_in_rpm_with_its_band():
     assert np.isnan(np.delete(drawn, range(2, 8))).all()
     (band,) = ax.patches
     assert (band.get_y(), band.get_height()) == pytest.approx((70 * RPM, 10 * RPM))
-
-
-def test_influence_has_a_row_for_each_sensor_with_size_and_phase():
-    rotor = rotor23(2e4)
-    W = fem.influence(rotor, [7, 12], [2, 22], np.linspace(50, 700, 40))
-    figure = influence_figure(W, rotor)
-    sizes, phases = figure.axes[1::2], figure.axes[2::2]
-    assert [ax.get_ylabel().split("\n")[0] for ax in sizes] == ["sensor 2", "sensor 22"]
-    for c, (size, phase) in enumerate(zip(sizes, phases, strict=True)):
-        for p in (0, 1):
-            steady = ~np.isnan(size.get_lines()[p].get_ydata())
-            np.testing.assert_allclose(size.get_lines()[p].get_ydata()[steady], np.abs(W.W[steady, c, p]))
-            lag = np.radians(phase.get_lines()[p].get_ydata()[steady])
-            np.testing.assert_allclose(np.exp(1j * lag), np.exp(1j * np.angle(W.W[steady, c, p])), atol=1e-12)
-            assert -2 * np.pi <= np.median(lag) <= 1e-6

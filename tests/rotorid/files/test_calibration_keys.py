@@ -93,7 +93,6 @@ def test_what_an_engineer_writes_is_read(read):
     [
         (PLAIN.replace("[DE]", "[DF]"), "calibration", r"the bearing 'DF' is not known: one of 1, DE"),
         (PLAIN.replace("[DE]", "[*]"), "calibration", r"single parameter: name one, without \[\*\]"),
-        (PLAIN.replace("[1.0, -0.5]", "[1.0]"), "calibration", "2 numbers, one for each"),
         (PLAIN.replace("std = 2e5", "std = -2e5"), "calibration.parameter[1].std", "0 or more"),
         ('[[calibration.data]]\nfile = "A"', "calibration.data[1].sha256", "its hash"),
         ("[calibration]\nlack_of_fit = -0.1", "calibration.lack_of_fit", "0 or more"),

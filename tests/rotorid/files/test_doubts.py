@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tables_data import RUNS, WEIGHTS, complaints, csv_text, the_only, write_book, write_csv
+from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
 
 from balancing import correct, estimate_influence
 from rotorid.files import (
     job_from_files,
     read_job,
-    read_rotor,
     read_trials,
     write_influence,
 )
@@ -19,19 +18,6 @@ from rotorid.files import (
 @pytest.fixture
 def files(tmp_path):
     return write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
-
-
-@pytest.mark.parametrize("title", [["My rotor"], ["Rotor 7, trial of June", "", "", "7"]])
-def test_a_title_above_the_header_is_named(tmp_path, files, title):
-    """Runs and weights are found under a title; any other table begins with its header."""
-    path = write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": [title, *WEIGHTS]})
-    assert tuple(read_job(path).planes) == read_trials(*files).planes
-    text = tmp_path / "titled.csv"
-    text.write_text("My rotor\n\n" + csv_text(WEIGHTS), encoding="utf-8")
-    assert read_trials(files[0], text).planes == read_trials(*files).planes
-    rotor = write_book(tmp_path / "rotor.xlsx", {"rotor": [title, ["length_m", "diameter_m"], [1, 0.1]]})
-    [problem] = complaints(read_rotor, rotor)
-    assert "a header row with the names of columns" in problem.expected
 
 
 def test_control_characters_in_the_name_of_a_file(tmp_path, files):

@@ -63,7 +63,6 @@ def test_a_table_comes_back_with_one_standard_deviation(tmp_path, suffix, phase,
     files = write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
     influence = estimate_influence(read_trials(*files, phase=phase, angles=angles, errors=ERRORS))
     again = round_trip(tmp_path / f"influence{suffix}", influence, angles=angles)
-    np.testing.assert_allclose(again.speeds, influence.speeds, rtol=1e-14)
     for stated in (again, read_influence(tmp_path / f"influence{suffix}", phase="lead", angles=angles)):
         np.testing.assert_allclose(stated.W, influence.W, rtol=1e-13)
     for name in ("sensors", "planes", "labels"):

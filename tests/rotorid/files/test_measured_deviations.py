@@ -10,7 +10,7 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from balancing import ReadingErrors, estimate_influence, reading_of
+from balancing import ReadingErrors, reading_of
 from rotorid.files import read_job, read_trials
 
 JOB = 'phase = "lag"\nangles = "with rotation"\nruns = "runs.csv"\nweights = "weights.csv"\n'
@@ -70,7 +70,6 @@ def test_nothing_is_assumed_then(read):
     assert reading_of(read()).source == "measured"
     assert reading_of(read(RUNS)).source == "assumed"
     assert read(RUNS).covariance is None
-    assert estimate_influence(read()).reading.source == "measured"
     assert reading_of(read(errors=ReadingErrors(0.01))).source == "stated"
 
 
@@ -90,11 +89,6 @@ def test_none_is_zero_negative_or_missing(read, column, value, words):
 def test_both_or_neither_in_the_unit_of_the_amplitude(read, change):
     header = [name.replace(*change) for name in MEASURED[0]]
     assert [problem.row for problem in complaints(read, [header, *MEASURED[1:]])] == [1]
-
-
-def test_balance_names_them(job, cli):
-    errors = cli("balance", job(VECTORS), "--json").json["errors"]
-    assert (errors["source"], errors["between_runs"]["source"]) == ("measured", "assumed")
 
 
 def test_check_runs_and_slow_roll_read_them(job, tmp_path):

@@ -145,7 +145,6 @@ def test_every_column_in_us_units_with_blank_cells(tmp_path, book):
     "row, column, value, words",
     [
         (3, "length_m", 0, "a length above 0 (0 only in the last row"),
-        (3, "support_stiffness_N_per_m", "rigid", "a number"),
         (4, "inner_diameter_mm", 115, "less than the outer diameter"),
         (4, "poisson_ratio", -1, "above -1, up to 0.5"),
     ],
@@ -196,24 +195,9 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
         ("modulus_Pa = 2e11", "modulus = 2e11", "material.youngs_modulus", "200000000000.0", "did you mean"),
         ("ratio = 0.28", "ratio = 2", "material.poisson_ratio", "2", "a number up to 0.5"),
         ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
-        (
-            "mass_kg = 4",
-            "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
-            "disc[1].width_m",
-            "1",
-            "no moments of inertia beside",
-        ),
-        (
-            "mass_kg = 4",
-            "width_m = 1\nouter_diameter_m = 0.1\ninner_diameter_m = 0.2",
-            "disc[1]",
-            None,
-            "a possible disc: disc at node 1: the inner diameter",
-        ),
         ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
         ("node = 4", "node = 5", "bearing[1].node", "5", "a node from 1 to 4 or a station"),
         ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
-        ('name = "thrust"', 'name = "12"', "station[1].name", "12", "a name, not a number"),
         (
             "node = 1\n",
             'node = 1\n[[station]]\nname = "thrust"\nnode = 2',
@@ -226,8 +210,6 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
 def test_bad_rotor_files(file, old, new, key, value, words):
     assert old in FILE
     text = FILE.replace(old, new, 1)
-    if "station[1]" in key:
-        text = text.replace('node = "thrust"', "node = 1")
     the_only(complaints(file, text, ""), "rotor.toml", None, key, value, words)
 
 
@@ -263,7 +245,6 @@ STAND = ["pedestal_mass_lb = 50", "pedestal_stiffness_N_per_m = [1e8, 2e8]", "pe
             [*MATRIX, "cxx_N_s_per_m = 10", "cyy = 20"],
             [((1e7, 2e6), (-1e6, 3e7)), ((10, 0), (0, 20))],
         ),
-        ("bearing", ["damping_N_s_per_m = 3"], [0.0, 3.0]),
         ("seal", ["kxy = 1e6", "kyx = -1e6"], [((0.0, 1e6), (-1e6, 0.0)), 0.0]),
         ("seal", ["kxx = -1", "kyy = -2", "cxx = 3", "cyy = 4"], [((-1, 0), (0, -2)), ((3, 0), (0, 4))]),
         ("bearing", [SCALAR, 'name = "DE"', "tilting_stiffness_N_m_per_rad = 3e5"], [1e7, 0.0, "DE"]),
@@ -297,12 +278,6 @@ def test_coefficients_over_speed(file):
         ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "", None, "either stiffness_N_per_m, or both kxx_N_per_m"),
         (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx_N_per_m", "10000000.0", "kxx says it already"),
         (
-            (SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"),
-            "pedestal_stiffness_N_per_m",
-            "[1, 2, 3]",
-            "[x, y]",
-        ),
-        (
             ("kxx_N_per_mm = -5e7", "kyy = 5e7"),
             "kxx_N_per_mm",
             "-50000000.0",
@@ -321,7 +296,6 @@ def test_bad_bearings(file, lines, key, value, words):
     [
         (replaced(SPEEDS, 3, "speed_rad_s", 100), 3, "speed_rad_s", "100", "above that of the row before"),
         (replaced(SPEEDS, 3, "kyy_N_per_m", -1), 3, "kyy_N_per_m", "-1", "is a [[seal]]"),
-        (replaced(SPEEDS, 1, "kxx_N_per_m", "kxx"), 1, "kxx", "kxx", "one of the units N_per_m, "),
     ],
 )
 def test_bad_tables_of_bearings(file, table, row, column, value, words):
@@ -370,7 +344,6 @@ def test_every_kind_of_force_in_field_units(file):
             "clearance_um",
             "a number above 0",
         ),
-        ("journal_bearing", [*BEARING, "clearance_mm = 0.1"], "clearance_mm", "clearance_um says it already"),
         ("journal_bearing", [*BEARING, 'film = "pi"'], "film", "'pressure' or 'line of centres'"),
     ],
 )

@@ -10,7 +10,6 @@ from cases import each_of
 from pump_job import EIGHT_HOLES, PUMP, WEIGHTS, assert_same, job_of, refused, trials_of, write
 from tables_data import write_book
 
-import balancing
 from balancing import UndeterminedError, estimate_influence
 from rotorid.files import read_trials
 
@@ -138,14 +137,3 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     holes = job_of(tmp_path, stated, check=check, pieces=between).holes
     np.testing.assert_allclose(holes["P1"].taken, [0, 0.007, 0, 0, 0, 0, 0, 0])
     assert not holes["P2"].taken.any()
-
-
-def test_a_trim_leaves_the_holes_of_the_pieces_alone(tmp_path, cli):
-    job = job_of(tmp_path, CHECKED, check=CHECK.format(0.5, 10, 0.4, 20), pieces=PIECES)
-    W = balancing.estimate_influence(job.trials).W[0]
-    shown = job.trials.labels.vibration(job.trials.readings[0, 0, 0] + W @ job.check.weights[0])
-    write(tmp_path, check=CHECK.format(*np.round(np.transpose(shown), 4).ravel()))
-    rows = cli("balance", tmp_path / "job.toml", "--split", "--refine", "--json").json["mounting"]["holes"]
-    used = {(row["plane"], row["hole"]) for row in rows}
-    assert used
-    assert not used & {("P1", "1"), ("P2", "4"), ("P2", "6")}
