@@ -5,28 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
-from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
+from tables_data import complaints, the_only
 
-from rotorid.files import read_job
-
-TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'
-
-
-@pytest.fixture
-def folder(tmp_path):
-    write_csv(tmp_path / "runs.csv", RUNS)
-    write_csv(tmp_path / "weights.csv", [WEIGHTS[0], *([*line[:3], 50] for line in WEIGHTS[1:])])
-    return tmp_path
-
-
-@pytest.fixture
-def job(folder):
-    def read(text, **options):
-        (folder / "job.toml").write_text(text + TABLES, encoding="utf-8")
-        return read_job(folder / "job.toml", **options)
-
-    return read
 
 
 def test_errors_of_weights_and_drift(job):

@@ -11,9 +11,8 @@ from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors, reading_of
-from rotorid.files import read_job, read_trials
+from rotorid.files import read_trials
 
-JOB = 'phase = "lag"\nangles = "with rotation"\nruns = "runs.csv"\nweights = "weights.csv"\n'
 MEASURED = [
     [*RUNS[0], "amplitude_std_um_pp", "phase_std_deg"],
     *([*row, 0.05 + 0.01 * k, 0.4 + 0.1 * k] for k, row in enumerate(RUNS[1:])),
@@ -40,17 +39,6 @@ def read(tmp_path):
     def run(runs=MEASURED, weights=WEIGHTS, **options):
         files = write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", weights)
         return read_trials(*files, **options)
-
-    return run
-
-
-@pytest.fixture
-def job(tmp_path):
-    def run(runs=MEASURED, text=""):
-        write_csv(tmp_path / "runs.csv", runs)
-        write_csv(tmp_path / "weights.csv", WEIGHTS)
-        (tmp_path / "job.toml").write_text(JOB + text, encoding="utf-8")
-        return tmp_path / "job.toml"
 
     return run
 
@@ -91,16 +79,15 @@ def test_both_or_neither_in_the_unit_of_the_amplitude(read, change):
     assert [problem.row for problem in complaints(read, [header, *MEASURED[1:]])] == [1]
 
 
-def test_check_runs_and_slow_roll_read_them(job, tmp_path):
-    at = {name: k for k, name in enumerate(VECTORS[0])}
-    check = [VECTORS[0], *(["check", *row[1:]] for row in VECTORS[1:3])]
-    slow = [VECTORS[0], *(["slow", 100, *row[2:]] for row in VECTORS[1:3])]
-    for row in slow[1:]:
-        row[at["amplitude_um_pp"]] = 0.5
-    write_csv(tmp_path / "check.csv", check)
-    write_csv(tmp_path / "slow.csv", slow)
-    found = read_job(job(VECTORS, 'check = "check.csv"\nslow_roll = "slow.csv"\n'))
-    plain = read_job(job(VECTORS, 'check = "check.csv"\n'))
-    np.testing.assert_array_equal(found.trials.covariance, plain.trials.covariance)
-    np.testing.assert_array_equal(found.check.covariance, plain.check.covariance)
-    np.testing.assert_allclose(np.abs(found.slow_roll), 0.25e-6)
+def test_check_runs_and_slow_roll_read_them(job, folder):
+    def table(name, speed, amplitude=None):
+        rows = ([name, speed, row[2], amplitude or row[3], *row[4:]] for row in VECTORS[1:3])
+        write_csv(folder / f"{name}.csv", [VECTORS[0], *rows])
+
+    write_csv(folder / "runs.csv", VECTORS)
+    table("check", 1000)
+    table("slow", 100, 0.5)
+    plain, slow = (job(f'check = "check.csv"\n{more}') for more in ("", 'slow_roll = "slow.csv"\n'))
+    np.testing.assert_array_equal(slow.trials.covariance, plain.trials.covariance)
+    np.testing.assert_array_equal(slow.check.covariance, plain.check.covariance)
+    np.testing.assert_allclose(np.abs(slow.slow_roll), 0.25e-6)

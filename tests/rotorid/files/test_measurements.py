@@ -1,12 +1,11 @@
-"""Measurement tables and model files for identification: what they mean, and every complaint."""
+"""Measurement tables for identification: what they mean, and every complaint."""
 
 import math
 
 import numpy as np
 import pytest
-from cases import each_of
 
-from rotorid import InputError, read_harmonic_model, read_measurements
+from rotorid import InputError, read_measurements
 from rotorid.identify.equations import harmonic_model
 
 MODEL = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
@@ -21,16 +20,6 @@ def table(tmp_path):
         path = tmp_path / name
         path.write_text(text, encoding="utf-8")
         return read_measurements(path, model)
-
-    return write
-
-
-@pytest.fixture
-def model_file(tmp_path):
-    def write(text):
-        path = tmp_path / "harmonic.toml"
-        path.write_text(text, encoding="utf-8")
-        return read_harmonic_model(path)
 
     return write
 
@@ -97,59 +86,3 @@ def test_repeated_readings_stay_apart(table):
     rows = table("experiment,repeat,frequency_rad_s,F_re,X_re,X_im\na,1,1,1,2,3\na,2,1,1,2.1,3\n")
     assert rows.names == ("a, 1", "a, 2")
     np.testing.assert_array_equal(rows.signals["X"], [2 + 3j, 2.1 + 3j])
-
-
-SMALL = 'equations = ["(m*p**2 + b*p + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c", "b"]\n'
-
-
-def test_a_model_file(model_file):
-    file = model_file(
-        SMALL
-        + 'inputs = ["F"]\n[bounds]\nc = [0, 2e6]\nb = [0, inf]\n[start]\nc = 900\n'
-        + "[errors]\namplitude_percent = 2\nphase_deg = 1\nfloor = 1e-6\n"
-    )
-    assert file.model.parameters == ("c", "b")
-    assert file.model.known == {"m": 10.0}
-    assert file.model.inputs == ("F",)
-    assert file.bounds == {"c": (0.0, 2e6), "b": (0.0, math.inf)}
-    assert file.start == {"c": 900.0}
-    assert (file.errors.relative, file.errors.floor) == (0.02, 1e-6)
-    assert file.errors.phase == pytest.approx(math.radians(1))
-
-
-@each_of(
-    "old, new, words",
-    [
-        ("equations", "equation", "key equation: .*did you mean 'equations'"),
-        ('["(m', '["n = 1", "(n', "equation 2.* n"),
-        ("X = F", "X*X = F", "equation 1.*linear"),
-        ('["c", "b"]', '["c", "k"]', "k .*stands in no equation"),
-        ('["c", "b"]', '["c", "b", "m"]', "known value m: m is already a parameter"),
-        ('b"]\n', 'b"]\n[bounds]\nd = [0, 1]\n', "key bounds.*names of estimate; d is none"),
-        ('b"]\n', 'b"]\n[bounds]\nc = [1, 1]\n', r"key bounds.*\[lowest, highest\] of c"),
-        ('b"]\n', 'b"]\n[bounds]\nc = [false, 1]\n', "key bounds.c: found 'false'"),
-    ],
-)
-def test_complaints_about_a_model_file_name_the_key(model_file, old, new, words):
-    with pytest.raises(InputError, match=rf"(?s)harmonic\.toml.*{words}"):
-        model_file(SMALL.replace(old, new, 1))
-
-
-EVIL = "__import__('pathlib').Path('{}').touch()"
-
-
-@each_of(
-    "text",
-    [
-        'equations = ["EVIL = F"]\nestimate = ["c"]\n',
-        'equations = ["c*X = F"]\nestimate = ["c"]\ninputs = ["EVIL"]\n',
-        'equations = ["c*X = F"]\nestimate = ["c"]\n[known]\n"EVIL" = 1\n',
-        'equations = ["c*X = F"]\nestimate = ["c"]\n[bounds]\nc = ["EVIL", 1]\n',
-        'estimate = ["c"]\nM = [[1]]\nK = [["c"]]\noutputs = { "EVIL" = "y1", z = "EVIL" }\n',
-    ],
-)
-def test_no_text_of_a_model_file_runs_code(model_file, tmp_path, text):
-    mark = tmp_path / "mark"
-    with pytest.raises(InputError, match=r"harmonic\.toml"):
-        model_file(text.replace("EVIL", EVIL.format(mark)))
-    assert not mark.exists()
