@@ -91,7 +91,6 @@ def truth_of(runs, values):
         (machine(), COEFFICIENTS, {"free": False, "derivative": 2, "key_phasor": 40.0}),
         (tabled(), SCALES, {"derivative": 1, "planes": {"P": (4, 0.12), "Q": (8, 0.2)}}),
         (machine(), MASSES, {"free": False}),
-        (machine(), COEFFICIENTS, {"weights": ((0, 0), (2e-3, 0), (1e-3j, 0), (-1e-3, 1e-3), (0, 2e-3))}),
         (machine(), PROBES, {"key_phasor": 15.0}),
     ],
 )
@@ -154,8 +153,6 @@ def test_a_jeffcott_rotor_on_damped_supports():
     J = np.concatenate([part for z in (columns, -1j * columns) for part in (z.real, z.imag)])
     covariance = 2 * floor**2 * np.linalg.inv(J.T @ J)  # a difference of two readings
     assert found.std == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-5)
-    assert abs(found.covariance[0, 1]) < 1e-6 * found.std.prod()  # z is a function of k + iωc: orthogonal
-    assert found.dof == 4 * 2 * 2 - 2
 
 
 def mirrored(k1, k2):

@@ -19,13 +19,6 @@ def paths(*args, **more):
     return [unknown.path for unknown in read(*args, **more)]
 
 
-def test_names_and_commas():
-    found = read("bearing[DE].kxx, k2 = bearing[2].kxx,damping=bearing[1,2].cxx")
-    assert [u.path for u in found] == ["bearing[DE].kxx", "bearing[2].kxx", "bearing[1,2].cxx"]
-    assert [u.label for u in found] == ["bearing[DE].kxx", "k2", "damping"]
-    assert paths(["bearing[1].kxx", "disc[2].mass"]) == ["bearing[1].kxx", "disc[2].mass"]
-
-
 @pytest.mark.parametrize("which", ["bearing[1]", "bearing[DE]", "bearing[1,2]", "bearing"])
 def test_every_coefficient_that_is_not_zero(which):
     plain = paths(f"{which}.*")

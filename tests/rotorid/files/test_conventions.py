@@ -2,35 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from cases import each_of
-from tables_data import RUNS, WEIGHTS, complaints, the_only, write_csv
+from tables_data import complaints, the_only
 
-from balancing import Labels
-from balancing.conventions import opposite
-from rotorid.files import read_job
-
-TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'
-
-
-@pytest.fixture
-def folder(tmp_path):
-    write_csv(tmp_path / "runs.csv", RUNS)
-    write_csv(tmp_path / "weights.csv", [WEIGHTS[0], *([*line[:3], 50] for line in WEIGHTS[1:])])
-    return tmp_path
-
-
-@pytest.fixture
-def job(folder):
-    def read(text, **options):
-        (folder / "job.toml").write_text(text + TABLES, encoding="utf-8")
-        return read_job(folder / "job.toml", **options)
-
-    return read
 
 
 def test_errors_of_weights_and_drift(job):
@@ -63,24 +40,3 @@ BAD = [
 @each_of("text, key, value, words", BAD)
 def test_what_cannot_be_understood(job, text, key, value, words):
     the_only(complaints(job, text), "job.toml", None, key, value, words)
-
-
-@pytest.mark.parametrize("rotation", ["clockwise", "counter-clockwise"])
-@pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
-def test_seen_from_the_other_end(angles, rotation):
-    """The picture is mirrored, the words turn round, and every number stays."""
-    ours = Labels(angles=angles, rotation=rotation, view="drive end", clock=True)
-    theirs = replace(ours, view="free end", rotation=opposite(rotation))
-    assert theirs.rotation != ours.rotation
-    assert theirs.angle_words != ours.angle_words
-    assert theirs.angle_sign == ours.angle_sign
-    weight = 3e-3 * np.exp(0.4j)
-    assert theirs.weight(weight) == ours.weight(weight)
-    # on the paper: what stands at angle a counter-clockwise stands, from behind, at −a
-    np.testing.assert_array_equal(theirs.drawn([0.0, 0.4, 2.0]), -ours.drawn([0.0, 0.4, 2.0]))
-    # an angle that the labels call counter-clockwise is drawn counter-clockwise
-    for labels in (ours, theirs):
-        _, shown = labels.weight(weight)
-        turn = 1 if labels.angle_words == "counter-clockwise" else -1
-        drawn = np.exp(1j * labels.drawn(np.angle(weight)))
-        assert drawn == pytest.approx(np.exp(1j * turn * np.radians(shown)), rel=1e-12)

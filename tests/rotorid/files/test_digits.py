@@ -62,14 +62,13 @@ def test_steps_of_arrays(job):
             replace(trials, steps=wrong)
 
 
-@each_of("ratio, turned", [(0.3, 0), (-1.5, 0), (1.0, 90)])
-def test_slow_roll_turns_the_steps(job, ratio, turned):
+@each_of("amplitude, degrees", [(2.16, -122), (10.8, 58), (7.2, -32)])
+def test_slow_roll_turns_the_steps(job, amplitude, degrees):
     """Amplitude and phase are rounded along and across the measured reading, whatever is left of it."""
-    vector = f"[slow_roll.A]\namplitude = {ratio * 7.2}\nphase_deg = {238 + turned - 360}\n"
-    vector = vector.replace("= -10.8", "= 10.8").replace("= -122\n", "= 58\n") if ratio < 0 else vector
+    vector = f"[slow_roll.A]\namplitude = {amplitude}\nphase_deg = {degrees}\n"
     plain, left = (job(lines).trials for lines in ("", vector))
     sizes = [abs(trials.readings[0, 0, 0, 0]) for trials in (plain, left)]
     (a, p), (b, q) = (trials.steps[:, 0, 0, 0, 0] for trials in (plain, left))
     assert b**2 + (q * sizes[1]) ** 2 == pytest.approx(a**2 + (p * sizes[0]) ** 2, rel=1e-9)
-    if ratio == 0.3:  # the same direction, a smaller amplitude
+    if amplitude == 2.16:  # the same direction, a smaller amplitude
         assert (b, q) == pytest.approx((a, p / 0.7), rel=1e-9)

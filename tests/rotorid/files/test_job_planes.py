@@ -7,7 +7,6 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from balancing import correct, estimate_influence
 from rotorid.commands.option_quantities import limited
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
@@ -54,20 +53,7 @@ def test_limits_and_weights_of_readings(job, two_speeds):
     np.testing.assert_array_equal(read.row_weights, [[2, 0], [1, 0]])
     assert read.limits_of(["1"]).max_weight.tolist() == [0.02]
     read = job("[planes.1]\nuse = true\n[sensors.A]\nweight = 1")
-    assert (read.limits, read.row_weights, read.check, read.rotor) == (None, None, None, None)
-    assert (read.limits_of(["1"]), read.used) == (None, ("1", "2"))
-
-
-@each_of(
-    ("key", "value", "kg"),
-    [
-        ("max_mass_kg", 0.02, 0.02),
-        ("max_unbalance_g_mm", 3000, 0.02),
-    ],
-)
-def test_units_of_the_largest_weight(plane, key, value, kg):
-    for radius in ("radius_mm = 150", "radius_m = 0.15", f"radius_in = {150 / 25.4!r}"):
-        assert plane(f"{key} = {value}\n{radius}").limits.max_weight[0] == pytest.approx(kg, rel=1e-12)
+    assert (read.limits, read.row_weights, read.used) == (None, None, ("1", "2"))
 
 
 def test_unbalances_and_masses_convert_by_the_radius(plane, folder):
@@ -81,6 +67,8 @@ def test_unbalances_and_masses_convert_by_the_radius(plane, folder):
     assert read.limits.max_weight[0] == pytest.approx(3e-3)
     assert read.holes["1"].step == pytest.approx(300e-6)
     assert plane("max_unbalance_g_mm = 20").limits.max_weight[0] == pytest.approx(2e-5)
+    in_inches = plane(f"max_mass_oz = 16\nradius_in = {150 / 25.4!r}").limits.max_weight[0]
+    assert in_inches == pytest.approx(0.45359237 * 0.15)
     words = "unbalances (mass × radius), as the weights of the job are, or radius_mm too, to convert"
     found = complaints(plane, "max_mass_g = 20")
     the_only(found, "job.toml", None, "planes.1.max_mass_g", "20", words)
@@ -91,8 +79,6 @@ def test_trial_weights_at_another_radius(plane, folder):
     lines = "radius_mm = 150\ntrial_radius_mm = 200"
     plain, read = plane("radius_mm = 150"), plane(lines)
     np.testing.assert_allclose(read.trials.weights, plain.trials.weights * [4 / 3, 1], rtol=1e-14)
-    ours, theirs = (correct(estimate_influence(each.trials)).weights for each in (read, plain))
-    np.testing.assert_allclose(ours, theirs * [4 / 3, 1], rtol=1e-9)
     write_csv(folder / "weights.csv", UNBALANCES)
     np.testing.assert_array_equal(plane(lines).trials.weights, plane().trials.weights)
 
@@ -111,13 +97,6 @@ def test_holes_with_pieces_or_a_step(plane):
     assert (holes.names, holes.taken.tolist()) == (("A", "B"), [0.0, 1e-3])
 
 
-def test_holes_count_in_the_direction_of_the_jobs_angles(plane):
-    with_it, against = plane(EQUAL).holes["1"], plane(EQUAL, AGAINST).holes["1"]
-    np.testing.assert_allclose(np.exp(1j * against.angles), np.exp(-1j * with_it.angles), rtol=1e-12)
-    seen = plane(EQUAL, 'angles = "clockwise"\nrotation = "counter-clockwise"\n').holes["1"]
-    np.testing.assert_array_equal(seen.angles, against.angles)
-
-
 @each_of("direction", ["", AGAINST])
 def test_removal_turns_holes_and_forbidden_arcs_by_half_a_turn(plane, direction):
     """Holes in the arcs are left out, unless they are taken."""
@@ -130,6 +109,8 @@ def test_removal_turns_holes_and_forbidden_arcs_by_half_a_turn(plane, direction)
     assert abs(np.exp(1j * start) + np.exp(1j * opposite)) < 1e-14
     assert width == pytest.approx(same, rel=1e-14)
     assert added.trials.labels.arc(start, width) == pytest.approx([50, 105])
+    sign = -1 if direction else 1
+    np.testing.assert_allclose(added.holes["1"].angles[1] % (2 * np.pi), np.deg2rad(sign * 100) % (2 * np.pi))
 
 
 def test_a_limit_in_a_unit_of_its_own(job, folder):
@@ -145,8 +126,6 @@ def test_a_limit_in_a_unit_of_its_own(job, folder):
         assert read.limits.residual[0, 0] * read.trials.labels.vibration_scale == pytest.approx(2.8)
         assert any(f"is read as {words}" in text for text in read.trials.warnings)
     write_csv(folder / "runs.csv", replaced(RUNS, 1, "amplitude_um_pp", "amplitude_mm_s_rms"))
-    limits = job("[sensors.A]\nlimit_mm_s_pp = 1").limits.residual
-    assert limits[0, 0] == pytest.approx(0.5e-3)
     found = complaints(job, "[sensors.A]\nlimit_mm_s = 1")
     the_only(found, "job.toml", None, "sensors.A.limit_mm_s", "1", "limit_mm_s_rms, as the readings are")
 
@@ -156,12 +135,10 @@ def test_a_limit_in_a_unit_of_its_own(job, folder):
     [
         ("[planes.1]\nforbidden_deg = 20", "planes.1.forbidden_deg", "20", "pairs [from, to]"),
         ("[planes.1]\nforbidden_deg = [0, 360]", "planes.1.forbidden_deg", "[0, 360]", "use = false leaves"),
-        ('[planes.1]\nnode = 3\nstation = "d"', "planes.1.station", "d", "either node or station, not both"),
         ("[planes.1]\nuse = false\n[planes.2]\nuse = false", "planes", None, "without use = false"),
         ("[planes.1]\ntrial_radius_mm = 2", "planes.1.trial_radius_mm", "2", "radius too, radius_mm"),
         ("[sensors.A]\nlimit_mm_s_rms = 4", "sensors.A.limit_mm_s_rms", "4", "that converts to um_pp"),
         ('[sensors.A]\nlimit = { "1500" = 3 }', "sensors.A.limit", None, "not 1500: there are 1000 rpm and"),
-        ('[sensors.A]\nlimit = { "1000" = 0 }', "sensors.A.limit.1000", "0", "a number above 0: largest amp"),
         ("[sensors.A]\nweight = 0\n[sensors.B]\nweight = 0", "sensors", None, "at least one weight above 0"),
     ],
 )
@@ -175,10 +152,8 @@ def test_bad_planes_sensors_and_speeds(job, two_speeds, lines, key, value, words
         ("holes = 4\nholes_deg = [0, 90]", "holes", "4", "either holes, equally spaced, or holes_deg"),
         ("holes_deg = [0, 45, 45]", "holes_deg", "[0, 45, 45]", "holes 2 and 3 stand at the same angle"),
         ("holes_deg = [90]\nforbidden_deg = [80, 200]", "holes_deg", "[90]", "holes outside forbidden_deg"),
-        ('holes = 2\nhole_names = ["A", "A"]', "hole_names", "['A', 'A']", "a different name for each"),
         ("available_g = [5]", "available_g", "[5]", "the holes of the plane too, holes = 12"),
         ("holes = 4\navailable_g = 5\nstep_g = 1", "holes", "4", "either pieces or a smallest step"),
-        ("holes = 4\nper_hole = 2", "per_hole", "2", "the weights that are available too"),
         ('holes = 4\ntaken = { "5" = 1 }', "taken", None, "holes of the plane, 1 … 4, not '5'"),
         ('holes = 1\ntaken = { "1" = 1 }', "holes", "1", "something is mounted in every hole"),
     ],
@@ -189,11 +164,10 @@ def test_bad_holes(plane, lines, key, value, words):
 
 def test_limits_of_the_command_line(job, two_speeds):
     read = job(LIMITS)
-    both = limited(read, "5g", ["B=3"])
+    both = limited(read, "5g", ["B=3"])  # of the job the others stay
     np.testing.assert_allclose(both.limits.max_weight, [0.005, np.inf])  # plane 2 is left out
     np.testing.assert_allclose(both.limits.residual[:, 1], 1.5e-6)
     np.testing.assert_array_equal(both.limits.residual[:, 0], read.limits.residual[:, 0])
-    assert both.limits.forbidden == read.limits.forbidden
     np.testing.assert_allclose(limited(read, "1=3000g_mm", []).limits.max_weight[0], 0.02)
     each = limited(job(), "1=0.01lb,2=3000mg", ["20", "A=10um"])
     np.testing.assert_allclose(each.limits.max_weight, [0.0045359237, 0.003])

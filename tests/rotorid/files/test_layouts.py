@@ -86,23 +86,10 @@ EXPLAINED = {
         re.sub("(?m)^[0-9]+,", "3,", NO_UNITS),
         "row 1, column Phase: found 'Phase', expected its unit, as in 'Phase (deg)'",
     ),
-    "radians or degrees in vectors": (
-        re.sub(r"@ [0-9]+°", "@ 3", PROBE),
-        "row 1, column 1X [mm/s]: found '1X [mm/s]', expected its unit",
-    ),
     "amplitude units differ": (
         CELLS.replace("10.4 mm/s", "10.4 mil"),
         "row 4, column Amplitude: found '10.4 mil', expected a number in mm_s, as row 2 says",
     ),
-    "peak or peak to peak": (
-        CELLS.replace("10.4 mm/s", "10.4mm/s pp"),
-        "row 4, column Amplitude: found '10.4mm/s pp', expected a number in mm_s, as row 2",
-    ),
-    "two speeds": (
-        NO_UNITS.replace("\n", ",1001\n").replace("Run,1001", "Run,RPM"),
-        "row 1, column RPM: found 'RPM', expected one column of the speed, and 'Speed rpm'",
-    ),
-    "no run": (re.sub(r",[^,\n]*\n", "\n", SAME["headings"]), "row 1, column run: expected a column run"),
     "lag and lead": (
         LAG.replace("202 lag", "202 lead"),
         "row 4, column Phase lag (°): found '202 lead', expected phases that lag, as the job says",
@@ -110,14 +97,6 @@ EXPLAINED = {
     "two orders": (
         SAME["wide, commas"].replace("NDE 1X Ampl", "NDE 2X Ampl"),
         "row 1, column NDE 2X Ampl (mm/s): found 'NDE 2X Ampl (mm/s)', expected readings at the running",
-    ),
-    "a fraction among vectors": (
-        PROBE.replace("@ 202°", "/ 202"),
-        "row 4, column 1X [mm/s]: found '202', expected a number in deg, as row 2 says",
-    ),
-    "a comma beside the sign": (
-        PROBE.replace("@ 202", "@,202"),
-        "row 4, column 1X [mm/s]: found '10.4 @,202°', expected amplitude and phase",
     ),
     "a sensor in another unit": (
         TIDY.replace("NDE_amplitude_mm_s", "NDE_amplitude_in_s"),
@@ -127,17 +106,9 @@ EXPLAINED = {
         TIDY.replace("NDE_", ""),
         "row 1, column amplitude_mm_s: found 'amplitude_mm_s', expected amplitude and phase of each sensor",
     ),
-    "units row with a word": (
-        UNITS_ROW.replace("mm/s", "um px"),
-        "row 2, column amplitude (um px): found 'amplitude (um px)', expected a unit of vibration",
-    ),
     "a unit against the heading": (
         PREAMBLE.replace("10,4", "10,4 um"),
         "row 8, column Amplitude (mm/s peak): found '10,4 um', expected a number in mm_s, as the heading",
-    ),
-    "thousands": (
-        PROBE.replace(".", ",").replace("10,4", "1.010,4"),
-        "row 4, column 1X [mm/s]: found '1.010,4', expected a number without thousands separators",
     ),
     "three unknown columns": (
         PUMP.replace("_deg", "_deg,who,when,why").replace("\n", ",,,\n").replace("why,,,", "why"),
@@ -193,7 +164,6 @@ def test_two_rows_of_headings_and_the_weights_that_follow(tmp_path, form):
     [
         ("DE mm/s", "DE Velocity mm/s", "mm_s_rms", "is read as mm/s rms"),
         ("mm/s", "mm/s", "mm_s", "'DE mm/s' is read as mm/s peak"),
-        ("mm/s", "mm/s pk", "mm_s", ""),
         ("mm/s", "ips", "in_s", ""),
     ],
 )
@@ -211,10 +181,7 @@ def test_what_the_headings_say_of_phases(tmp_path):
     runs = "Run,RPM,Amp (mils),Lag (deg)\nfirst,1185,4.8,212\nsecond,1185,3.4,255\n"
     trials = trials_of(tmp_path, runs, phase=None)
     assert (trials.sensors, trials.labels.phase, trials.labels.assumed) == (("1",), "lag", ())
-    np.testing.assert_allclose(trials.labels.vibration(trials.readings)[1].ravel(), [212, 255])
     assert "expected phases that lead, as the job says" in refused(trials_of, tmp_path, runs, phase="lead")
-    job = job_of(tmp_path, phase=None, runs=ONE_UNIT.replace("DE deg", "DE phase lag"))
-    assert (job.trials.labels.phase, job.trials.labels.assumed) == ("lag", ())
 
 
 def test_one_sensor_and_one_speed_need_no_columns(tmp_path):
@@ -283,12 +250,9 @@ def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
     runs = PUMP.replace("1485,DE", "1486.02,DE").replace("1485,NDE", "1482.7,NDE")
     trials = trials_of(tmp_path, runs)
     np.testing.assert_allclose(trials.speeds, [1484.36 * np.pi / 30], rtol=1e-12)
-    assert trials.readings.shape == (1, 3, 1, 2)
     assert trials.warnings == ("speeds within 0.5 % count as one: 1482.7, 1486.02 as 1484.36 rpm",)
     words = refused(trials_of, tmp_path, runs, speed_tolerance_percent=0.1)
     assert "a reading of sensor 'NDE' in run 'as found' at 1486.02 rpm" in words
-    twice = runs + "trial P2,1484,DE,3.6,188\n"
-    assert "one speed: run 'trial P2' has 1486.02 as well" in refused(trials_of, tmp_path, twice)
 
 
 @each_of(

@@ -43,8 +43,6 @@ def test_vectors_are_subtracted_from_every_run(job):
     assert read.trials.warnings == plain.warnings == ()
     lag = job('phase = "lag"\n' + VECTORS)
     np.testing.assert_allclose(lag.slow_roll, np.conj(S), rtol=1e-12)
-    mil = job(VECTORS.replace("amplitude = 2.0", "amplitude_mil = 0.1"))
-    np.testing.assert_allclose(mil.slow_roll, [polar(2.54e-6, 35), S[1]], rtol=1e-12)
 
 
 def test_a_slow_run_is_a_runs_table_of_one_run(job, slow, folder):
@@ -54,9 +52,6 @@ def test_a_slow_run_is_a_runs_table_of_one_run(job, slow, folder):
     np.testing.assert_allclose(read.trials.readings, job(VECTORS).trials.readings, rtol=1e-12)
     other = slow(replaced(SLOW, 1, "amplitude_um_pp", "amplitude_um"))
     np.testing.assert_allclose(other.slow_roll, 2 * S, rtol=1e-12)
-    lines = [[*line[:3], 3.0 * k, *line[4:], k] for line in SLOW[1:] for k in (1, 2)]
-    mean = slow([[*SLOW[0], "repeat"], *lines]).slow_roll
-    np.testing.assert_allclose(np.abs(mean), 2.25e-6, rtol=1e-12)
     (words,) = slow([SLOW[0], *([line[0], 600, *line[2:]] for line in SLOW[1:])]).trials.warnings
     assert words.startswith("the slow-roll vectors were read at 600 rpm, which is not slow against 1000 rpm")
 
@@ -76,13 +71,6 @@ def test_vectors_at_every_speed_of_the_job(job, slow, folder):
     the_only(complaints(slow, [SLOW[0], *by_speed[:4]]), "slow.csv", None, "speed", None, words)
 
 
-def test_the_check_run_is_corrected_too(job, folder):
-    write_csv(folder / "check.csv", [RUNS[0], ["check", 1003, "B", 1.5, -80], ["check", 1003, "A", 4.0, 35]])
-    read = job('check = "check.csv"\n' + VECTORS)
-    assert read.check.sensors == ("B", "A")
-    np.testing.assert_allclose(read.check.readings[0, 0, 0], [0, S[0]], atol=1e-18)
-
-
 def test_a_sensor_without_a_vector(job):
     only_b = "[slow_roll.B]" + VECTORS.split("[slow_roll.B]")[1]
     read = job(only_b)
@@ -93,12 +81,8 @@ def test_a_sensor_without_a_vector(job):
 
 
 def test_a_vector_larger_than_readings(job):
-    for size, more in (("4.5", ""), ("8", ", and than 2 other readings")):
-        (words,) = job(VECTORS.replace("amplitude = 2.0", f"amplitude = {size}")).trials.warnings
-        assert words.startswith(
-            f"the slow-roll vector of sensor 'A', {size} µm pp, is larger than its reading in run 'trial 2' "
-            f"at 1000 rpm, 4 µm pp{more}: check its unit"
-        )
+    (words,) = job(VECTORS.replace("amplitude = 2.0", "amplitude = 8")).trials.warnings
+    assert "larger than its reading in run 'trial 2' at 1000 rpm, 4 µm pp, and than 2 other readings" in words
 
 
 def test_errors_are_those_of_the_measured_amplitude(job):

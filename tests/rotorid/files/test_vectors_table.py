@@ -37,7 +37,6 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
     assert np.isnan(b.vectors).tolist() == [[False, False], [False, True]]
     (bare,) = read(tmp_path, "run,speed_Hz,sensor,amplitude,phase_deg\na,9,x,1,0\na,8,x,2,0\n")
     assert bare.time is None
-    assert bare.covariances is None
     np.testing.assert_allclose(bare.speeds / 2 / np.pi, [8, 9])
     assert bare.labels.speed_unit == "Hz"
 

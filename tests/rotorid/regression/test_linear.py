@@ -68,16 +68,6 @@ def test_stretching_turns_complex_products_into_real_ones(m, n, seed):
     np.testing.assert_array_equal(unstretch(stretch(x)), x)
 
 
-def test_complex_equations_with_complex_unknowns():
-    rng = np.random.default_rng(1)
-    K = rng.normal(size=(6, 2, 2)) @ [1, 1j]
-    truth = np.array([1 + 2j, -0.5j])
-    estimate = least_squares(K, K @ truth, names=["A", "B"])
-    np.testing.assert_allclose(unstretch(estimate.values), truth, atol=1e-12)
-    assert estimate.names == ("Re A", "Im A", "Re B", "Im B")
-    assert estimate.dof == 12 - 4
-
-
 def straight_line(seed=0, scatter=0.3):
     rng = np.random.default_rng(seed)
     x = np.linspace(0, 5, 12)
