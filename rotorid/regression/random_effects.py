@@ -48,7 +48,7 @@ class RandomEffects:
     @cached_property
     def new_group(self) -> FloatArray:
         """Covariance (n, n) of a further group about the mean, which is none too well known itself."""
-        error = block_diag(*self.error.mean(axis=0)) + self.within * np.mean(1 / self.jobs)
+        error = _of_means(self.error, self.within, self.jobs)
         return np.asarray(self.between + (self.between + error) / len(self.groups))
 
     def distance(self, y: FloatArray, error: FloatArray) -> float:
@@ -60,7 +60,7 @@ class RandomEffects:
 
     def known(self, m: int) -> tuple[FloatArray, FloatArray]:
         """Best linear prediction of group m from its own jobs and all groups, and its covariance (n, n)."""
-        error = block_diag(*self.error[m]) + self.within / self.jobs[m]
+        error = _of_means(self.error[[m]], self.within, self.jobs[[m]])
         G = solution(self.between + error, self.between).T
         rest = np.eye(len(G)) - G
         covariance = rest @ self.new_group @ rest.T + G @ error @ G.T
@@ -82,9 +82,13 @@ def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomE
         left = np.tensordot(1 - 1 / jobs[group], error, 1) / dof
         within = _without(shrunk((y - groups[group])[several], dof), block_diag(*left))
     mean = groups.mean(axis=0)
-    left = block_diag(*errors.mean(axis=0)) + within * np.mean(1 / jobs)
-    between = _without(shrunk(groups - mean, len(jobs) - 1), left)
+    between = _without(shrunk(groups - mean, len(jobs) - 1), _of_means(errors, within, jobs))
     return RandomEffects(mean, between, within, groups, errors, jobs)
+
+
+def _of_means(error: FloatArray, within: FloatArray, jobs: IntArray) -> FloatArray:
+    """What errors and the jobs leave in the means of groups, (n, n), on average."""
+    return np.asarray(block_diag(*error.mean(axis=0)) + within * np.mean(1 / jobs))
 
 
 def shrunk(off: FloatArray, dof: int) -> FloatArray:
