@@ -31,8 +31,7 @@ from math import nan
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.json import SCHEMA_VERSION, cell, now
-from rotorid.base.text import WIDTH
-from rotorid.base.text import table as aligned
+from rotorid.base.text import WIDTH, aligned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,7 +171,7 @@ def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
     for k in range(1, left):
         if not printed[k].words:
             texts[k] = [cell.rjust(max(map(len, texts[k]))) for cell in texts[k]]
-    return aligned([list(row) for row in zip(*texts, strict=True)], left, width)
+    return aligned(texts, left, width)
 
 
 def terminal(table: Table, width: int = WIDTH) -> str:

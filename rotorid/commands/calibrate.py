@@ -131,7 +131,7 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
     """The first numbers with one standard deviation, two a line."""
     import numpy as np
 
-    from rotorid.base.text import table
+    from rotorid.base.text import aligned
 
     stds = [np.nan] * len(names) if part.std is None else part.std
     cells = []
@@ -142,7 +142,7 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
         number = f"{figures(value, digits)} ± {error_figures(std)}"
         cells += [name, "not determined" if np.isnan(value) else number]
     cells += [""] * (-len(cells) % 4)
-    return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
+    return aligned([cells[k : 4 * _ROWS : 4] for k in range(4)], left=4)
 
 
 class Prepared(NamedTuple):

@@ -141,7 +141,7 @@ class Identification(Answered, Uncertain):
     @property
     def residual_rms(self) -> float:
         """Over the real rows used; NaN where there are none."""
-        parts = np.concatenate([column.values for column in self.residuals[3:]])
+        parts = np.array([column.values for column in self.residuals[3:]], dtype=float)
         return float(np.sqrt(np.nanmean(parts**2))) if np.isfinite(parts).any() else np.nan
 
     def value(self, name: str) -> float:

@@ -17,7 +17,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records
-from rotorid.base.text import error_figures, listing, percent, sentence, table
+from rotorid.base.text import aligned, error_figures, listing, percent, sentence
 
 WORD_TOLERANCE = 1e-7
 """A parameter whose share in the null space is below this is taken as determined."""
@@ -119,7 +119,7 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
         reason = why.get(name, "" if estimate else "not determined")
         lines.append([name, estimate, error, share, *interval, reason])
     filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    return table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS)
+    return aligned(filled, width=COLUMNS)
 
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
@@ -197,12 +197,17 @@ class Estimate(Answered, Uncertain):
             return ()
         if self.curved is not None:
             return self.curved
-        return tuple(self._combination(row) for row in echelon(self.row_space) if np.count_nonzero(row) > 1)
+        return tuple(
+            self.combination(combination_words(row, self.names), float(row @ self.solution), row)
+            for row in echelon(self.row_space)
+            if np.count_nonzero(row) > 1
+        )
 
-    def _combination(self, row: FloatArray) -> Combination:
+    def combination(self, words: str, value: float, slope: FloatArray) -> Combination:
+        """One of this value and these derivatives (n,) by the parameters, with its standard deviation."""
         cov = self.solution_covariance
-        std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
-        return Combination(combination_words(row, self.names), float(row @ self.solution), std, row)
+        std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+        return Combination(words, value, std, slope)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
