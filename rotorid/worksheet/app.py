@@ -19,9 +19,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from rotorid.worksheet.job_files import Conflict
 from rotorid.worksheet.page import ACTIONS, View
 from rotorid.worksheet.session import Session
+from rotorid.worksheet.text_table import Conflict
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {
@@ -68,12 +68,12 @@ async def do(session: Session, given: Given) -> dict[str, Any]:
 async def trial(session: Session, given: Given) -> str:
     """A proposed trial weight."""
     if "with_job" in given:
-        return str(await session.front.ask("trial", session.files.job.name, {}))
+        return str(await session.worker.ask("trial", session.files.job.name, {}))
     options: dict[str, Any] = {key: text.replace(",", ".") for key, text in given.items() if text}
     options |= {key: options[key] + unit for key, unit in _UNITS.items() if key in options}
     if "reading_phase" in options:
         options["reading_phase"] = float(options["reading_phase"])
-    return str(await session.front.ask("trial", None, options))
+    return str(await session.worker.ask("trial", None, options))
 
 
 ROUTES: Mapping[str, Callable[[Session, Given], Awaitable[dict[str, Any] | str]]] = {

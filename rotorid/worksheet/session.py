@@ -14,7 +14,7 @@ from typing import Any
 
 from rotorid.base.worker_processes import worker_pool
 from rotorid.worksheet.calculation import Results, answered
-from rotorid.worksheet.job_files import JobFiles
+from rotorid.worksheet.job_files import JobFiles, Stamp
 from rotorid.worksheet.page import page
 
 LOOK = 0.25
@@ -33,11 +33,11 @@ class Worker:
     Attributes
     ----------
     read
-        Names of all files that it has read so far, and when each was changed before that (ns).
+        Names of all files that it has read so far, each with its stamp before that.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.read: dict[str, int] = {}
+        self.read: dict[str, Stamp] = {}
         self._folder = str(folder)
         self._lock = asyncio.Lock()
         self._pool: Executor | None = None
@@ -94,14 +94,14 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    front, aside
-        The process that answers at once, and the one that may take its time.
+    worker
+        The process that computes and draws.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.aside = self._workers = [Worker(files.job.parent) for _ in range(2)]
+        self.worker = Worker(files.job.parent)
         self._notice = ""
         self.results = Results()
         self._news, self._left = asyncio.Event(), False
@@ -116,8 +116,7 @@ class Session:
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        for worker in self._workers:
-            worker.stop()
+        self.worker.stop()
 
     async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
         """The page that a window shows, as soon as it is newer, or after so many seconds."""
@@ -143,11 +142,9 @@ class Session:
 
     async def drawn(self, do: str) -> str:
         """The picture or the sheet of the answer."""
-        asked = self.results.asked
-        if asked is None:
+        if self.results.asked is None:
             raise ValueError("there is no answer yet")
-        worker = self.aside if asked.split or asked.refine else self.front
-        return str(await worker.ask(do, asked))
+        return str(await self.worker.ask(do, *self.results.asked))
 
     def _publish(self, **results: Any) -> None:  # noqa: ANN401
         self.results = self.results._replace(**results)
@@ -158,27 +155,16 @@ class Session:
     async def _watch(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            if names := self.files.look(self.front.read | self.aside.read):
+            if names := self.files.look(self.worker.read):
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
     async def _compute(self, version: int) -> None:
-        """The weights at once; pieces in the holes and the trim aside, in place of these."""
-        seen, words = Results(), ""
+        """The answer in place of what was there."""
+        seen = Results()
         if self.files.now.text is not None:
             try:
-                seen = await self.front.ask("whole_job", self.files.job.name, version)
+                seen = await self.worker.ask("whole_job", self.files.job.name, version)
             except Refused as error:
                 seen = Results(refused=str(error))
-        if (more := seen.more) is not None:
-            words = "choosing pieces for the holes" if more.split else "computing the trim"
-        self._publish(**{**seen._asdict(), "busy": words, "version": self.version})
-        if more is None or seen.answer is None:
-            return
-        answer, asked = seen.answer, seen.asked
-        try:
-            answer, asked = await self.aside.ask("balanced", more), more
-        except Refused as error:
-            warning = f"no {'trim' if more.refine else 'pieces'}: {error}"
-            answer = {**answer, "warnings": [*answer["warnings"], warning]}
-        self._publish(answer=answer, asked=asked, busy="", version=self.version)
+        self._publish(**{**seen._asdict(), "version": self.version})

@@ -6,7 +6,7 @@ import threading
 
 _PAGE = """<!doctype html><link rel="icon" href="data:,"><iframe src="BASE#TOKEN"></iframe><p></p><script>
 const headers = {'X-Rotorid-Token': 'TOKEN'};
-const body = JSON.stringify({edits: [{key: ['phase'], old: 'lead', new: 'lag'}]});
+const body = JSON.stringify({edits: [{cell: 'phase', old: 'lead', new: 'lag'}]});
 const tries = [fetch('BASEstate', {headers}), fetch('BASEedit', {method: 'POST', headers, body}),
   fetch('BASEedit', {method: 'POST', mode: 'no-cors', headers, body})];
 Promise.allSettled(tries).then(all => document.querySelector('p').textContent = all.map(

@@ -41,6 +41,6 @@ def type_job(window, sample, radius=None):
             window.next(text)
         window.leave()
     for plane in dict.fromkeys(row["plane"] for row in weights) if radius else ():
-        window.type(f'[id="planes.{plane}.radius_mm"]', str(radius))
+        window.type(f'[id="planes|{plane}|radius_mm"]', str(radius))
         window.leave()
     window.saved()

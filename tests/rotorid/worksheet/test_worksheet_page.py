@@ -194,7 +194,7 @@ def test_a_block_from_excel_is_one_step(shared, windows):
         "baseline,1360,probe 2,4.5,279",
         "baseline,1360,probe 3,11.25,277",
     ]
-    window.hold(CONTROL, "z")
+    window.push('[data-do="undo"]')
     window.wait(lambda: window.text(cell) == "9.75", "one step takes it back")
     window.saved()
     assert path.read_bytes() == before

@@ -89,7 +89,7 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
 @pytest.mark.parametrize(
     ("path", "body"),
     [
-        ("/edit", {"edits": [{"table": "runs", "row": "no such", "column": "run", "old": "", "new": "x"}]}),
+        ("/edit", {"edits": [{"cell": "runs|no such|run", "old": "", "new": "x"}]}),
         ("/edit", {"edits": [{"table": "nothing", "cells": {}}]}),
         ("/edit", {}),
         ("/do", {"do": "no such"}),
@@ -98,7 +98,7 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
         ("/edit", "[" * 100_000),
         ("/edit", '{"edits": null}'),
         ("/edit", "{"),
-        ("/edit", '{"edits":[{"key":[],"new":1}]}'),
+        ("/edit", '{"edits":[{"cell":[],"new":1}]}'),
     ],
 )
 def test_what_a_page_should_not_ask_for_is_one_sentence(shared, path, body, monkeypatch):
@@ -128,24 +128,16 @@ def test_kill_loses_no_finished_cell(tmp_path, serve):
 
 
 @pytest.mark.full
-def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, serve):
+def test_long_work_is_given_up_when_the_input_changes(tmp_path, serve):
     job = copy(tmp_path) / "holes.toml"
     text = job.read_text().replace("available_g_mm = [150]", "available_g_mm = [5, 7, 11, 13, 17, 19, 23]")
-    job.write_text(text.replace("stock = [5]\n", "").replace("holes = 12", "holes = 24"))
+    job.write_text(text.replace("stock = [5]\n", "").replace("holes = 12", "holes = 48"))
     served = serve(job)
-
-    def choosing():
-        state = served.state()
-        while "pieces" not in state["busy"]:
-            state = served.state(state["version"])
-        return state
-
-    assert not [key for key in choosing()["numbers"] if key.startswith("mounting")]
-    begun = time.perf_counter()
-    assert served.type(CELL, "97")[0] == 200
-    state = choosing()
-    assert time.perf_counter() - begun < 3
-    agree(state["numbers"], command(job))
+    time.sleep(3)
+    assert served.state()["busy"] == "computing"
+    job.write_text((sample_data() / "turbo_job" / "holes.toml").read_text())
+    state = served.noticed(0)
+    agree(state["numbers"], command(job, "--split"))
 
 
 def test_what_there_is_to_look_at_and_to_print(shared):
@@ -161,7 +153,7 @@ def test_a_trial_weight_with_and_without_the_coefficients(shared):
     status, text = served.ask("/trial", {"load": "25,5", "speed": "3000", "radius": "100", "lag": ""})
     assert (status, "2.534 g" in text) == (200, True)
     status, text = served.ask("/trial", {"with_job": "on"})
-    assert (status, "<svg" in text) == (200, True)
+    assert (status, text[:3]) == (200, "<p>")
 
 
 def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
@@ -169,11 +161,11 @@ def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
     served.settled()
     assert served.type(CELL, "915")[0] == 200
     state = served.settled()
-    assert "phase of baseline: '915' stands here; expected" in state["words"]
+    assert "1 × phase of baseline: '915' stands here; expected" in state["words"]
     assert (f'data-go="{CELL}"' in state["html"], state["numbers"]) == (True, {})
     assert served.ask("/picture")[0] == 400
     assert served.type(CELL, "")[0] == 200
-    assert "Still missing: 1 × phase of baseline" in served.settled()["words"]
+    assert "1 × phase of baseline: still missing" in served.settled()["words"]
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
@@ -195,7 +187,7 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
     now = served.settled()
     assert now["numbers"] == before["numbers"] != {}
     assert "Warning: the check run is not finished" in now["words"]
-    assert "Still missing: 1 × amplitude of check" in now["words"]
+    assert "1 × amplitude of check: still missing" in now["words"]
     assert [served.ask(path)[0] for path in ("/picture", "/sheet")] == [200, 200]
 
 
@@ -218,7 +210,7 @@ def test_a_workbook_is_answered_and_not_edited(tmp_path, serve):
     assert state["numbers"]
     assert "edit job.xlsx in Excel: what is saved there appears here" in state["words"]
     assert state["html"].count(" disabled") > len(state["cells"])
-    status, answer = served.edit({"key": ["phase"], "old": "lead", "new": "lag"})
+    status, answer = served.edit({"cell": "phase", "old": "lead", "new": "lag"})
     assert (status, "edit job.xlsx in Excel" in answer["error"]) == (400, True)
 
 
