@@ -9,27 +9,17 @@ import errno
 import functools
 import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from rotorid.base.tables import Column, Table, html
-from rotorid.base.text import figures
 from rotorid.worksheet.job_files import Stamp, stamp
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
-
-    from balancing import Labels
     from rotorid.commands.balance import Balance
     from rotorid.files import Job
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
-_TWO = partial(figures, digits=2)
-_SHOWN: Mapping[str, Callable[[Any], str]] = {"mass": figures, "angle_deg": "{:.1f}°".format}
 _read: dict[str, Stamp] = {}
 """Names of the files that were read, each with its stamp before that."""
 
@@ -55,10 +45,6 @@ def _note(path: Path) -> None:
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(".")):
         raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
     _read[str(path)] = stamp(path)
-
-
-def _problems(error: Exception) -> tuple[dict[str, Any], ...]:
-    return tuple({**vars(one), "text": str(one)} for one in getattr(error, "problems", ()))
 
 
 class Results(NamedTuple):
@@ -96,7 +82,8 @@ def whole_job(job: str, version: int) -> Results:
         except (ValueError, OSError, ArithmeticError) as error:
             if asked[2]:
                 why = "" if isinstance(error, InputError) else str(error)
-                seen = seen._replace(problems=_problems(error), refused=why)
+                rows = [{**vars(one), "text": str(one)} for one in getattr(error, "problems", ())]
+                seen = seen._replace(problems=tuple(rows), refused=why)
     return seen
 
 
@@ -124,14 +111,12 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]
 
 
 def _without_check(path: Path) -> Job:
-    """The job as it is before its check run; InputError where it has none."""
+    """The job as it is before its check run."""
     from rotorid.files.job import job_of, open_job
-    from rotorid.files.problems import InputError, Problems
+    from rotorid.files.problems import Problems
 
     problems = Problems()
     written = open_job(path, problems)
-    if "check" not in {**written.settings, **written.tables}:
-        raise InputError(())
     for key in ("check", "check_weights"):
         written.settings.pop(key, None)
         written.tables.pop(key, None)
@@ -139,94 +124,27 @@ def _without_check(path: Path) -> Job:
 
 
 def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
-    """The answer: what to do, with its tables as HTML; what there is to mount, and a list of it to tick."""
+    """The answer: what to do, its tables as HTML, what there is to mount."""
+    from markupsafe import Markup
+
+    from rotorid.report.balance import to_do
+
     made, read = _balance(*asked)
     answer, document, labels = made.answer, made.document, made.job.trials.labels
-    path = "mounting.holes" if "mounting" in document else "corrections"
-    boxes = Column("mounted", [f"{k}" for k in range(len(_at(document, path)))], _box)
+    rows = document["mounting"]["holes"] if "mounting" in document else document["corrections"]
+
+    def at(row: Mapping[str, Any]) -> float:  # removed from the other side
+        drilled = row.get("remove_at_deg")
+        return float(row["angle_deg"] if drilled is None else drilled)
+
+    refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
-        "tables": str(_tables(document, made, labels)),
+        "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
-        "notes": list(answer.notes),
-        "to_mount": [dict(row) for row in _at(document, path)],
-        "unit": labels.weight_unit,
-        "list": str(html(_table(document, path, _work(labels), more=[boxes]))),
+        "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
+        "to_mount": [{**row, "at": at(row)} for row in rows],
     }
-
-
-def _box(row: str) -> str:
-    from markupsafe import Markup
-
-    box = '<label class="check"><input type="checkbox" name="{0}" aria-label="mounted, {0}" checked></label>'
-    return Markup(box).format(row)
-
-
-def _work(labels: Labels) -> dict[str, str]:
-    """Headings of what is to be done, by the keys of the document."""
-    places = {"plane": "plane", "action": "", "hole": "hole", "pieces": "pieces"}
-    return {**places, "mass": labels.weight_in, "angle_deg": "at"}
-
-
-def _tables(document: Mapping[str, Any], made: Balance, labels: Labels) -> Markup:
-    """What to mount, with 95 % of it, or what is left to do."""
-    from markupsafe import Markup
-
-    left, pieces, last = document.get("left_to_do"), document.get("mounting"), document["mounted_in_last_run"]
-    table, work, words = partial(_table, document), _work(labels), f"For {document['corrections_refer_to']}. "
-    tables = []
-    if left:
-        words = ""
-        if left["word"] == "trim":
-            tables += [table("left_to_do.holes" if left["holes"] else "left_to_do.add", work, "To add")]
-        tables += [table("left_to_do.mounted", work, f"Mounted in {left['run']}")]
-    elif pieces:
-        tables += [table("mounting.holes", work)]
-    else:
-        sizes, angles = made.result.half_widths()
-        within = [
-            Column(f"± {labels.weight_in}", sizes * labels.weight_scale, _TWO),
-            Column("± °", np.degrees(angles), _TWO),
-        ]
-        tables += [table("corrections", work, more=within)]
-        words += "95 of 100 such weights lie within ±. "
-        if last and any(row["mass"] for row in last["weights"]):
-            tables += [table("add_to_mounted", work, f"Instead, if the weights of {last['run']} stay")]
-        if document["other_readings"]:
-            tables += [table("other_readings", {"if": "if", **work}, "Under another convention")]
-    words += f"Angles count {labels.angles}, phase {labels.phase}."
-    first, *others = map(html, tables)
-    return Markup("\n").join([first, Markup("<p>{}</p>").format(words), *others])
-
-
-def _at(document: Mapping[str, Any], path: str) -> Sequence[Mapping[str, Any]]:
-    rows: Any = document
-    for part in path.split("."):
-        rows = rows[part]
-    return rows  # type: ignore[no-any-return]
-
-
-def _table(
-    document: Mapping[str, Any],
-    path: str,
-    headings: Mapping[str, str],
-    name: str = "",
-    *,
-    more: Sequence[Column] = (),
-) -> Table:
-    """Rows of the document; columns in which nothing stands are left out."""
-    rows = _at(document, path)
-    if all(row.get("action") == "add" for row in rows):  # which needs no words
-        headings = {key: text for key, text in headings.items() if key != "action"}
-    columns = []
-    for key, heading in headings.items():
-        shown = _SHOWN.get(key, str)
-        if key == "angle_deg" and all(row.get("remove_at_deg") is not None for row in rows):
-            key = "remove_at_deg"  # where it is drilled
-        if key.endswith("_deg") and any("hole" in row for row in rows):
-            shown = "{:.6g}°".format  # holes are where they are
-        columns.append(Column(heading, [row.get(key) for row in rows], shown, f"{path}.*.{key}"))
-    return Table(name, (*(one for one in columns if any(one.texts)), *more))
 
 
 def picture(*asked: Any) -> str:  # noqa: ANN401

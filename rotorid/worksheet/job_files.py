@@ -84,11 +84,9 @@ class JobFiles:
 
     def place(self, file: str, row: int | None) -> tuple[str, str] | None:
         """The table and the id of the row that a message of the reader names."""
-        for key, table in self.now.tables.items():
-            for line in table.rows():
-                if self.job.parent / file == table.path and line.number == row:
-                    return key, line.id
-        return None
+        tables = self.now.tables.items()
+        ids = {(one.path, line.number): (key, line.id) for key, one in tables for line in one.rows()}
+        return ids.get((self.job.parent / file, row or 0))
 
     def look(self, read: Mapping[str, Stamp] | None = None) -> list[str]:
         """Names of the files that another program has changed since the last look.
@@ -186,9 +184,6 @@ class JobFiles:
 
     def _in_files(self, text: bytes | None) -> Job:
         folder, tables, settings = self.job.parent, dict[str, Table](), settings_in(text or b"")
-        if text is None:  # its first edit writes down the names of the tables that are there
-            settings = {key: f"{key}.csv" for key in KEYS[:2] if (folder / f"{key}.csv").exists()}
-            text = "".join(f'{key} = "{name}"\n' for key, name in settings.items()).encode() or None
         for key, name in named_tables(settings).items():
             path, others = folder / name, [table.path for table in tables.values()]
             if key not in KEYS or not name.isprintable():
@@ -228,10 +223,8 @@ class JobFiles:
             with suppress(ValueError, OSError, _OutsideError):
                 done = {path: before[path] for path in files if self._read(path) == files[path]}
                 self._replace(done, files)
-            file = str(error.problems[0].file if isinstance(error, InputError) else error.filename)
-            why = getattr(error.__cause__ or error, "strerror", None) or str(error)
-            words = "nothing was changed; where it is open in Excel, close it there, then try again"
-            raise ValueError(f"{Path(file).name} cannot be written ({why}): {words}") from error
+            words = "where a file is open in Excel, close it there, then try again"
+            raise ValueError(f"nothing was changed: {error}; {words}") from error
         self._held |= files
         self._stamps = dict.fromkeys(files, Stamp()) | self._stamps
         self.now = self._job()
@@ -286,7 +279,7 @@ class JobFiles:
             raise ValueError(f"a table {key!r} cannot be made: there is one, or none of this name")
         name = named_tables(draft.settings).get(key)
         if name is None:
-            names = (f"{key}{end}.csv" for end in ("", *map("_{}".format, range(2, 1000))))
+            names = (f"{key}{end}.csv" for end in ("", *range(2, 1000)))
             name = next(name for name in names if not self.job.with_name(name).exists())
             draft.set([key], name)
         separator = next((one.separator for one in draft.tables.values() if one.lines), ",")

@@ -123,8 +123,7 @@ class View:
         self.names = {key: table.columns() for key, table in self.job.tables.items()}
         self.rows = {key: [*self._rows(key)] for key in self.job.tables}
         self.sensors = self.values("sensor", "runs", "check")
-        stated = setting(self.job.settings, ["planes"])
-        self.planes = _each([*(stated if isinstance(stated, dict) else ()), *self.values("plane", "weights")])
+        self.planes = _each([*self._stated("planes"), *self.values("plane", "weights")])
         self.runs, weighed = self.values("run", "runs", "weights"), self.values("run", "weights")
         self.baseline = next((run for run in self.runs if run not in weighed), "baseline")
         self.trials = [run for run in self.runs if run != self.baseline]
@@ -149,11 +148,6 @@ class View:
     def column(self, what: str, key: str = "runs") -> str:
         """The name of a column in the file."""
         return self.names.get(key, {}).get(what, {"weight": "mass_g"}.get(what, ""))
-
-    @property
-    def closed(self) -> list[str]:
-        """Why the job, or tables of it, cannot be edited."""
-        return _each([self.job.read_only, *(table.read_only for table in self.job.tables.values())])
 
     def readings(self, key: str, run: str) -> list[Line]:
         """Amplitude and phase of each sensor, a line for each speed."""
@@ -188,7 +182,7 @@ class View:
         tables = {
             "planes": (self.planes, plane),
             "sensors": (self.sensors, {"limit": "largest"}),
-            "errors": ([""] * bool(self.rows), ERRORS),
+            "errors": ([""], ERRORS),
         }
         return [
             ([top, *columns.values()], [(name, self._settings(top, name, columns), "") for name in names])
@@ -217,15 +211,19 @@ class View:
 
     def _settings(self, top: str, name: str, columns: Mapping[str, str]) -> list[Cell]:
         """Cells of settings; one that is stated in another unit has the key of that."""
-        its, cells = setting(self.job.settings, [one for one in (top, name) if one]), list[Cell]()
-        stated = its if isinstance(its, dict) else {}
+        path, cells = [top, name] if name else [top], list[Cell]()
+        stated = self._stated(*path)
         for usual, words in columns.items():
             others = (one for one in stated if name and content(one) == content(usual))
             key = next(others, usual)
-            place = "|".join(filter(None, (top, name, key)))
-            text = text_of(stated.get(key))
-            cells.append(Cell(place, text, f"{words}, {name or top}", bool(self.job.read_only)))
+            text, label = text_of(stated.get(key)), f"{words}, {name or top}"
+            cells.append(Cell("|".join([*path, key]), text, label, bool(self.job.read_only)))
         return cells
+
+    def _stated(self, *path: str) -> Mapping[str, Any]:
+        """Settings of a table of the job, none where there is no table."""
+        its = setting(self.job.settings, path)
+        return its if isinstance(its, dict) else {}
 
     def _problem(self, one: Mapping[str, Any], place: tuple[str, str] | None) -> tuple[str, str]:
         """A problem of a file in words, and the cell of the page, "" for none."""
@@ -269,15 +267,13 @@ def check_run(view: View, fields: Fields) -> list[Edit]:
     answer = view.results.answer
     if answer is None or fields["of"] != answer["judgement"]:
         raise ValueError("the answer has changed meanwhile: look at it, then say again what was mounted")
-    unit = answer["unit"]
-    header = ["run", "plane", f"{'unbalance' if '_' in unit else 'mass'}_{unit}", "angle_deg"]
+    header = ["run", "plane", view.column("weight", "weights"), "angle_deg"]
     if any(row["action"] == "remove" for row in answer["to_mount"]):
         header.append("action")  # without it all would be added
     made: list[Edit] = [{"create": "check", "header": view.job.tables["runs"].header}]
     made += [*_as_baseline(view, "check", "check"), {"create": "check_weights", "header": header}]
     for k, row in enumerate(answer["to_mount"]):
-        at = row["angle_deg"] if row.get("remove_at_deg") is None else row["remove_at_deg"]
-        cells = ("check", row["plane"], row["mass"], at, row["action"])
+        cells = ("check", row["plane"], row["mass"], row["at"], row["action"])
         if f"{k}" in fields:
             made.append({"table": "check_weights", "cells": dict(zip(header, cells, strict=False))})
     return made

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -21,10 +21,6 @@ LOOK = 0.25
 """Seconds between two looks at the files."""
 GRACE = 0.3
 """Seconds that a computation may go on when nobody wants it: a new process takes longer to start."""
-
-
-class Refused(ValueError):
-    """What was asked cannot be computed."""
 
 
 class Worker:
@@ -48,7 +44,7 @@ class Worker:
 
         Raises
         ------
-        Refused
+        ValueError
             If it cannot be computed.
         """
         async with self._lock:
@@ -66,10 +62,10 @@ class Worker:
                 raise
             except BrokenProcessPool as error:
                 self.stop()
-                raise Refused("the calculation ended unexpectedly: try again") from error
+                raise ValueError("the calculation ended unexpectedly: try again") from error
         self.read |= answer["read"]
         if "refused" in answer:
-            raise Refused(answer["refused"])
+            raise ValueError(answer["refused"])
         return answer["value"]
 
     def stop(self) -> None:
@@ -104,33 +100,28 @@ class Session:
         self.worker = Worker(files.job.parent)
         self._notice = ""
         self.results = Results()
-        self._news, self._left = asyncio.Event(), False
+        self._news = asyncio.Event()
         self._computing: asyncio.Task[None] | None = None
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[None]:
-        """Compute, and look for changes from outside, until the page is closed."""
+    async def running(self, ready: Callable[[], object]) -> AsyncIterator[None]:
+        """Compute, and look for changes from outside, until the page is closed; say when it is `ready`."""
         self.changed()
         watching = asyncio.ensure_future(self._watch())
+        ready()
         yield
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
         self.worker.stop()
 
-    async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
+    async def after(self, version: int, seconds: float = 1.0) -> dict[str, Any]:
         """The page that a window shows, as soon as it is newer, or after so many seconds."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
-                while self.version <= version and not self._left:
+                while self.version <= version:
                     await self._news.wait()
-        state = {"version": self.version, "busy": self.results.busy, "notice": self._notice}
-        return {**state, "html": page(self.files, self.results, self._notice)}
-
-    def leave(self) -> None:
-        """Answer those who wait for news, since the program ends."""
-        self._left = True
-        self._news.set()
+        return {"version": self.version, "html": page(self.files, self.results, self._notice)}
 
     def changed(self, notice: str = "") -> None:
         """Say that the files are others, and compute them anew; what is being computed is given up."""
@@ -138,7 +129,7 @@ class Session:
         if self._computing is not None:
             self._computing.cancel()
         self._publish(busy="computing")
-        self._computing = asyncio.ensure_future(self._compute(self.version))
+        self._computing = asyncio.ensure_future(self._compute())
 
     async def drawn(self, do: str) -> str:
         """The picture or the sheet of the answer."""
@@ -159,12 +150,12 @@ class Session:
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
-    async def _compute(self, version: int) -> None:
+    async def _compute(self) -> None:
         """The answer in place of what was there."""
         seen = Results()
         if self.files.now.text is not None:
             try:
-                seen = await self.worker.ask("whole_job", self.files.job.name, version)
-            except Refused as error:
+                seen = await self.worker.ask("whole_job", self.files.job.name, self.version)
+            except ValueError as error:
                 seen = Results(refused=str(error))
         self._publish(**{**seen._asdict(), "version": self.version})

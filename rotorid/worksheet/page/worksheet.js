@@ -1,10 +1,10 @@
-/* The worksheet's page: it shows the HTML that the server sends, and sends every cell that changes.
-A cell is called by its id, a button has its edits as `data-edits` or what it does as `data-do`; what has
-`data-keep` is filled here. */
+/* It shows the HTML of the server, and sends every cell that changes, by its id; buttons have `data-edits`
+or what they `data-do`; what has `data-keep` is filled here. */
 const $ = (id) => document.getElementById(id);
 const typed = new Map(); // id of a cell → its change, until the page has it; with `why` if it was refused
-const queue = []; // what is still to be sent, in order
-let token = location.hash.slice(1);
+let last = Promise.resolve(); // of what is still to be sent, in order
+let waiting = 0;
+const token = location.hash.slice(1);
 let version = -1;
 let online = true;
 let savedWords = "all is saved";
@@ -71,27 +71,27 @@ async function away({ status }) {
   await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 
-const send = (path, body) => new Promise((done, failed) => {
+function send(path, body) {
   tell("");
-  if (queue.push({ path, body, done, failed }) === 1) drain();
+  waiting += 1;
+  const sent = last.then(() => deliver(path, body));
+  last = sent.catch(() => {}).then(() => showSaved((waiting -= 1)));
   showSaved();
-});
-const act = (path, body) => send(path, body).then(() => true, ({ message }) => tell(message));
-
-async function drain() {
-  for (; queue.length; showSaved()) {
-    const { path, body, done, failed } = queue[0];
-    try {
-      await ask(path, body);
-      savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
-      while (!(await refresh(-1).then(() => true, away)));
-      done(queue.shift());
-    } catch (problem) {
-      if (problem.status && problem.status !== 403) failed(problem, queue.shift());
-      else await away(problem);
-    }
-  }
+  return sent;
 }
+
+async function deliver(path, body) {
+  for (;;) {
+    const problem = await ask(path, body).then(() => null, (error) => error);
+    if (!problem) break;
+    if (problem.status && problem.status !== 403) throw problem;
+    await away(problem);
+  }
+  savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
+  while (!(await refresh(-1).then(() => true, away)));
+}
+
+const act = (path, body) => send(path, body).then(() => true, ({ message }) => tell(message));
 
 /* Changes {id, old, text} of cells, as one step. */
 function save(changes) {
@@ -137,8 +137,8 @@ function tell(text) {
 }
 
 function showSaved() {
-  const lost = `not saved — the program is not running${queue.length ? `: ${queue.length} wait here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : savedWords) : lost;
+  const words = waiting ? "saving…" : savedWords;
+  $("saved").textContent = online ? words : `not saved: ${waiting} wait here, the program is not running`;
   $("saved").className = online ? "" : "why";
 }
 
@@ -156,8 +156,7 @@ async function draw() {
 /* What a person does. */
 document.addEventListener("click", ({ target }) => {
   const button = target.closest("button");
-  const { edits, sure, go, theirs, mine } = button?.dataset ?? {};
-  if (sure && !confirm(sure)) return;
+  const { edits, go, theirs, mine } = button?.dataset ?? {};
   if (edits) act("/edit", { edits: JSON.parse(edits) });
   if (button?.dataset.do) act("/do", { ...button.dataset });
   if (go) $(go)?.focus();
@@ -174,7 +173,6 @@ document.addEventListener("submit", async (event) => {
   if (!(await act("/do", { do: form.dataset.do, ...fields }))) return;
   form.reset();
   $("setup").open = false;
-  if (form.id === "new-run") $("runs").lastElementChild.querySelectorAll("input")[1]?.focus();
 });
 document.addEventListener("change", ({ target }) => {
   if (target.form?.id === "trial") localStorage.setItem(trialKey(), JSON.stringify([...new FormData($("trial"))]));
@@ -217,6 +215,5 @@ async function print() {
   if (sheet) opened.location = URL.createObjectURL(sheet);
   else opened.close();
 }
-window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));
-window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
+window.addEventListener("beforeunload", (event) => waiting && event.preventDefault());
 for (;;) await refresh(online ? version : -1).catch(away);

@@ -75,6 +75,8 @@ class Served:
         status, state = self.ask(f"/state?after={after}")
         assert status == 200, state
         page = html.unescape(state["html"])
+        state["busy"] = re.search('id="busy" role="status">([^<]*)<', page).group(1)
+        state["notice"] = "".join(re.findall('id="notice" role="status"><p>([^<]*)<', page))
         cells = re.findall('<input id="([^"]*)" value="([^"]*)" class="cell"', state["html"])
         state["cells"] = {html.unescape(name): html.unescape(text) for name, text in cells}
         state["numbers"] = dict(re.findall(r'data-key="([^"]*)"[^>]*>([^<]*)<', page))

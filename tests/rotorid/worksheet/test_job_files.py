@@ -119,7 +119,8 @@ def test_numbers_that_may_have_thousands_stay_as_typed_and_are_refused(tmp_path)
         ("errors.floor = 1 # a remark\n", "errors|phase_deg", "2", 2),
         ("[planes.a]\nholes = 3\n# of b\n[planes.b]\nholes = 4", "planes|c|holes", "5", 5),
         ("# of it\na = 1\n[errors]\nfloor = 1\n", "errors|floor", "", None),
-        ("a = 1\n", "planes|left|taken", "3: 10", {"3": 10}),
+        ("a = 1\n", "planes|left|taken", "3: 10; 7: 2,5", {"3": 10, "7": 2.5}),
+        ("a = 1\n", "planes|left|stock", "1", [1]),
     ],
 )
 def test_a_setting_is_changed_in_files_of_all_forms(tmp_path, text, cell, new, value):
@@ -145,24 +146,6 @@ def test_a_setting_that_cannot_be_added_is_refused(tmp_path):
     with pytest.raises(ValueError, match="change it in the job file itself"):
         JobFiles(tmp_path / "job.toml").apply([{"cell": "planes|c|holes", "new": "5"}])
     assert (tmp_path / "job.toml").read_text() == text
-
-
-@pytest.mark.parametrize(
-    ("key", "typed", "saved"),
-    [
-        ("stock", "1; 1; 1; 1", [1, 1, 1, 1]),
-        ("stock", "1", [1]),
-        ("max_mass_g", "12,5", 12.5),
-        ("taken", "3: 10; 7: 20", {"3": 10, "7": 20}),
-    ],
-)
-def test_a_setting_is_typed_as_text(turbo, key, typed, saved):
-    job = JobFiles(turbo)
-    edit = {"cell": f"planes|left|{key}", "old": "", "new": typed}
-    job.apply([edit])
-    assert job.now.settings["planes"]["left"] == {key: saved}
-    job.apply([{**edit, "old": typed.replace(",", "."), "new": ""}])
-    assert "planes" not in job.now.settings
 
 
 def test_steps_over_several_files_go_back_to_the_same_bytes(turbo):
@@ -274,28 +257,6 @@ def test_files_outside_the_folder_are_neither_read_nor_written(turbo, tmp_path_f
     assert outside.read_bytes() == (turbo / "runs.csv").read_bytes()
 
 
-def test_a_job_file_that_is_broken_meanwhile_is_named_and_its_rows_keep_their_ids(turbo):
-    job = JobFiles(turbo)
-    ids, good = [row["id"] for row in rows(job)], (turbo / "checked.toml").read_bytes()
-    (turbo / "checked.toml").write_bytes(good + b"phase = \n")
-    assert job.look() == ["checked.toml"]
-    assert "checked.toml cannot be read" in job.now.read_only
-    with pytest.raises(ValueError, match="cannot be read"):
-        job.apply([{"cell": "view", "old": "", "new": "driven end"}])
-    (turbo / "checked.toml").write_bytes(good)
-    assert job.look() == ["checked.toml"]
-    assert [row["id"] for row in rows(job)] == ids
-
-
-def test_rows_come_and_go_at_the_end_of_a_file(tmp_path):
-    text = "run;speed_rpm;sensor;amplitude;phase_deg\r\na;1200;s;1,5;3\r\n# end"
-    job = plain_job(tmp_path, text)
-    job.apply([{"table": "runs", "cells": {"run": "b", "amplitude": "2.25"}}])
-    assert (tmp_path / "runs.csv").read_bytes().decode() == text.replace("# end", "b;;;2,25;\r\n# end")
-    job.apply([{"delete": "runs|b|||1"}])
-    assert (tmp_path / "runs.csv").read_bytes().decode() == text
-
-
 def test_a_change_that_leaves_time_and_size_is_seen(turbo):
     job, path = JobFiles(turbo), turbo / "runs.csv"
     assert job.look() == []
@@ -323,7 +284,7 @@ def test_a_step_that_fails_names_the_file_and_leaves_nothing_behind(tmp_path, mo
         patched.setattr(Path, "replace", replace)
         with pytest.raises(ValueError, match="nothing was changed") as caught:
             job.apply([{"create": "check", "header": HEADER}])
-    assert str(caught.value).startswith(tried[failing - 1])
+    assert f"{tried[failing - 1]}: expected a file that can be written" in str(caught.value)
     assert contents(tmp_path) == before
     assert job.look() == []
     job.apply([{"create": "check", "header": HEADER}])
@@ -363,19 +324,7 @@ def test_a_workbook_is_shown_and_not_edited(tmp_path):
     path = as_workbook(TURBO / "checked.toml", tmp_path / "job.xlsx")
     before = path.read_bytes()
     job = JobFiles(path)
-    assert {key: len(rows(job, key)) for key in job.now.tables} == {
-        "runs": 80,
-        "weights": 3,
-        "check": 20,
-        "check_weights": 3,
-    }
-    assert job.now.settings["phase"] == "lead"
-    assert rows(job)[0] == {
-        "id": "baseline|1220|probe 1|1",
-        "cells": ["baseline", "1220", "probe 1", "3.36", "89"],
-    }
     assert job.place("job.xlsx (sheet 'runs')", 3) == ("runs", rows(job)[1]["id"])
-    for edit in (cell(job), {"cell": "phase", "old": "lead", "new": "lag"}):
-        with pytest.raises(ValueError, match=r"edit job\.xlsx in Excel"):
-            job.apply([edit])
+    with pytest.raises(ValueError, match=r"edit job\.xlsx in Excel"):
+        job.apply([cell(job)])
     assert path.read_bytes() == before

@@ -50,17 +50,14 @@ def test_every_number_is_that_of_the_command(shared, name, options, path, count)
     numbers = state["numbers"]
     agree(numbers, command(served.job, *options))
     if path == "corrections":  # it prints ± 32 g·mm, ± 5.8°
-        assert "left 423.0 168.9° 32 5.8" in state["words"]
+        assert "left add 423.0 168.9° 32 5.8" in state["words"]
     assert len([key for key in numbers if key.startswith(path)]) == count
 
 
-def test_an_edit_changes_one_line_and_every_number_follows(shared):
+def test_every_number_follows_an_edit(shared):
     served = shared()
-    before, numbers = (served.job.parent / "runs.csv").read_text(), served.settled()["numbers"]
+    numbers = served.settled()["numbers"]
     assert served.type(CELL, "95")[0] == 200
-    after = (served.job.parent / "runs.csv").read_text()
-    pairs = enumerate(zip(before.splitlines(), after.splitlines(), strict=True))
-    assert [k for k, (a, b) in pairs if a != b] == [1]
     now = served.settled()["numbers"]
     agree(now, command(served.job))
     assert now != numbers
@@ -140,17 +137,12 @@ def test_long_work_is_given_up_when_the_input_changes(tmp_path, serve):
     agree(state["numbers"], command(job, "--split"))
 
 
-def test_what_there_is_to_look_at_and_to_print(shared):
-    served = shared("holes.toml")
-    served.settled()
-    assert served.ask("/picture")[1].startswith("<svg")
-    assert "2 × 150" in served.ask("/sheet")[1]
-
-
 def test_a_trial_weight_with_and_without_the_coefficients(shared):
     served = shared()
     # 10 % of the static load: 0.1 · 25.5 kg · 9.81 m/s² / (ω² · 0.1 m), ω = 2π · 50 Hz: 2.534 g
-    status, text = served.ask("/trial", {"load": "25,5", "speed": "3000", "radius": "100", "lag": ""})
+    status, text = served.ask(
+        "/trial", {"load kg": "25,5", "speed rpm": "3000", "radius mm": "100", "lag": ""}
+    )
     assert (status, "2.534 g" in text) == (200, True)
     status, text = served.ask("/trial", {"with_job": "on"})
     assert (status, text[:3]) == (200, "<p>")
@@ -188,7 +180,8 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
     assert now["numbers"] == before["numbers"] != {}
     assert "Warning: the check run is not finished" in now["words"]
     assert "1 × amplitude of check: still missing" in now["words"]
-    assert [served.ask(path)[0] for path in ("/picture", "/sheet")] == [200, 200]
+    assert served.ask("/picture")[1].startswith("<svg")
+    assert ("2 × 150" in served.ask("/sheet")[1]) == (name == "holes.toml")
 
 
 def test_the_address_survives_a_restart(tmp_path, serve, monkeypatch):
@@ -209,7 +202,7 @@ def test_a_workbook_is_answered_and_not_edited(tmp_path, serve):
     state = served.settled()
     assert state["numbers"]
     assert "edit job.xlsx in Excel: what is saved there appears here" in state["words"]
-    assert state["html"].count(" disabled") > len(state["cells"])
+    assert state["html"].count(" disabled") == len(state["cells"])
     status, answer = served.edit({"cell": "phase", "old": "lead", "new": "lag"})
     assert (status, "edit job.xlsx in Excel" in answer["error"]) == (400, True)
 
