@@ -27,7 +27,7 @@ def type_job(window, sample, radius=None):
         if mounted:
             window.type('#new-run [name="name"]', name)
             window.type('#new-run [name="plane"]', mounted[0]["plane"])
-            window.push("#add-run")
+            window.push("#new-run button")
         for k, weight in enumerate(mounted, 1):
             cell = f'{card} tr:nth-child({k}) [id^="weights|"]'
             if k > 1:
@@ -41,6 +41,6 @@ def type_job(window, sample, radius=None):
             window.next(text)
         window.leave()
     for plane in dict.fromkeys(row["plane"] for row in weights) if radius else ():
-        window.type(f'[id="planes.{plane}.radius_mm"]', str(radius))
+        window.type(f'[id="planes|{plane}|radius_mm"]', str(radius))
         window.leave()
     window.saved()
