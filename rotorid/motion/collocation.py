@@ -144,12 +144,12 @@ class Orbit:
     def resampled(self, count: int) -> Orbit:
         """The same in so many steps."""
         N, v = len(self.velocities), self.velocities
-        known = np.concatenate([np.roll(v[:, -1:], 1, axis=0), v], axis=1)
+        rates = np.concatenate([np.roll(v[:, -1:], 1, axis=0), v], axis=1)
         at = (np.arange(count)[:, None] + POINTS) * (N / count)
         step = np.ceil(at - 1e-9).astype(int) - 1
         powers = np.vander((at - step).ravel(), _S + 1, increasing=True).reshape(count, _S, _S + 1)
         weights = powers @ np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
-        return replace(self, velocities=np.einsum("ijl,ijlk->ijk", weights, known[step]))
+        return replace(self, velocities=np.einsum("ijl,ijlk->ijk", weights, rates[step]))
 
     def readings(self, directions: FloatArray) -> FloatArray:
         """What sensors read at 2048 times of a period, shape (2048, k), of directions (k, n)."""
