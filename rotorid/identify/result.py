@@ -203,8 +203,8 @@ class Identification(Answered, Uncertain):
             judgement = "\n".join(map(sentence, self.unidentifiable))
         else:
             n, condition = len(self.parameters), self.estimate.condition_number
-            known = "The parameter is" if n == 1 else f"All {n} parameters are"
-            judgement = f"{known} determined (condition number {condition:.3g})."
+            subject = "The parameter is" if n == 1 else f"All {n} parameters are"
+            judgement = f"{subject} determined (condition number {condition:.3g})."
             judgement = self.prior.judgement(judgement) if self.prior else judgement
         judgement += f" Method: {HEADINGS[self.method]}."
         if self.predicted and np.isfinite(self.residual_rms):

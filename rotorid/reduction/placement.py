@@ -334,10 +334,10 @@ def rank_nodes(
     )
     # best error first, of equal errors the larger MAC, then the lighter; then masses not positive,
     # then nothing determined
-    good, known = np.isfinite(error), np.isfinite(condition)
+    good, determined = np.isfinite(error), np.isfinite(condition)
     keys = np.where(good, (masses.sum(axis=1), -agreement, error), 0.0)
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
-    order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(known, 1, 2))))
+    order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(determined, 1, 2))))
     nodes = np.array(places, dtype=np.int32)[chosen[order]]
     book, note = None, ""
     try:
@@ -356,7 +356,7 @@ def rank_nodes(
         worst_mode=worst[order],
         condition=condition[order],
         ranked=int(good.sum()),
-        unphysical=int((known & ~good).sum()),
+        unphysical=int((determined & ~good).sum()),
         undetermined=int(np.isinf(condition).sum()),
         at_node=int(np.isnan(condition).sum()),
         modes=modes,

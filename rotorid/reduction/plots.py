@@ -213,10 +213,10 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     """
     axes = ax or new_axes((WIDTH, 4.2))
     plain(axes)
-    known = np.concatenate((cost.full_decrement, cost.small_decrement))
-    known = known[np.isfinite(known)]
-    far = 20 * np.median(np.abs(known)) if known.any() else 1.0  # beyond nothing matters
-    low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
+    finite = np.concatenate((cost.full_decrement, cost.small_decrement))
+    finite = finite[np.isfinite(finite)]
+    far = 20 * np.median(np.abs(finite)) if finite.any() else 1.0  # beyond nothing matters
+    low, high = np.clip([finite.min(initial=-1e-9), finite.max(initial=1e-9)], -far, far) * 1.1
     low -= 0.1 * high  # 0 is in sight with room below
     for name, decrement, threshold, style in (
         ("full rotor", cost.full_decrement, cost.full.threshold, FULL),

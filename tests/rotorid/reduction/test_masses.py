@@ -56,16 +56,6 @@ def test_a_true_model_gets_its_masses_back_whatever_is_chosen(seed, n, k, normal
     assert (found.values > 0).all()
 
 
-def test_one_mode_gives_the_same_masses_whatever_is_chosen():
-    book = equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
-    for normalise in NORMALISATIONS:
-        for rows in ("equal", "relative"):
-            other = equivalent_masses(
-                COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1], normalise=normalise, rows=rows
-            ).values
-            np.testing.assert_allclose(other, book, rtol=1e-9)
-
-
 @pytest.mark.parametrize("normalise", NORMALISATIONS)
 @pytest.mark.parametrize("rows", ["equal", "relative"])
 def test_many_models_at_once_are_the_models_one_by_one(normalise, rows):

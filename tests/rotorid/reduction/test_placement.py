@@ -60,7 +60,7 @@ def test_all_triples_of_the_reference_rotor(rotor, triples, monkeypatch):
     np.testing.assert_allclose(again.masses, triples.masses, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("n", "modes"), [(1, 1), (2, 2), (3, 1), (3, 2), (3, 3), (4, 2), (5, 4)])
+@pytest.mark.parametrize(("n", "modes"), [(1, 1), (2, 2), (3, 1), (4, 2), (5, 4)])
 def test_every_choice_is_that_of_the_one_by_one_reduction(rotor, n, modes):
     candidates = (2, 4, 7, 9, 12, 15, 18, 20, 23)
     result = rank_nodes(rotor, n, modes, candidates=candidates)
@@ -133,12 +133,10 @@ def test_a_first_mass_at_a_node_of_a_mode_is_counted_and_not_ranked(beam):
     assert np.isfinite(other.condition).all()
 
 
-def test_badly_conditioned_fits_are_said(rotor):
-    poor, fair = rank_nodes(rotor, 3, 1), rank_nodes(rotor, 3, 2)
-    assert (poor.condition[:10] > 60).any()
-    assert any("badly conditioned" in text for text in poor.warnings)
-    assert (fair.condition[:10] < 30).all()
-    assert not any("badly conditioned" in text for text in fair.warnings)
+def test_badly_conditioned_fits_are_said(rotor, triples):
+    for result, poor in ((rank_nodes(rotor, 3, 1), True), (triples, False)):
+        assert (result.condition[:10] > 60).any() == poor
+        assert any("badly conditioned" in text for text in result.warnings) == poor
 
 
 @pytest.mark.parametrize(
@@ -147,7 +145,6 @@ def test_badly_conditioned_fits_are_said(rotor):
         (1, [1 / 2]),
         (2, [1 / 4, 3 / 4]),
         (3, [1 / 4, 1 / 2, 3 / 4]),
-        (4, [1 / 8, 3 / 8, 5 / 8, 7 / 8]),
         (5, [1 / 6, 1 / 4, 1 / 2, 3 / 4, 5 / 6]),
         (6, [1 / 12, 3 / 12, 5 / 12, 7 / 12, 9 / 12, 11 / 12]),
     ],
@@ -180,38 +177,19 @@ def test_the_books_rule_needs_enough_antinodes(rotor, beam):
     assert rank_nodes(coarse, 5, 2).book is None
 
 
-def test_what_the_plane_at_rest_leaves_out_is_said(lumped):
-    ends = [fem.Support(1, ((1e7, 0.0), (0.0, 3e7))), fem.Support(7, 2e7)]
-    turning = fem.Rotor(lumped.length, 0.05, density=0.0, discs=lumped.discs, supports=ends)
-    result = rank_nodes(turning)
-    assert "plane x of the rotor at rest" in result.warnings[0]
-    np.testing.assert_allclose(result.masses[0], rank_nodes(lumped).masses[0], rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"n": 0}, "number of masses"),
         ({"n": 25}, "24 candidates hold 1 … 24"),
         ({"n": 2, "modes": 3}, "2 masses can use 1 … 2"),
-        ({"modes": 0}, "number of modes"),
         ({"n": 12}, "ways, more than 2000000: give fewer nodes as candidates"),
         ({"candidates": [4, 4, 7]}, "candidates must be different nodes"),
-        ({"candidates": []}, "candidates must be different nodes"),
         ({"candidates": [4, 7, 99]}, "node 99 does not exist"),
         ({"candidates": [4, 7]}, "2 candidates hold 1 … 2"),
-        ({"normalise": "second"}, "normalise"),
-        ({"rows": "heavy"}, "rows"),
         ({"speed": -1.0}, "speed must be"),
     ],
 )
 def test_bad_questions_are_refused(rotor, arguments, message):
     with pytest.raises(ValueError, match=message):
         rank_nodes(rotor, **arguments)
-
-
-def test_a_rotor_that_is_free_or_has_too_few_modes_is_refused(rotor, lumped):
-    with pytest.raises(ValueError, match="support"):
-        rank_nodes(fem.Rotor(rotor.length, rotor.outer_diameter))
-    with pytest.raises(ValueError, match="4 critical speeds cannot be found"):
-        rank_nodes(lumped, 4)
