@@ -12,12 +12,9 @@ from rotorid.cli import _JOBS, _work_of
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
-from rotorid.commands.fit import fit
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.commands.response import ResponseOptions, response
-from rotorid.commands.split import SplitOptions, split
-from rotorid.commands.tolerance import ToleranceOptions, tolerance
 from rotorid.files import read_job
 from rotorid.files.disk import each_file_once
 from rotorid.report.options import changed, checked, plain
@@ -93,7 +90,6 @@ def same(one, other):
 @pytest.mark.parametrize(
     ("work", "text", "values"),
     [
-        (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": ["1=35"]}, {"limit": "1=35"}),
         (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": "1=35"}, {"limit": {"1": "35"}}),
         (
             lambda o: balance(JOB, BalanceOptions(**o)),
@@ -126,13 +122,6 @@ def same(one, other):
             {"modes": 2, "errors": "compliance=2"},
             {"modes": np.int64(2), "errors": ["compliance=2"]},
         ),
-        (lambda o: split("35g@120", SplitOptions(holes=12, taken=o)), "3:10g", {3: 0.01}),
-        (
-            lambda o: tolerance(ToleranceOptions(5, 100.0, 2.5, centre=0.3, planes=o)),
-            "a=100mm,b=600mm",
-            {"a": "100mm", "b": 0.6},
-        ),
-        (lambda o: fit(MODEL, o), [RECORD], str(RECORD)),
     ],
 )
 def test_texts_and_what_they_stand_for_are_the_same(work, text, values):

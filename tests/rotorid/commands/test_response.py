@@ -130,9 +130,6 @@ def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
         for key in ("speed_rad_s", "amplitude", "amplification_factor", "separation_margin_percent"):
             assert one[key] == pytest.approx(other[key], rel=1e-6) if other[key] else one[key] is None, key
     assert len(mine["peaks"]) >= 3
-    made = [tmp_path / name for name in ("p.png", "r.html", "t.csv")]
-    cli("response", small, *how, "--plot", made[0], "--report", made[1], "--output", made[2])
-    assert all(path.stat().st_size > 1000 for path in made)
 
 
 def test_unbalance_of_a_small_model(cli, tmp_path):
