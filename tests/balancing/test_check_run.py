@@ -135,12 +135,10 @@ def test_without_known_errors_there_is_no_verdict():
 # refined coefficients
 
 
-def mounted(trials, W, Y0, weights, *, runs=("check",), noise=0.0, rng=None):
+def mounted(trials, W, Y0, weights, *, runs=("check",)):
     """Check runs with weights (R, P) of a rotor that is linear."""
     T = np.atleast_2d(np.asarray(weights, dtype=complex))
     readings = Y0 + np.einsum("scp,rp->rsc", W, T)
-    if noise:
-        readings = readings * (1 + noise * complex_normal(rng, readings.shape))
     return replace(trials, runs=runs, readings=readings[None], weights=T, warnings=())
 
 
@@ -194,6 +192,10 @@ def test_joined_runs_keep_the_errors_that_were_measured():
 
     joint = with_check_runs(measured(trials, 0.01), measured(check, 0.25))
     assert np.allclose(joint.covariance[0, 0, 0, :, 0, 0], [0.01, 0.01, 0.01, 0.25])
+    own, other = (replace(x, steps=np.full((2, *x.readings.shape), k)) for k, x in enumerate((trials, check)))
+    assert (
+        with_check_runs(own, other).steps[:, 0, :, 0, 0].tolist() == [[0, 0, 0, 1]] * 2
+    )  # their digits, too
     # typed ones have the mean of the others, unless errors are stated
     assert np.allclose(with_check_runs(measured(trials, 0.01), check).covariance[0, 0, 0, 3], 0.01)
     both = (replace(each, errors=ERRORS) for each in (measured(trials, 0.01), check))

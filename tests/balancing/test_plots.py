@@ -64,6 +64,13 @@ def test_angles_are_written_as_the_job_counts_them():
     assert {"↺ rotation", "↻ rotation"} <= set(same) | set(behind)
 
 
+@pytest.mark.parametrize(("angles", "direction"), [("with rotation", 1), ("against rotation", -1)])
+def test_angles_of_the_weights_run_as_the_job_counts_them(angles, direction):
+    labels = Labels("um_pp", 1e6, "g", 1e3, "lag", angles)
+    figure = correction_figure(correct(estimate_influence(bruel_kjaer(labels=labels))))
+    assert figure.axes[0].get_theta_direction() == direction
+
+
 def test_limits_arcs_and_many_readings():
     rng = np.random.default_rng(2)
     trials, _, _ = synthetic(rng, planes=3, sensors=9, speeds=14, errors=ReadingErrors(0.02, 0.02))

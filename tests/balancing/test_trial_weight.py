@@ -6,6 +6,7 @@ from math import degrees, pi, radians
 import numpy as np
 import pytest
 from balancing_data import stored
+from cases import each_of
 from fem_rotors import rotor23
 
 from balancing import Labels
@@ -76,6 +77,7 @@ def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(quantity, eta):
     [
         ({"where": "below"}, 45, 45),
         ({"where": "at"}, 90, 0),
+        ({"where": "above"}, 135, 45),
         ({"degrees": 37}, 37, None),
         # tan = 2·0.05·0.5 / (1 − 0.25), somewhere between 0 and 90°
         ({"ratio": 0.5}, degrees(np.arctan(0.05 / 0.75)), 90 - degrees(np.arctan(0.05 / 0.75))),
@@ -143,6 +145,18 @@ def test_a_trial_radius_of_its_own():
     assert outside.expected == pytest.approx(usual.expected)
     with pytest.raises(ValueError, match=r"5 g is larger .* 4.8 g"):
         trial_from_coefficients(W, "left", amount=0.005, limit=0.006, radius=0.2, trial_radius=0.25)
+
+
+@each_of(
+    ("options", "words"),
+    [
+        ({"amount": 1e-3}, "changes no reading by 30 % or 30°"),
+        ({"amount": 0.1}, "would read more than the largest reading"),
+        ({"radius": 0.2, "load": 100.0}, "% of the load, more than 25 %"),
+    ],
+)
+def test_weights_too_small_or_too_large_are_named(options, words):
+    assert words in trial_from_coefficients(influence(COEFFICIENTS), "left", **options).warnings[0]
 
 
 def test_limit_cuts_what_follows_from_the_share_and_refuses_what_is_stated():

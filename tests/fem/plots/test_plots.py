@@ -6,11 +6,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from documents import check_hygiene
+from fem_rotors import rotor23
 
 import fem
 from fem import Peak, Peaks, Window, draw_rotor
 from fem.plots.campbell import campbell_figure, draw_speed_map
-from fem.plots.response import bode_figure, draw_orbits, draw_polar
+from fem.plots.response import bode_figure, draw_orbits, draw_polar, influence_figure
 from rotorid.base.text import RPM
 from rotorid.plots import plot
 
@@ -196,6 +197,19 @@ def test_the_phase_is_a_lag_within_a_turn(turns):
     lag = np.radians(np.linspace(-20.0, -170.0, 100)) + 2 * np.pi * turns
     phase = bode_figure(readings_of(speeds, np.exp(1j * lag)), ["A"]).axes[1].get_lines()[0].get_ydata()
     np.testing.assert_allclose(phase, np.linspace(-20.0, -170.0, 100), atol=1e-9)
+
+
+def test_influence_has_a_row_for_each_sensor_with_size_and_phase():
+    rotor = rotor23(2e4)
+    W = fem.influence(rotor, [7, 12], [2, 22], np.linspace(50, 700, 40))
+    figure = influence_figure(W, rotor)
+    for c, (size, phase) in enumerate(zip(figure.axes[1::2], figure.axes[2::2], strict=True)):
+        assert size.get_ylabel().startswith(f"sensor {(2, 22)[c]}")
+        for p in (0, 1):
+            drawn, lag = (np.asarray(ax.get_lines()[p].get_ydata()) for ax in (size, phase))
+            steady = ~np.isnan(drawn)
+            found = drawn[steady] * np.exp(1j * np.radians(lag[steady]))
+            np.testing.assert_allclose(found, W.W[steady, c, p], rtol=1e-9)
 
 
 def test_a_speed_map_is_in_rpm_with_its_band():

@@ -1,5 +1,7 @@
 """Numbers from data of a known truth: exact data give them back, noise as stated their errors."""
 
+import functools
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +14,7 @@ from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.commands.calibrate import outcome
+from rotorid.regression import nonlinear
 
 ERRORS = ReadingErrors(0.02, 0.02)
 
@@ -217,6 +220,17 @@ def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     with_prior = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
     assert with_prior.values == pytest.approx([4e7, 1e8], rel=1e-4)
     assert with_prior.std[1] == pytest.approx(1e6, rel=1e-3)
+
+
+def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
+    once = functools.partial(nonlinear.nonlinear_least_squares, max_iterations=1)
+    monkeypatch.setattr(sys.modules[calibrate.__module__], "nonlinear_least_squares", once)
+    monkeypatch.setattr(nonlinear, "POLISH", 0)
+    data = Runs().data(Runs().readings(machine()), errors=ERRORS)
+    found = calibrate(machine(), [Unknown("bearing[1].kxx", start=1e7)], [data], side_starts=False)
+    assert np.isnan(found.std).all()
+    assert found.undetermined == found.warnings[0]
+    assert found.rotor.calibration.needs_trial_run
 
 
 @pytest.mark.parametrize(

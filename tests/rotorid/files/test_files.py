@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
+from pump_job import assert_same
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
-from rotorid.files import InputError, TableWarning, read_trials
+from rotorid.files import InputError, TableWarning, read_job, read_trials
 
 
 @pytest.fixture
@@ -19,12 +19,6 @@ def weights(tmp_path):
 @pytest.fixture
 def plain(tmp_path, weights):
     return read_trials(write_csv(tmp_path / "plain.csv", RUNS), weights)
-
-
-def assert_same(a, b):
-    assert (a.runs, a.sensors, a.planes, a.labels) == (b.runs, b.sensors, b.planes, b.labels)
-    for name in ("speeds", "readings", "weights"):
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
 COMMA = csv_text(RUNS)
@@ -151,3 +145,12 @@ def test_one_wrong_heading_is_one_message(tmp_path, weights, column, new):
     with pytest.raises(InputError) as caught:
         read_trials(path, weights)
     assert str(caught.value).count("\n") == 0
+
+
+def test_control_characters_in_the_name_of_a_file(tmp_path, weights):
+    job = tmp_path / "job.toml"
+    job.write_text('runs = ".\\runs.csv"\nweights = "weights.csv"\n', encoding="utf-8")
+    problem = the_only(complaints(read_job, job), "job.toml", None, "runs", ".\runs.csv", "single quotes")
+    assert "\r" not in str(problem)
+    [problem] = complaints(read_trials, "no\x1b[31m.csv", weights)
+    assert str(problem).startswith("no\\x1b[31m.csv: expected a file that exists")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal, synthetic
 from cases import each_of
-from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
+from tables_data import RUNS, complaints, replaced, the_only, write_csv
 
 from balancing import (
     Labels,
@@ -58,27 +58,27 @@ def test_meaning(stored):
 
 
 @each_of("suffix, phase, angles", [(".csv", "lag", "against rotation"), (".xlsx", "lag", "with rotation")])
-def test_a_table_comes_back_with_one_standard_deviation(tmp_path, suffix, phase, angles):
+def test_a_table_comes_back_with_one_standard_deviation(tmp_path, folder, suffix, phase, angles):
     """Its own phase counts, whatever the job says."""
-    files = write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
+    files = folder / "runs.csv", folder / "weights.csv"
     influence = estimate_influence(read_trials(*files, phase=phase, angles=angles, errors=ERRORS))
     again = round_trip(tmp_path / f"influence{suffix}", influence, angles=angles)
     for stated in (again, read_influence(tmp_path / f"influence{suffix}", phase="lead", angles=angles)):
         np.testing.assert_allclose(stated.W, influence.W, rtol=1e-13)
-    for name in ("sensors", "planes", "labels"):
-        assert getattr(again, name) == getattr(influence, name)
+    assert (again.sensors, again.planes) == (influence.sensors, influence.planes)
+    assert again.labels == influence.labels
     both = (np.einsum("scii->sci", each.channels())[..., 2:] for each in (again, influence))
     new, old = (each.reshape(*influence.W.shape, 2) for each in both)
     np.testing.assert_allclose(new[..., 0], new[..., 1])
     np.testing.assert_allclose(new.mean(axis=-1), old.mean(axis=-1), rtol=1e-12)
 
 
-def test_balance_writes_measured_coefficients_for_people_and_without_loss(tmp_path, cli):
-    runs, weights = write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
+def test_balance_writes_measured_coefficients_for_people_and_without_loss(folder, cli):
+    runs, weights = folder / "runs.csv", folder / "weights.csv"
     influence = estimate_influence(read_trials(runs, weights))
     for name in ("fan influence.csv", "w.json"):
-        assert cli("balance", runs, weights, "--output", tmp_path / name).code == 0
-        np.testing.assert_allclose(read_influence(tmp_path / name).W, influence.W, rtol=1e-13)
+        assert cli("balance", runs, weights, "--output", folder / name).code == 0
+        np.testing.assert_allclose(read_influence(folder / name).W, influence.W, rtol=1e-13)
 
 
 @each_of(
@@ -211,3 +211,21 @@ def test_bad_json_is_one_message(tmp_path, change, words):
     change(document)
     path.write_text(json.dumps(document))
     assert words in complaints(read_influence, path)[0].expected
+
+
+def test_stored_conventions_hold_for_the_readings_unless_others_are_stated(folder):
+    trials = read_trials(folder / "runs.csv", folder / "weights.csv", phase="lag", angles="against rotation")
+    write_influence(folder / "influence.json", estimate_influence(trials))
+    expected = correct(estimate_influence(trials)).weights
+    turned = [RUNS[0], *([*row[:4], 360 - row[4]] for row in RUNS[1:3])]
+    for phase, runs, words in (
+        (None, RUNS[:3], "nothing states the conventions of the readings"),
+        ("lag", RUNS[:3], ""),
+        ("lead", turned, "the readings are taken with phase = lead, as stated"),
+    ):
+        now = write_csv(folder / "now.csv", runs)
+        read = job_from_files([now], influence=folder / "influence.json", phase=phase)
+        c = correct(read.influence, read.trials)
+        np.testing.assert_allclose(c.weights, expected, rtol=1e-9)
+        assert c.to_dict()["conventions"]["angles"] == "against rotation"
+        assert any(words in w for w in c.warnings) or not words

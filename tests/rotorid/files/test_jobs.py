@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
+from pump_job import assert_same
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
 from balancing import estimate_influence
@@ -44,13 +45,6 @@ def book(tmp_path):
     return read
 
 
-def same(a, b):
-    for name in ("runs", "sensors", "planes", "labels", "errors"):
-        assert getattr(a, name) == getattr(b, name)
-    for name in ("speeds", "readings", "weights"):
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
-
-
 def test_a_job_file_and_a_workbook_that_say_the_same(job, book, folder):
     read = job(LINES)
     trials, errors = read.trials, read.trials.errors
@@ -60,7 +54,9 @@ def test_a_job_file_and_a_workbook_that_say_the_same(job, book, folder):
     assert read.files == tuple(folder / name for name in ("job.toml", "runs.csv", "weights.csv"))
     plain = read_trials(folder / "runs.csv", folder / "weights.csv")
     np.testing.assert_array_equal(trials.readings, plain.readings.conj())
-    same(book(sensors=[["sensor"]], Sheet1=[], Notes=[["anything"]]).trials, trials)
+    sheets = book(sensors=[["sensor"]], Sheet1=[], Notes=[["anything"]]).trials
+    assert_same(sheets, trials)
+    assert sheets.errors == trials.errors
 
 
 def test_arguments_replace_what_the_job_says(job, folder):

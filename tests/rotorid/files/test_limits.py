@@ -12,23 +12,15 @@ from tables_data import RUNS, WEIGHTS, complaints, write_book
 from rotorid.files import (
     excel_workbook,
     read_harmonic_model,
+    read_job,
     read_ode_model,
     read_rotor,
 )
-from rotorid.files.excel_workbook import read_workbook
-from rotorid.files.problems import Problems
 
 
 @pytest.fixture
 def book(tmp_path):
     return write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": WEIGHTS})
-
-
-def words(path):
-    problems = Problems()
-    assert read_workbook(path, problems) is None
-    (problem,) = problems
-    return problem.expected
 
 
 @pytest.mark.parametrize(
@@ -40,7 +32,7 @@ def words(path):
 )
 def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
     monkeypatch.setattr(excel_workbook, limit, value)
-    assert expected in words(book)
+    assert expected in complaints(read_job, book)[0].expected
 
 
 def test_a_bomb_is_not_unpacked(book, monkeypatch):
@@ -50,7 +42,7 @@ def test_a_bomb_is_not_unpacked(book, monkeypatch):
     book.write_bytes(stream.getvalue())
     monkeypatch.setattr(excel_workbook, "MOST_UNPACKED", 500_000)
     monkeypatch.setattr(openpyxl, "load_workbook", lambda *_, **__: pytest.fail("read"))
-    assert "this one has 1 MB" in words(book)
+    assert "this one has 1 MB" in complaints(read_job, book)[0].expected
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")

@@ -8,8 +8,8 @@ from cases import each_of
 from scipy.io import savemat, wavfile
 from waveform_files import RATE, SUFFIXES, drawn, write
 
+from rotorid.files import InputError
 from rotorid.files.instruments import read_samples
-from rotorid.files.problems import InputError
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

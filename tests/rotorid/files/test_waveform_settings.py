@@ -1,15 +1,18 @@
 """A waveforms file or options: runs, channels with units and scales, conventions, refusals."""
 
 import math
+import shutil
 
 import numpy as np
 import pytest
 from cases import each_of
+from tables_data import complaints
 from waveform_files import RATE, drawn, write
 
 from balancing import Labels
-from rotorid.files.problems import InputError
+from rotorid.files import InputError, read_job
 from rotorid.files.waveforms import read_waveforms
+from rotorid.samples import sample_data
 from rotorid.waveforms.record import SignalPath, TachoSettings
 
 FILE = """
@@ -149,3 +152,12 @@ def test_several_files(folder):
     assert "one waveforms file alone" in complaint([settings(folder), folder / "base.npz"], wishes)
     write(folder / "base.csv")
     assert "records of different names" in complaint([folder / "base.npz", folder / "base.csv"], wishes)
+
+
+def test_a_run_up_in_a_job_wants_speeds(tmp_path):
+    shutil.copytree(sample_data() / "waveforms", tmp_path, dirs_exist_ok=True)
+    slow = tmp_path / "slow_roll.toml"
+    slow.write_text(slow.read_text().replace("speeds_rpm = [620]\n", ""))
+    [problem] = complaints(read_job, tmp_path / "job.toml")
+    assert problem.column == "speeds_rpm"
+    assert "speeds at which 'slow' are read, whose speed is not steady" in problem.expected
