@@ -47,8 +47,8 @@ LONG, THINNED = 60, 13
 """Rows of a table that a page shows whole, and of a longer one so many."""
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """Date of a part of an archive."""
-NOTHING = "\N{EN DASH}"
-"""In HTML, where nothing is known."""
+NOTHING, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+"""In HTML, where nothing is known, and before negative numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,44 +242,36 @@ def html(table: Table, longest: int = LONG) -> Markup:
 
     Of one that is longer some rows, evenly spread.
     """
-    from markupsafe import Markup
+    from markupsafe import Markup, escape
 
     count = len(table.columns[0].values)
     rows: Sequence[int] = range(count)
     if count > longest:
         rows = [round(i * (count - 1) / (THINNED - 1)) for i in range(THINNED)]
-    heads, cells, letters = [], [], 0
+    heads, cells, letters = "", [], 0
     for column in table.columns:
-        kind, texts = {} if column.words else {"class": "n"}, column.texts
+        heading, texts, kind = escape(column.heading), column.texts, "" if column.words else ' class="n"'
         letters += max(map(len, (column.heading, *texts)))
-        heads.append(_tag("th", column.heading, kind))
-        kind |= {"data-label": column.heading}
-        cells.append([_tag("td", _number(column, row, texts[row] or NOTHING), kind) for row in rows])
-    body = Markup("\n").join(_tag("tr", Markup("").join(row)) for row in zip(*cells, strict=True))
-    head = _tag("thead", _tag("tr", Markup("").join(heads)))
-    caption = _tag("caption", table.name) + "\n" if table.name else ""
-    inner = Markup("\n{}{}\n<tbody>\n{}\n</tbody>\n").format(caption, head, body)
-    wide = {"class": "blocks"} if len(heads) > NARROW or letters > LETTERS else {}
+        heads += f"<th{kind}>{heading}</th>"
+        shown = (_number(column, row, escape(texts[row] or NOTHING)) for row in rows)
+        cells.append([f'<td{kind} data-label="{heading}">{each}</td>' for each in shown])
+    body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in zip(*cells, strict=True))
+    caption = f"<caption>{escape(table.name)}</caption>\n" if table.name else ""
+    wide = ' class="blocks"' if len(cells) > NARROW or letters > LETTERS else ""
     thinned = f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""
     words = " ".join(filter(None, (table.note, thinned)))
-    return _tag("table", inner, wide) + ("\n" + _tag("p", words, {"class": "note"}) if words else "")
-
-
-def _tag(name: str, content: str, attributes: Mapping[str, str] | None = None) -> Markup:
-    from markupsafe import Markup
-
-    each = Markup("").join(Markup(' {}="{}"').format(*pair) for pair in (attributes or {}).items())
-    return Markup("<{0}{1}>{2}</{0}>").format(name, each, content)
+    note = f'\n<p class="note">{escape(words)}</p>' if words else ""
+    return Markup(
+        f"<table{wide}>\n{caption}<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>{note}"
+    )
 
 
 def _number(column: Column, row: int, text: str) -> str:
-    """A cell; a number with its place in the document."""
-    if column.words:
-        return text
-    text = text.replace("-", "\N{MINUS SIGN}")
-    scale = {} if column.scale == 1.0 else {"data-scale": repr(column.scale)}
-    key = column.key.replace("*", str(row))
-    return _tag("span", text, {"data-key": key, **scale}) if key else text
+    """A cell of HTML; a number with its place in the document."""
+    if column.words or not column.key:
+        return text if column.words else text.replace("-", MINUS)
+    scale = "" if column.scale == 1.0 else f' data-scale="{column.scale!r}"'
+    return f'<span data-key="{column.key.replace("*", str(row))}"{scale}>{text.replace("-", MINUS)}</span>'
 
 
 def csv_bytes(names: Sequence[str], rows: Sequence[Sequence[Value]], note: str = "") -> bytes:
