@@ -185,10 +185,9 @@ def read_study(path: str | Path) -> Study:
     nodes = tuple(node(keys, "unbalance", place) for place in keys.unbalance)
     scatter = _scatter(keys, rotor, problems)
     problems.stop()
-    limits, speeds, readings = [], np.array(keys.speeds), keys.readings
-    for sensor in keys.sensors.values():
-        per_metre = 1j * speeds if sensor.limit.unit.kind == "velocity" else 1.0 + 0 * speeds
-        limits.append(per_metre / sensor.limit.si)
+    limits = [sensor.limit for sensor in keys.sensors.values()]
+    velocity = [limit.unit.kind == "velocity" for limit in limits]
+    speeds, readings = np.array(keys.speeds), keys.readings
     sizes = (
         readings.amplitude_percent / 100,
         float(np.radians(readings.phase_deg)),
@@ -203,7 +202,7 @@ def read_study(path: str | Path) -> Study:
         speeds,
         planes,
         {name: Sensor(place, keys.sensors[name].angle_deg) for name, place in places.items()},
-        np.stack(limits, axis=-1),
+        np.where(velocity, 1j * speeds[:, None], 1.0 + 0j) / np.array([limit.si for limit in limits]),
         nodes,
         np.array([drawn.rms for drawn in keys.unbalance.values()]) / np.sqrt(2),
         scatter,

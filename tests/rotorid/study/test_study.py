@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from repetitions import FULL
 from scipy.stats import binomtest
-from studies.drawn import SCATTER, STUDY, write
+from studies.drawn import SCATTER, STUDY, TWO, write
 
 import fem
 from rotorid import read_rotor
@@ -16,13 +16,6 @@ from rotorid.study import StudyOptions, study
 from rotorid.study.study_file import UNDETERMINED, UNSTABLE, read_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
-
-TWO = STUDY.replace(
-    "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
-).replace(
-    "[unbalance.3]",
-    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nrms_g_mm = 360\n[unbalance.4]",
-)
 
 
 def run(file, **options):
