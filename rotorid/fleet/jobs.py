@@ -88,24 +88,14 @@ def _read_job(file: Path, path: str, machine_type: str) -> list[pd.DataFrame]:
         measured = estimate_influence(job.trials)
     labels, keys, W = job.trials.labels, job.settings, measured.W
     s, c, p = np.indices(W.shape).reshape(3, -1)
-    rows = {
-        "job": path,
-        "machine": machine_of(job),
-        "machine_type": keys.machine_type or machine_type,
-        "date": str(keys.date or ""),
-        "quantity": quantity_of(labels),
-        "vibration_unit": labels.vibration_unit,
-        "weight_unit": labels.weight_unit,
-        "runs": runs_of(job),
-        "sensor": [measured.sensors[k] for k in c],
-        "plane": [measured.planes[k] for k in p],
-        "mounted": [mounted_in(job, measured.planes[k]) for k in p],
-        "speed_rad_s": measured.speeds[s],
-        "re": W.real.ravel(),
-        "im": W.imag.ravel(),
-        "std": known_errors(measured).ravel(),
-    }
-    return [pd.DataFrame(rows)]
+    planes = [measured.planes[k] for k in p]
+    values = (
+        *(path, machine_of(job), keys.machine_type or machine_type, str(keys.date or "")),
+        *(quantity_of(labels), labels.vibration_unit, labels.weight_unit, runs_of(job)),
+        *([measured.sensors[k] for k in c], planes, [mounted_in(job, plane) for plane in planes]),
+        *(measured.speeds[s], W.real.ravel(), W.imag.ravel(), known_errors(measured).ravel()),
+    )
+    return [pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))]
 
 
 def known_errors(measured: Influence) -> FloatArray:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -103,8 +103,7 @@ class Grid(NamedTuple):
     mounted: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class MachineType:
+class MachineType(NamedTuple):
     """Coefficients of a type of machines.
 
     Attributes
@@ -137,7 +136,7 @@ class MachineType:
     limit: float
     notes: tuple[str, ...]
     name: str = ""
-    labels: Labels = field(default_factory=Labels)
+    labels: Labels = Labels()
     left_out: int = 0
 
     @property
@@ -167,26 +166,28 @@ class MachineType:
 
     def why_odd(self, record: MachineRecord) -> str:
         """What would make a record fit the type best, in words; "" where nothing tried does."""
-        W, share = record.W, self.mean / np.abs(self.mean) ** 2
+        W, std, share = record.W, record.std, self.mean / np.abs(self.mean) ** 2
+
+        def far(W: ComplexArray, std: FloatArray, chosen: int = 0) -> float:
+            """Squared distance, more for numbers that were chosen."""
+            return self.effects.distance(*_rows(W, std, self.turn)) + _CHOSEN * chosen
+
         lag = W.conj() * np.exp(1j * np.angle(np.sum(W * share, axis=(0, 1))))
         theta = np.angle(np.sum(W.conj() * share))
         degrees = round(np.degrees(theta))
         mark = f"{'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
-        changes = [
-            (f"its phases {mark}", W * np.exp(1j * theta), record.std, 1),
-            ("its phases were of the other sense (lag for lead)", lag, record.std, len(self.planes)),
-        ]
+        reasons = {
+            "": far(W, std),
+            f"its phases {mark}": far(W * np.exp(1j * theta), std, 1),
+            "its phases were of the other sense (lag for lead)": far(lag, std, len(self.planes)),
+        }
         for a, b in combinations(range(len(self.sensors)), 2):
             order = np.arange(len(self.sensors))
             order[[a, b]] = b, a
             words = f"its sensors {self.sensors[a]} and {self.sensors[b]} were exchanged"
-            changes.append((words, W[:, order], record.std[:, order], 0))
-        least, reason = min((self._distance(*each) + _CHOSEN * n, words) for words, *each, n in changes)
-        return reason if least <= min(self.limit, self._distance(W, record.std)) else ""
-
-    def _distance(self, W: ComplexArray, std: FloatArray) -> float:
-        """Squared distance of coefficients measured in one job, to be compared with `limit`."""
-        return self.effects.distance(*_rows(W, std, self.turn))
+            reasons[words] = far(W[:, order], std[:, order])
+        reason = min(reasons, key=reasons.__getitem__)
+        return reason if reasons[reason] <= self.limit else ""
 
 
 def _doubt(effects: RandomEffects) -> FloatArray:
@@ -296,7 +297,7 @@ def type_of_fleet(
         notes = (f"{counted(left_out, 'job')} of {name} {words}", *notes)
     read, mounted = long[["vibration_unit", "weight_unit"]].iloc[0]
     labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
-    return replace(kind, name=name, labels=labels, left_out=left_out, notes=notes)
+    return kind._replace(name=name, labels=labels, left_out=left_out, notes=notes)
 
 
 def _usual(cells: pd.DataFrame) -> Grid:
@@ -307,8 +308,7 @@ def _usual(cells: pd.DataFrame) -> Grid:
     return Grid(np.unique(part["speed_rad_s"]), sensors, part["quantity"].iloc[0], *mounted)
 
 
-@dataclass(frozen=True, eq=False)
-class TypeKnowledge:
+class TypeKnowledge(NamedTuple):
     """What a type says of a machine.
 
     `influence` has what the job's own runs have added, `files` are those of the job and the table of the
@@ -328,8 +328,8 @@ class TypeKnowledge:
         """A correction that is not to be mounted where the machine is not of its type."""
         if self.probability >= LEVEL:
             return result
-        rare = f"{self.probability:.1g}" if self.probability > 1e-12 else "below 1e-12"
-        cause = f"by its runs this machine is not of the type {self.kind.name!r} (χ², probability {rare})"
+        cause = f"by its runs this machine is not of the type {self.kind.name!r} (χ², probability "
+        cause += f"{self.probability:.1g})"
         cause += f"; it would fit if {self.reason}" if self.reason else ""
         instead = ("Instead: balance it without --type.",)
         decision = replace(result.decision, word="do not mount", cause=cause, instead=instead)

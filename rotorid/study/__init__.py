@@ -77,8 +77,8 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
 
     from rotorid.files.disk import sha256
     from rotorid.fleet.jobs import arrow
-    from rotorid.study.samples import draw_all, draw_machine, nominal
-    from rotorid.study.study_file import read_study
+    from rotorid.study.samples import draw_all
+    from rotorid.study.study_file import draw_machine, nominal, read_study
 
     options = options or StudyOptions()
     read = read_study(file_of(file, "a study file"))
@@ -121,11 +121,8 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         good, count = int((held == 1).sum()), len(held)  # unknown where there is no region
         coverage[name] = {"held": good, "corrections": count}
         if count:
-            low, high = (f"{100 * end:.1f}" for end in binomtest(good, count).proportion_ci())
-            notes.append(
-                f"first corrections with {'a' if warned else 'no'} warning: {good} of {count} of the 95 % "
-                f"regions hold the true one ({low} to {high} %)"
-            )
+            words = f"first corrections with {'a' if warned else 'no'} warning: {good} of {count}"
+            notes.append(f"{words} of the 95 % regions hold the true one")
     return Outcome(
         result=frame,
         sentences=(f"{head}, of {counted(n, 'drawn machine')}.",),

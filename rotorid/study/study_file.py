@@ -1,18 +1,30 @@
-"""Study files (.toml): what is drawn of a machine, what it is read with, and the limit that it is to meet."""
+"""Study files (.toml): what is drawn of a machine, what it is read with, and the limit that it is to meet.
+
+A machine is drawn, read as built, and balanced until its readings meet the limit. The first runs are the bare
+rotor and a trial in each plane; each check run joins them in the next fit, as in `balancing.refine`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from balancing import ReadingErrors, RunScatter
-from fem import Sensor
-from fem.parameters import expand, numbers_of, parameter_value
+from balancing import (
+    ReadingErrors,
+    RunScatter,
+    Trials,
+    UndeterminedError,
+    correct,
+    estimate_influence,
+)
+from fem import InfluenceCoefficients, Rotor, Sensor, influence
+from fem.parameters import expand, numbers_of, parameter_value, with_parameters
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.files import units
 from rotorid.files.problems import Problems
 from rotorid.files.rotor import read_rotor, rotor_files
@@ -32,11 +44,10 @@ from rotorid.files.settings import (
 )
 from rotorid.files.units import Quantity
 
-if TYPE_CHECKING:
-    from fem import Rotor
-    from rotorid.base.arrays import ComplexArray, FloatArray
-
-_SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale" = 20'
+TRIAL = 0.5
+"""By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
+UNDETERMINED = "the readings do not determine a correction"
+UNSTABLE = "the drawn rotor is unstable, and has no steady response"
 _NODE = "the node, a number from 1, or a station"
 Node = Whole | Text
 Percent = Annotated[NotNegative, Field(le=100)]
@@ -99,7 +110,7 @@ class StudyKeys(Settings):
     sensors: dict[str, SensorKeys] = key("sensors with their limits", min_length=1)
     unbalance: dict[str, UnbalanceKeys] = key("drawn unbalance, by node or station", min_length=1)
     scatter: by_name(NotNegative) = key(  # type: ignore[valid-type]
-        f"log-normal, {_SCATTER}", default={}, example='"bearing[*].stiffness.scale" = 20'
+        "log-normal, percent by number of the rotor", default={}, example='"bearing[*].stiffness" = 20'
     )
     readings: ReadingKeys = key("errors of readings, which are stated, too", default=ReadingKeys())
 
@@ -111,8 +122,7 @@ class StudyKeys(Settings):
             yield "speeds", "each speed once"
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
+class Study(NamedTuple):
     """What is drawn of a machine, in SI; readings are in shares of their limits.
 
     Attributes
@@ -175,10 +185,9 @@ def read_study(path: str | Path) -> Study:
     nodes = tuple(node(keys, "unbalance", place) for place in keys.unbalance)
     scatter = _scatter(keys, rotor, problems)
     problems.stop()
-    limits, speeds, readings = [], np.array(keys.speeds), keys.readings
-    for sensor in keys.sensors.values():
-        per_metre = 1j * speeds if sensor.limit.unit.kind == "velocity" else 1.0 + 0 * speeds
-        limits.append(per_metre / sensor.limit.si)
+    limits = [sensor.limit for sensor in keys.sensors.values()]
+    velocity = [limit.unit.kind == "velocity" for limit in limits]
+    speeds, readings = np.array(keys.speeds), keys.readings
     sizes = (
         readings.amplitude_percent / 100,
         float(np.radians(readings.phase_deg)),
@@ -193,7 +202,7 @@ def read_study(path: str | Path) -> Study:
         speeds,
         planes,
         {name: Sensor(place, keys.sensors[name].angle_deg) for name, place in places.items()},
-        np.stack(limits, axis=-1),
+        np.where(velocity, 1j * speeds[:, None], 1.0 + 0j) / np.array([limit.si for limit in limits]),
         nodes,
         np.array([drawn.rms for drawn in keys.unbalance.values()]) / np.sqrt(2),
         scatter,
@@ -220,3 +229,79 @@ def _scatter(keys: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tup
         except ValueError as error:
             keys.complain(problems, "scatter", f"numbers of the rotor: {error}")
     return scatter
+
+
+def nominal(study: Study) -> InfluenceCoefficients:
+    """Coefficients (S, C, P + U) of the rotor as its file has it; refuses an unstable one."""
+    model = _influence(study, study.rotor)
+    if model.windows:
+        raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
+    return model
+
+
+def _influence(study: Study, rotor: Rotor) -> InfluenceCoefficients:
+    """Of unbalance in the planes and at the drawn nodes, in shares of the limits."""
+    places = [*study.planes.values(), *study.nodes]
+    model = influence(rotor, places, list(study.sensors.values()), study.speeds)
+    return replace(model, W=model.W * study.gains[..., None])
+
+
+def draw_machine(study: Study, W: ComplexArray, rng: np.random.Generator) -> dict[str, Any]:
+    """Largest readings over the limit, as built and after each correction; `runs_needed` to meet it.
+
+    `W` is that of `nominal`. `held`: the 95 % region of the first weights holds the true ones, those of the
+    same weighing of readings without errors; `warned`: this correction had a warning.
+    """
+    P, stated = len(study.planes), (study.errors, study.run_errors)
+    trial = TRIAL / np.abs(W[..., :P]).max(axis=(0, 1))
+    normal = rng.standard_normal(len(study.scatter))
+    unbalance = study.unbalance * _normal(rng, len(study.nodes))
+    if study.scatter:
+        each = zip(normal, study.scatter.items(), strict=True)
+        values = {path: value * float(np.exp(spread * x)) for x, (path, (value, spread)) in each}
+        model = _influence(study, with_parameters(study.rotor, values))
+        if model.windows:
+            return {"why": UNSTABLE}
+        W = model.W
+    W, bare = W[..., :P], W[..., P:] @ unbalance
+    row, mounted, readings = dict[str, Any](), [np.zeros(P, complex)], list[ComplexArray]()
+    for k in range(study.corrections + 1):
+        readings.append(_read_sensors(study, bare + W @ mounted[-1], rng))
+        row[f"ratio_{k}"] = ratio = float(np.abs(readings[-1]).max())
+        if ratio <= 1:
+            return row | {"runs_needed": len(readings)}
+        if k == study.corrections:
+            break
+        if k == 0:
+            mounted += [*np.diag(ratio * trial)]
+            readings += [_read_sensors(study, bare + W @ weights, rng) for weights in mounted[1:]]
+        runs, names = tuple(map(str, range(len(readings)))), (tuple(study.sensors), tuple(study.planes))
+        trials = Trials(runs, study.speeds, *names, np.array(readings), np.array(mounted))
+        try:
+            estimate = estimate_influence(replace(trials, errors=study.errors, run_errors=study.run_errors))
+            correction = correct(estimate)
+            if k == 0 and any(stated):
+                true = correct(replace(estimate, W=W, baseline=bare)).weights
+                held = bool(correction.region().holds(true)) if correction.region_known else None
+                row |= {"held": held, "warned": bool(correction.warnings)}
+        except UndeterminedError:
+            return row | {"why": UNDETERMINED}
+        mounted.append(correction.weights)
+    return row
+
+
+def _read_sensors(study: Study, Y: ComplexArray, rng: np.random.Generator) -> ComplexArray:
+    """What the sensors of a run say of (S, C), with the errors of the run and of the readings."""
+    if study.run_errors:
+        common, single = _normal(rng), _normal(rng, *Y.shape)
+        Y = Y * (1 + study.run_errors.relative * (common + single) / np.sqrt(2))
+    if study.errors:
+        a, b = rng.standard_normal((2, *Y.shape))
+        Y = Y * (1 + study.errors.amplitude * a) * np.exp(1j * study.errors.phase * b)
+        Y = Y + study.errors.floor * _normal(rng, *Y.shape)
+    return Y
+
+
+def _normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
+    """Complex, of variance 1 in each direction."""
+    return np.asarray(rng.standard_normal(shape) + 1j * rng.standard_normal(shape))

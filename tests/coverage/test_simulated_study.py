@@ -4,16 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 from repetitions import FULL
 from scipy.stats import binomtest
-from studies.drawn import STUDY, write
+from studies.drawn import TWO, write
 
 from rotorid.study import StudyOptions, study
-
-TWO = STUDY.replace(
-    "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
-).replace(
-    "[unbalance.3]",
-    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nrms_g_mm = 360\n[unbalance.4]",
-)
 
 
 def run(file, **options):

@@ -23,6 +23,12 @@ limit_um_pp = 20
 [unbalance.3]
 rms_g_mm = 500
 """
+TWO = STUDY.replace(
+    "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
+).replace(
+    "[unbalance.3]",
+    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nrms_g_mm = 360\n[unbalance.4]",
+)
 SCATTER = """
 [scatter]
 "bearing[*].stiffness" = 20

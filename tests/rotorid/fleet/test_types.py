@@ -12,7 +12,6 @@ from rotorid.files import read_job
 from rotorid.fleet import FleetFitOptions, fleet_fit
 from rotorid.fleet.jobs import read_fleet
 from rotorid.fleet.machine_type import type_coefficients
-from rotorid.samples import sample_data
 
 pytest.importorskip("pyarrow", reason="without the extra rotorid[fleet]")
 SPEED, SENSORS, PLANES = 1490.0, ("S1", "S2"), ("L", "R")
@@ -112,8 +111,6 @@ def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
     assert np.linalg.norm(left) < 0.4 * np.linalg.norm(machine.W @ machine.D)
     assert (answer.result.planes, answer.result.labels.weight_unit) == (PLANES, "g")
     assert answer.to_dict()["of_type"]["machines"] == 25
-    assert answer.result.covariance is not None
-    assert "coefficients of the type 'fan', 25 machines" in " ".join(answer.result.notes)
 
 
 def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
@@ -133,8 +130,6 @@ def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
         np.trace(one.influence.channels()[..., 2:, 2:], axis1=2, axis2=3).sum() for one in (first, other)
     )
     assert near < 0.3 * far
-    W = machines[2].W * 1e-6 / 2 / 1e-3
-    assert np.abs(first.influence.W[0] - W).max() < 0.1 * np.abs(W).max()
     runs = shutil.copytree(folder / "tree", tmp_path / "tree") / "fan" / "F2" / "2026-01-01" / "runs.csv"
     fit(tmp_path / "tree", tmp_path / "fans.parquet")
     runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
@@ -160,24 +155,15 @@ def test_a_machine_of_another_kind_is_not_to_be_balanced_so(fleet, tmp_path):
     assert answer.answer.judgement.startswith("Do not mount these weights: by its runs this machine is not")
     assert "lagged" in answer.of_type.reason
     assert not answer.to_dict()["of_type"]["of_type"]
-    assert answer.to_dict()["judgement"]["word"] == "do not mount"
 
 
-@pytest.mark.usefixtures("cli")
-@pytest.mark.parametrize(
-    ("runs", "more", "planes"),
-    [
-        (1, "[planes.L]\nmax_mass_g = 1\n[planes.R]\n", PLANES),
-        (1, "[planes.R]\n", ("R",)),
-        (3, "[planes.L]\nuse = false\n", ("R",)),
-    ],
-)
-def test_limits_and_planes_of_a_job_hold(fleet, tmp_path, runs, more, planes):
-    job = Machine(np.random.default_rng(26)).job(tmp_path / "job", runs=runs, more=more)
+def test_limits_and_planes_of_a_job_hold(fleet, tmp_path):
+    machine = Machine(np.random.default_rng(26))
+    job = machine.job(tmp_path / "job", runs=1, more="[planes.L]\nmax_mass_g = 1\n[planes.R]\n")
     result = balance(job, BalanceOptions(machine_type=address(fleet))).result
-    assert result.planes == planes
-    if "max_mass" in more:
-        assert abs(result.weights[0]) == pytest.approx(1e-3, rel=1e-4)
+    assert abs(result.weights[0]) == pytest.approx(1e-3, rel=1e-4)
+    job = machine.job(tmp_path / "other", more="[planes.L]\nuse = false\n")
+    assert balance(job, BalanceOptions(machine_type=address(fleet))).result.planes == ("R",)
 
 
 def test_masses_at_another_radius_are_of_another_kind(tmp_path):
@@ -209,12 +195,10 @@ def test_what_is_wrong_is_refused(fleet, tmp_path):
     pd.read_parquet(store).drop(columns="std").to_parquet(tmp_path / "other.parquet")
     refused("column std: expected the table that", machine_type=f"{tmp_path / 'other.parquet'}:fan")
     refused("there is no type 'fun'.*did you mean 'fan'", machine_type=f"{store}:fun")
-    refused("leave --coefficients and --influence away", machine_type=address(fleet), coefficients="measured")
     refused("no check runs to refine with", machine_type=address(fleet), refine=True)
     refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     table = pd.read_csv(job.parent / "runs.csv")
     for changed, words in (
-        (table.assign(speed_rpm=2000), "no job of fan has .* of all these speeds"),
         (table.assign(sensor=["S1", "S9"]), "there are sensor S1 and S2, plane L and R"),
         (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "quantity displacement"),
     ):
@@ -228,7 +212,7 @@ def test_a_tree_holds_other_files_too(tmp_path):
         Machine(rng).job(fans / f"F{k}")
     (fans / "F0" / "job.toml").write_text('machine = "7"\n' + (fans / "F0" / "job.toml").read_text())
     Machine(rng).job(fans / "F4", runs=1)
-    shutil.copy(next(sample_data().rglob("rotor*.toml")), fans)
+    (fans / "rotor.toml").write_text("shaft = 'shaft.csv'")
     (fans / "broken.toml").write_text("a = ")
     Machine(rng).job(fans / "F5").write_text('runs = "none.csv"\nweights = "weights.csv"\n')
     Machine(rng).job(fans / ".F6")
@@ -239,8 +223,6 @@ def test_a_tree_holds_other_files_too(tmp_path):
     assert document["undetermined"] == ["fan/F4/job.toml"]
     jobs = {f"fan/F{k}/job.toml" for k in range(4)}
     assert set(read_fleet(tmp_path / "f.parquet")["job"]) == jobs
-    with pytest.raises(ValueError, match="no balancing job in it has a type"):
-        fleet_fit(sample_data() / "motion")
 
 
 @pytest.mark.parametrize("stated", [True, False])
