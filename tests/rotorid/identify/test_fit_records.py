@@ -9,8 +9,6 @@ from repetitions import FULL
 from timedomain_cases import (
     CHAIN_ERRORS,
     CHAIN_OPTIMUM,
-    book_model,
-    book_record,
     chain,
     chain_record,
     decay,
@@ -239,21 +237,6 @@ def test_a_stop_far_from_the_minimum_is_no_estimate():
     assert "the next step still matters; lower --tolerance" in coarse.message
     assert fine.converged
     assert abs(fine.values[0] - decaying(0.01).values[0]) < 0.1 * fine.std[0]
-
-
-def test_quasilinearization_of_q_and_its_tables():
-    """With error control the truth; I(beta) and each state over time by iteration, as tables 2.2 and 2.3."""
-    result = fit(book_model(), book_record(), method="quasilinearization")
-    assert result.iterations <= 7
-    assert result.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
-    assert result.warnings == ()
-    result = fit(book_model(), book_record(), method="quasilinearization", integrator="sequential-heun")
-    iterations, x1, x2 = result.tables()
-    np.testing.assert_array_equal([row[1:4] for row in iterations.rows], result.history)
-    assert (x1.name, x2.name) == ("x1 by iteration", "x2 by iteration")
-    np.testing.assert_array_equal([row[2] for row in x2.rows], result.trajectories[1][0][:, 1])
-    r = result.simulations[0].y - np.column_stack([*result.records[0].outputs.values()])
-    assert result.integrals[-1] == pytest.approx(np.sum(r**2) * np.pi / 30, rel=1e-3)
 
 
 def test_quasilinearization_of_several_records_with_gaps_and_uneven_times():
