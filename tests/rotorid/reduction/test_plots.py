@@ -10,7 +10,7 @@ from fem_rotors import rotor23
 
 from rotorid.base.text import RPM
 from rotorid.reduction import compare_methods, reduce
-from rotorid.reduction.plots import plot_methods, plot_reduction, plot_running
+from rotorid.reduction.plots import plot_methods, plot_reduction, plot_stability
 
 mpl.use("Agg")
 
@@ -63,26 +63,17 @@ def test_bars_of_the_methods_hold_errors_and_mac():
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
 
 
-def test_both_responses_and_their_difference_over_speed():
-    speeds = np.linspace(0.0, 300.0, 61)
-    full = speeds**2 / np.abs(100.0**2 - speeds**2 + 200j * 10)
-    full = full[:, None, None] * np.array([[1.0, 0.5], [0.5, 2.0]]) * 1e-3 + 0j
-    small = full * (1.0 + 0.03 * speeds / 300.0)[:, None, None]
-    ax = plot_running(SimpleNamespace(
-        speeds=speeds, full=full, small=small, nodes=(7, 18), sensors=(7, 18), criticals=np.array([100.0]),
-        bands=0.1, left_out=[(90.0, 110.0)], excluded=(np.abs(speeds - 100.0) <= 10.0) | (speeds == 0),
+def test_decrements_and_thresholds_of_both_models():
+    speeds = np.linspace(0.0, 400.0, 41)
+    full, small = (0.01 * (1 - speeds / w) for w in (200.0, 210.0))
+    ax = plot_stability(SimpleNamespace(
+        speeds=speeds, full_decrement=full, small_decrement=small, nodes=(7, 12, 18),
+        full=SimpleNamespace(threshold=200.0), small=SimpleNamespace(threshold=210.0),
     ))  # fmt: skip
-    below = ax.figure.axes[1]
-    for line, values in zip(ax.get_lines(), (full, small), strict=True):
-        np.testing.assert_allclose(line.get_ydata(), np.abs(values[1:, 1, 1]))
-    assert legend_of(ax) == ["full rotor", "2-mass model", "left out, ±10 % of a critical speed"]
-    assert "µm per g·mm" in ax.get_ylabel()
-    (difference,) = below.get_lines()
-    np.testing.assert_allclose(difference.get_ydata(), 3.0 * speeds[1:] / 300.0, rtol=1e-9)
-    np.testing.assert_allclose(difference.get_xdata(), RPM * speeds[1:])
-    assert below.get_xlabel() == "speed, rpm"
-    assert below.get_ylim() == (0.0, pytest.approx(3.75))
-    for panel in (ax, below):
-        band = panel.patches[0].get_path().get_extents(panel.patches[0].get_patch_transform())
-        assert (band.x0, band.x1) == pytest.approx((90.0 * RPM, 110.0 * RPM))
-    check_hygiene(ax.figure)
+    labels = ["full rotor, unstable from 1910 rpm", "3-mass model, unstable from 2005 rpm"]
+    assert legend_of(ax) == labels
+    lines = {line.get_label(): line.get_ydata() for line in ax.get_lines()}
+    np.testing.assert_array_equal([lines[label] for label in labels], [full, small])
+    marks = [line.get_xdata()[0] for line in ax.get_lines() if list(line.get_ydata()) == [0.0]]
+    assert marks == pytest.approx([200.0 * RPM, 210.0 * RPM])
+    check_hygiene(ax.figure, unitless=["smallest logarithmic decrement\n(below 0 a motion grows)"])

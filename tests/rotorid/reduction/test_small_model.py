@@ -173,20 +173,6 @@ def test_state_space_has_the_same_eigenvalues_and_response():
     assert frequency_response(bearing, 250.0).shape == (1, 2, 1)
 
 
-def test_gyroscopic_moments_at_supports_follow_statically_when_condensed(rotor):
-    discs = [fem.Disc(d.node, d.mass, 0.02 * d.mass, 0.01 * d.mass) for d in rotor.discs]
-    turning = replace(rotor, discs=discs, model=fem.Model(rotary_inertia=True, gyroscopic=True))
-    small = small_model(turning, NODES, (134.2, 196.6, 157.1))
-    few = state_space(small.motion(300.0, condensed=True)).eigenvalues
-    kept = eigenvalues(small, 300.0)
-    assert len(few) == 12
-    assert len(kept) == 16
-    assert np.abs(kept[12:]).min() > 100 * np.abs(kept[:12]).max()  # far above: of the massless supports
-    for value in few:
-        assert np.abs(kept - value).min() < 5e-6 * abs(value)
-    assert np.abs(kept[:12].real).max() < 1e-8  # nothing takes energy out or brings it in
-
-
 def test_damped_supports_cannot_be_condensed():
     small = small_model(full_machine(), (4, 8), (30.0, 20.0))
     with pytest.raises(ValueError, match="damping acts on 'x1', which has no mass"):
