@@ -74,8 +74,8 @@ def balance_report(
 
     result, mounted, check, left, verdict = made
     labels = result.labels
-    known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
-    places = {s: known[s] for s in result.sensors if s in known}
+    angles = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
+    places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
     first = Path(job.files[0]).resolve()
     names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]

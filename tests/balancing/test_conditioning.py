@@ -6,7 +6,6 @@ from balancing_data import complex_normal
 
 from balancing.conditioning import (
     UndeterminedError,
-    check_planes,
     check_runs,
     conditioning,
 )
@@ -36,16 +35,3 @@ def test_singular_values_of_scaled_columns(near):
 def test_runs_that_do_not_determine(weights, words):
     with pytest.raises(UndeterminedError, match=words):
         check_runs([str(k) for k in range(len(weights))], "AB", np.array(weights, dtype=complex))
-
-
-@pytest.mark.parametrize(
-    ("W", "words"),
-    [
-        ([[1, 1]], "2 planes need at least 2 readings"),
-        ([[1, 0], [1, 0]], "has no effect"),
-        ([[2, 1], [2j, 1j]], "does what 2 times that weight does"),
-    ],
-)
-def test_planes_that_readings_cannot_tell_apart(W, words):
-    with pytest.raises(UndeterminedError, match=words):
-        check_planes(np.array(W), "AB")

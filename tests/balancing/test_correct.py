@@ -17,7 +17,7 @@ from balancing_data import (
 from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from repetitions import FULL, lowest_share
+from repetitions import FULL
 
 from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
 
@@ -85,16 +85,6 @@ def test_trial_weights_removed_or_left_in_or_without_a_baseline_run_say_the_same
 
 
 # errors
-
-
-@each_of("method, outside", [("least-squares", 0.0), ("weighted", 0.5)])
-def test_regions_hold_the_truth(method, outside):
-    n, inside = 100, []
-    for seed in range(n):
-        trials, D = rotor(seed, outside=outside, effect=1.5)
-        inside.append(correct(estimate_influence(trials), method=method).region().holds(D))
-    assert lowest_share(n, 0.94) <= np.mean(inside)
-    assert np.mean(inside) < 1
 
 
 def test_the_covariance_of_weights_and_of_a_check_run_against_simulated_jobs():
@@ -199,16 +189,12 @@ def test_stated_errors_refuse_what_assumed_ones_only_warn_of():
 @each_of(
     "options, words",
     [
-        ({"method": "magic"}, "method 'magic' is not known"),
         ({"strength": 0.1, "method": "minmax"}, "least squares without limits only"),
         ({"row_weights": np.ones(3)}, "shape"),
         ({"row_weights": np.zeros((1, 2))}, "all readings have the weight 0"),
         ({"planes": ["X"]}, "there is no plane 'X'"),
-        ({"planes": []}, "at least one plane"),
         ({"speeds": [120.0]}, "there are no coefficients at"),
-        ({"speeds": [100.0, 100.1]}, "a speed is given twice"),
         ({"baseline": np.zeros((1, 2))}, "there is nothing to balance"),
-        ({"baseline": np.array([[1, np.nan]])}, "missing|finite"),
     ],
 )
 def test_what_cannot_be(options, words):

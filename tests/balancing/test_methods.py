@@ -55,14 +55,10 @@ def test_least_squares_is_the_closed_form(seed, P, weighted):
     ("W", "Y", "more", "error", "message"),
     [
         ([[1], [2], [3j]], [1, np.nan, 2], {}, ValueError, "must be finite; found NaN or infinity"),
-        ([[1], [2], [3j]], [1, 2], {}, ValueError, "the vibration must have shape"),
-        (np.zeros((0, 2)), [], {}, ValueError, "not empty"),
         ([[1, 2], [1j, 2j]], [1, 3], {"names": ["A", "B"]}, UndeterminedError, r"'A' and 'B' act alike"),
         ([[1, 0], [2, 0]], [1, 3], {}, UndeterminedError, "plane '2' has no effect on any reading"),
         ([[1, 2]], [1], {}, UndeterminedError, "2 planes need at least 2 readings"),
         ([[1, 2], [2, 1]], [1, 3], {"row_weights": [1, 0]}, UndeterminedError, "2 planes need"),
-        ([[1, 2], [2, 1]], [1, 3], {"row_weights": [1, -1]}, ValueError, "row weights must be"),
-        ([[1, 2], [2, 1]], [1, 3], {"names": ["A"]}, ValueError, "2 planes need as many names"),
     ],
 )
 def test_silent_wrong_answers_are_refused(method, most, W, Y, more, error, message):
@@ -75,14 +71,12 @@ def test_silent_wrong_answers_are_refused(method, most, W, Y, more, error, messa
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"method": "huber"}, "method 'huber' is not known"),
         (
             {"limits": limits(3, 1, max_weight=1)},
             "the limits are for 3 readings and 1 planes; there are 2",
         ),
         ({"method": "weighted"}, "needs errors of the readings"),
         ({"method": "minmax", "strength": 0.1}, "least squares without limits only"),
-        ({"method": "least-squares", "strength": 0.0}, "a strength above 0"),
     ],
 )
 def test_what_cannot_be(options, words):

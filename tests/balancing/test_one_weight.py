@@ -1,10 +1,9 @@
 """One weight: in holes against trying everything; two masses, drilling, rounding against closed forms."""
 
-import itertools
-
 import numpy as np
 import pytest
 from cases import each_of
+from mountings import everything
 from scipy.integrate import quad
 
 from balancing.conventions import Labels
@@ -12,21 +11,6 @@ from balancing.holes import equal_holes, from_list
 from balancing.one_weight import STEEL, combine, drill, split, two_positions
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
-
-
-def everything(target, holes, most):
-    """Error and pieces of every choice, by trying it."""
-    K = len(holes.pieces)
-    one = [c for c in itertools.product(range(holes.per_hole + 1), repeat=K) if sum(c) <= holes.per_hole]
-    for combination in itertools.product(*[one if free else [(0,) * K] for free in holes.free]):
-        counts = np.array(combination)
-        if holes.stock is not None and (counts.sum(axis=0) > holes.stock).any():
-            continue
-        if most is not None and counts.sum() > most:
-            continue
-        vector = (counts @ holes.pieces) @ np.exp(1j * holes.angles)
-        if holes.allows(vector):
-            yield round(float(abs(vector - target)), 11), int(counts.sum())
 
 
 def problem(seed):
@@ -50,7 +34,12 @@ def problem(seed):
 @each_of("seed", range(40))
 def test_equal_to_trying_everything(seed):
     target, holes, most = problem(seed)
-    every = list(everything(target, holes, most))
+    vectors, number, _ = everything(holes)
+    every = [
+        (round(float(abs(vector - target)), 11), int(n))
+        for vector, n in zip(vectors, number, strict=True)
+        if most is None or n <= most
+    ]
     found = split(target, holes, most_pieces=most)
     assert (round(abs(found.error), 11), found.pieces) == min(every)
     assert found.mounting.vector - target == pytest.approx(found.error, abs=1e-15)
@@ -80,11 +69,9 @@ def test_fewer_pieces_stand_below_what_is_proposed():
     assert (one.pieces, one.relative_error > 0.5) == (1, True)
     against = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
     assert few.lines(against)[-2:] == ["With fewer pieces:", "  1: error 55 %: 5 g in hole 1 (0°)"]
-    document = few.to_dict(against)
-    assert document["number_of_pieces"] == sum(p["count"] for row in document["holes"] for p in row["pieces"])
-    assert document["mounted"]["mass"] == pytest.approx(1e3 * abs(few.mounting.vector))
-    assert document["mounted"]["angle_deg"] == pytest.approx(-np.degrees(np.angle(few.mounting.vector)) % 360)
-    assert [one["number_of_pieces"] for one in document["fewer_pieces"]] == [1]
+    mounted = few.to_dict(against)["mounted"]
+    assert mounted["mass"] == pytest.approx(1e3 * abs(few.mounting.vector))
+    assert mounted["angle_deg"] == pytest.approx(-np.degrees(np.angle(few.mounting.vector)) % 360)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -155,11 +142,8 @@ def test_a_hole_takes_away_what_the_integral_over_its_depth_says(diameter, depth
     ("call", "words"),
     [
         (lambda: drill(1e-4, 0.0, 0.008), "positive"),
-        (lambda: drill(1e-4, 0.1, -0.008), "positive"),
         (lambda: drill(1.0, 0.1, 0.008), "larger drill"),
-        (lambda: drill(np.nan, 0.1, 0.008), "cannot take away"),
         (lambda: drill(2e-6, 0.1, 0.008), "smaller drill"),
-        (lambda: split(np.nan, from_list([0.0, 1.0], [0.01])), "must be finite"),
         (lambda: split(1.0, from_list([0.0, 1.0], [0.01]), most_pieces=0), "1 or more"),
         (
             lambda: split(1.0, from_list([0.0, 1.0], np.arange(1, 12) * 0.01, per_hole=9)),
@@ -167,7 +151,6 @@ def test_a_hole_takes_away_what_the_integral_over_its_depth_says(diameter, depth
         ),
         (lambda: combine([]), "no weight"),
         (lambda: two_positions(0.051, 0.02, 0.03), r"reach from 0\.01 to 0\.05"),
-        (lambda: two_positions(0.01, 0.0, 0.03), "positive"),
     ],
 )
 def test_what_cannot_be_is_refused(call, words):

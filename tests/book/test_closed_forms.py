@@ -7,8 +7,6 @@ import pytest
 from exact_solutions import SOLVERS
 
 import fem
-from balancing import Gaussian, Influence, correct
-from fem.assembly import WholeBand, both_planes
 from rotorid.reduction import equivalent_masses, natural_frequencies
 
 MASS, BETA, SPEED = 20.0, 2e-5, 300.0
@@ -25,11 +23,6 @@ def disc_on_supports(stiffness, damping):
         discs=[fem.Disc(2, MASS)],
         supports=[fem.Support(node, stiffness, damping) for node in (1, 3)],
     )
-
-
-def shaft(s):
-    """Dynamic stiffness in x + iy: material damping turns with the shaft."""
-    return BENDING * (1 + BETA * (s - 1j * SPEED))
 
 
 # a seal on masses
@@ -86,35 +79,3 @@ def test_unbalance_response_on_unequal_damped_supports(method):
     response = SOLVERS[method](fem.unbalance_response, rotor, {2: 1.0}, np.array([SPEED]))
     found = [response.readings([(2, angle)])[0, 0] for angle in (0.0, 90.0)]
     np.testing.assert_allclose(found, exact, rtol=1e-8)
-
-
-def test_unbalance_response_on_equal_damped_supports():
-    rotor = disc_on_supports(DIRECT, DAMPING)
-    support = 2 * (DIRECT + 1j * SPEED * DAMPING)
-    exact = SPEED**2 / (1 / (1 / shaft(1j * SPEED) + 1 / support) - MASS * SPEED**2)
-    found = fem.unbalance_response(rotor, {2: 1.0}, SPEED).amplitudes[0, 1]
-    np.testing.assert_allclose(found, exact, rtol=1e-8)
-
-
-@pytest.mark.parametrize("planes", [1, 2])
-@pytest.mark.parametrize("value", [-20 + 150j, 5 - 90j])
-def test_the_banded_matrices_at_a_complex_frequency(planes, value):
-    """Material damping and its circulation in the bands: the deflection of the disc under a unit load."""
-    rotor = disc_on_supports(DIRECT, DAMPING)
-    P = both_planes(rotor, complex_coordinate=planes == 1)
-    band = WholeBand(P)
-    disc = P.A.stride
-    load = np.zeros((planes, P.A.size), dtype=complex)
-    load[:, disc] = [1, -1j][:planes]  # of x + iy
-    found = band.planes(band.factor(value, SPEED)(band.interleaved(load)))[:, disc]
-    support = 2 * (DIRECT + value * DAMPING)
-    exact = 1 / (MASS * value**2 + 1 / (1 / shaft(value) + 1 / support))
-    np.testing.assert_allclose(found, exact * np.array([1, -1j])[:planes], rtol=1e-8)
-
-
-def test_least_squares_over_two_speeds():
-    """One plane and one sensor: D = −Σ W̄ Y / Σ |W|²."""
-    W, Y = np.array([[[2 + 1j]], [[1 - 3j]]]), np.array([[4 - 1j], [2 + 5j]])
-    exact = -((2 - 1j) * (4 - 1j) + (1 + 3j) * (2 + 5j)) / (5 + 10)
-    influence = Influence(np.array([1.0, 2.0]), ("1",), ("A",), W, Y, Gaussian.none(2, 1, 1))
-    np.testing.assert_allclose(correct(influence, method="least-squares").weights, [exact], rtol=1e-12)

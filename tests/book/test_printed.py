@@ -91,8 +91,6 @@ def test_the_estimates_that_the_samples_quote_are_those_of_the_table():
         ("1.003e4", 5.0),
         ("8.92e-8", 5e-11),
         ("-1.119810467E-1", 5e-11),
-        (".41", 0.005),
-        ("10", 0.5),
     ],
 )
 def test_half_a_unit_of_the_last_printed_digit(text, half):
@@ -106,16 +104,13 @@ def test_half_a_unit_of_the_last_printed_digit(text, half):
     [
         ({"erratum": "wrong"}, 2.0, "misprint"),
         ({"erratum": "wrong"}, 1.04, "differs"),  # agrees with the print: no erratum
-        ({"erratum": "wrong"}, math.nan, "differs"),
         ({"erratum": "wrong", "corrected": "2.0"}, 2.04, "misprint"),
         ({"erratum": "wrong", "corrected": "2.0"}, 2.06, "differs"),
         ({"erratum": "wrong", "corrected": "2.0", "follows": "another"}, 2.04, "consequence"),
-        ({"erratum": "wrong", "tolerance": "0.5"}, 1.4, "differs"),
         ({"tolerance": "0.5"}, 1.4, "agrees"),
         ({"kind": "bound"}, 0.2, "agrees"),
         ({"kind": "bound"}, 1.01, "differs"),
         ({"kind": "bound", "erratum": "rounded down", "corrected": "1.01"}, 1.01, "misprint"),
-        ({"kind": "given"}, 1.0, "given"),
         ({"kind": "given"}, 1.1, "differs"),
         ({"kind": "not compared"}, math.nan, "not compared"),
     ],

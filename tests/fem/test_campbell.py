@@ -69,21 +69,6 @@ def test_undamped_forward_critical_speeds_are_those_of_critical_speeds():
     assert forward.size >= 3
 
 
-def test_speed_dependent_bearings():
-    def on(*coefficients, **options):
-        return dataclasses.replace(
-            rotor23(), supports=[fem.Support(n, *coefficients, **options) for n in (2, 22)]
-        )
-
-    table = on([5e7, 1e8, 3e8], [1e4, 2e4, 1e4], speeds=(0.0, 500.0, 1000.0))
-    found = fem.campbell(table, [0.0, 250.0, 500.0], n=2)
-    for values, rotor in zip(found.eigenvalues, (on(5e7, 1e4), on(7.5e7, 1.5e4), on(1e8, 2e4)), strict=True):
-        plain = fem.whirl_modes(rotor, 0.0, 2).eigenvalues
-        np.testing.assert_allclose(values, plain, rtol=1e-7)
-    with pytest.raises(ValueError, match="is not extrapolated"):
-        fem.campbell(table, [0.0, 1200.0])
-
-
 def test_a_mode_that_ceases_to_oscillate():
     """Damping that grows with speed until a motion is overdamped."""
     k, c = [((1e5, 0), (0, 3e5))] * 2, [((0, 0), (0, 0)), ((3e3, 0), (0, 10.0))]
@@ -160,13 +145,6 @@ def test_a_mode_that_grows_is_told_from_its_threshold_on():
     assert above.to_dict()["unstable"][0]["from_start"]
 
 
-def test_a_rotor_that_is_pushed_aside_is_refused():
-    base = machine()
-    pushed = dataclasses.replace(base, supports=[*base.supports, fem.Support(12, -1e9, kind="seal")])
-    with pytest.raises(ValueError, match="statically unstable"):
-        fem.campbell(pushed, [0.0, 100.0])
-
-
 def test_heavily_damped_modes_push_no_other_out():
     """On strongly damped pedestals two pairs of modes below the second of the shaft hardly oscillate."""
     stand = fem.Pedestal(60.0, 2e7, 6e4)
@@ -189,11 +167,8 @@ def test_heavily_damped_modes_push_no_other_out():
 
 def test_json_and_mesh_change():
     found = fem.campbell(machine(), np.linspace(0.0, 1000.0, 11), n=4)
-    document = found.to_dict()
-    assert np.shape(document["frequencies_rad_s"]) == (4, 11)
-    assert document["damped_critical_speeds"][0]["direction"] in ("forward", "backward", "mixed")
+    assert np.shape(found.to_dict()["frequencies_rad_s"]) == (4, 11)
     assert len(found.to_frame()) == 44
-    assert found.criticals[0][0] == found.critical_speeds[0]
     frequencies, speeds = found.mesh_change()
     assert 0 < frequencies < 1e-4
     assert 0 < speeds < 1e-4

@@ -67,27 +67,10 @@ def test_directions_come_in_pairs_on_slightly_different_supports():
     oval = ((1e8, 0), (0, 0.97e8))
     modes = fem.critical_speeds(on(oval), 4)
     assert modes.direction == ("backward", "forward") * 2
-    assert modes.x.shape == modes.y.shape == modes.shapes.shape == modes.slopes.shape
     # Without gyroscopic effect each plane whirls alone, in straight lines.
     apart = fem.critical_speeds(on(oval, False), 4)
     assert set(apart.direction) == {"mixed"}
     assert (np.minimum(np.abs(apart.x).max(axis=0), np.abs(apart.y).max(axis=0)) < 1e-6).all()
-    alone = [fem.critical_speeds(on(k, False), 2).frequencies for k in (0.97e8, 1e8)]
-    np.testing.assert_allclose(apart.frequencies, np.sort(np.concatenate(alone)), rtol=1e-10)
-
-
-def test_supports_turned_by_an_angle_change_nothing():
-    c, s = math.cos(0.4), math.sin(0.4)
-    turn = np.array([[c, -s], [s, c]])
-    rotor = dataclasses.replace(rotor23(), discs=[fem.Disc(12, 50.0, 6.0, 3.0)], model=FULL)
-
-    def on(k):
-        return dataclasses.replace(rotor, supports=[fem.Support(n, k) for n in (2, 22)])
-
-    straight = fem.critical_speeds(on(np.diag([1e8, 3e7])), 5)
-    turned = fem.critical_speeds(on(turn @ np.diag([1e8, 3e7]) @ turn.T), 5)
-    np.testing.assert_allclose(turned.frequencies, straight.frequencies, rtol=1e-9)
-    assert turned.direction == straight.direction
 
 
 @pytest.mark.parametrize("kind", ["isotropic", "anisotropic"])

@@ -119,15 +119,6 @@ def test_derivatives_are_those_of_whole_dense_matrices(rotor, seed):
     assert abs(difference).max() < exact * abs(influence).max()
 
 
-@pytest.mark.parametrize("soft", [0.0, 1e3])
-def test_free_rotors_and_soft_supports(soft):
-    supports = [fem.Support(node, soft) for node in (1, 7)] if soft else []
-    discs = [fem.Disc(3, 20.0, 0.3, 0.2)]
-    rotor = uniform(6, supports=supports, discs=discs, model=fem.Model(False, True, True))
-    paths = ["material.density.scale", "material.youngs_modulus.scale", "disc[1].polar_inertia"]
-    agree(rotor, [4], [2, 6], [90.0, 400.0], paths)
-
-
 def test_nothing_is_lost_at_the_resonances_of_the_conservative_rotor():
     """There the modes and series fail; damping that differs in x and y couples both directions."""
     supports = [fem.Support(node, 3e7, ((2e3, 0.0), (0.0, 5e3))) for node in (1, 9)]

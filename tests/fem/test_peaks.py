@@ -78,14 +78,6 @@ def test_half_power_points_outside_the_range_are_unknown():
     assert peak.note == "the steady speeds end before the curve falls to 0.707 above"
 
 
-def test_a_higher_neighbour_hides_the_half_power_point():
-    speeds = np.linspace(50.0, 200.0, 2000)
-    two = peaks_of(speeds, lambda speed: jeffcott(speed, 0.04) + 0.9 * jeffcott(speed, 0.03, 109.0))
-    first = two.peaks[0]
-    assert first.amplification is None
-    assert "another peak" in first.note
-
-
 @pytest.mark.parametrize(
     ("AF", "below", "above"),
     [

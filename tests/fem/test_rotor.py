@@ -56,8 +56,6 @@ def test_equal_by_value_and_copied():
         {"stations": {}},
         {"length": [0.1, 0.3]},
         {"model": fem.Model(shear=True)},
-        {"poisson_ratio": 0.25},
-        {"material_damping": [0, 1e-5]},
         {"forces": [fem.Stop(2, stiffness=1.0)]},
     ):
         assert replace(rotor, **change) != rotor
@@ -88,17 +86,12 @@ def test_stations_and_numbers_name_nodes():
     [
         ({"length": [0.1, -0.2]}, "element 2: length must be finite and greater than zero, not -0.2"),
         ({"length": []}, "length must be a number, or one for each of 1 elements"),
-        ({"length": "long"}, "length must be a number"),
-        ({"outer_diameter": [0.1, 0.1, 0.1]}, "length must be a number, or one for each of 3 elements"),
         (
             {"inner_diameter": [0, 0.05]},
             "element 2: inner_diameter must be smaller than outer_diameter, not 0.05",
         ),
-        ({"inner_diameter": -0.01}, "element 1: inner_diameter must be finite and not negative"),
-        ({"youngs_modulus": 0.0}, "youngs_modulus must be finite and greater than zero"),
         ({"discs": [fem.Disc(4, 1)]}, "disc 1: node 4 does not exist: the rotor has nodes 1 to 3"),
         ({"supports": [fem.Support(1, 1), fem.Support(9, 1)]}, "support 2: node 9 does not exist"),
-        ({"discs": [fem.Support(1, 1)]}, "disc 1 must be a Disc"),
         ({"stations": {"A": 4}}, "station 'A': node 4 does not exist"),
     ],
 )
@@ -111,13 +104,10 @@ def test_an_impossible_rotor_is_refused(arguments, message):
     ("make", "message"),
     [
         (lambda: fem.Disc(0, 1.0), "disc: node 0 does not exist, nodes are numbered from 1"),
-        (lambda: fem.Disc(True, 1.0), "whole number, not True"),
         (
             lambda: fem.Disc(2, -1.0, name="wheel"),
             "disc 'wheel' at node 2: mass must be finite and not negative",
         ),
-        (lambda: fem.Disc(2, "heavy"), "mass must be a number, not 'heavy'"),
-        (lambda: fem.Support(1.0, 1e8), "the node of support must be a whole number, not 1.0"),
         (lambda: fem.Support(1, -1e8), "support at node 1: stiffness must be finite and not negative"),
     ],
 )
@@ -201,7 +191,6 @@ def test_a_disc_from_its_sizes():
 @each_of(
     ("make", "message"),
     [
-        (lambda: fem.Support(1, ((1, 2), (3, "x"))), "could not convert string to float: 'x'"),
         (lambda: fem.Support(1, [1.0, 2.0]), r"stiffness must be a number or of the shape \(2, 2\)"),
         (
             lambda: fem.Support(1, 0.0, ((1, math.nan), (0, 1))),
@@ -213,20 +202,13 @@ def test_a_disc_from_its_sizes():
             "stiffness must be finite and not negative, not -2.0",
         ),
         (lambda: fem.Support(2, 1.0, speeds=[2, 1]), "at least two, not negative and ascending"),
-        (lambda: fem.Support(2, 1.0, speeds=[2]), "speeds must be at least two"),
         (lambda: fem.Support(1, 1e8, kind="spring"), "kind 'spring' is not known .*: one of bearing, seal"),
-        (
-            lambda: fem.Support(1, 1e8, tilting_stiffness=-1),
-            "tilting_stiffness must be finite and not negative",
-        ),
         (lambda: fem.Pedestal(1.0), "pedestal: stiffness must be above 0 in x and y"),
-        (lambda: fem.Pedestal(1.0, (1e8, -1)), "pedestal: stiffness must be finite and not negative, not -1"),
         (lambda: fem.Disc.from_geometry(1, 0.1, 0.2, 0.2), "inner diameter, 0.2 m, must be smaller"),
         (
             lambda: fem.Rotor([1.0], 0.1, poisson_ratio=0.6),
             "element 1: poisson_ratio must be finite and above",
         ),
-        (lambda: fem.Sensor(1, math.inf), "sensor at 1: angle must be finite"),
     ],
 )
 def test_impossible_data_are_refused(make, message):
@@ -260,9 +242,7 @@ def test_principal_columns_give_the_covariance_in_as_many_directions_as_it_has()
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"values": [1.0]}, r"values must be finite and of the shape \(3,\)"),
         ({"covariance": np.eye(2)}, r"covariance must be finite and of the shape \(3, 3\)"),
-        ({"lack_of_fit": np.nan}, "lack_of_fit finite"),
         ({"covariance": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "must be symmetric"),
         ({"covariance": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "negative in any direction"),
         ({"names": ("disc.scale",) * 3}, "one of its names comes twice"),

@@ -104,62 +104,6 @@ def test_bad_input(highest, options, message):
     assert fem.stability_threshold(rotor, 200.0, lowest=100.0).status == "stable"
 
 
-def veering():
-    """Modes 3 and 4 veer sharply between 200 and 225 rad/s, where one of them loses stability."""
-    return fem.Rotor(
-        [0.07598931, 0.11731469, 0.17572019, 0.28725273],
-        [0.17364281, 0.18922264, 0.11957767, 0.16664831],
-        [0.0, 0.0, 0.0, 0.05866477],
-        youngs_modulus=[1.16283623e11, 1.51811977e11, 1.66249788e11, 1.68663561e11],
-        density=[4185.70733511, 3473.05108279, 5381.48107674, 6375.33350678],
-        material_damping=[6.9187337e-07, 4.38956655e-08, 9.13098917e-07, 6.02745395e-07],
-        supports=[
-            fem.Support(
-                5,
-                ((86604455.79, -6332058.41), (-17029054.77, 58682574.55)),
-                ((25452.72, -2607.584), (-7439.726, 33058.947)),
-            ),
-            fem.Support(
-                3,
-                [
-                    ((310099817.98, 114204051.11), (-114204051.11, 616926832.59)),
-                    ((22531703.17, 10913375.61), (-7633740.71, 11993259.52)),
-                    ((50519546.24, -2709611.89), (2709611.89, 77312206.27)),
-                ],
-                [418.155, ((137.505, -27.6903), (-51.4019, 159.7095)), 4665.1515],
-                speeds=(0.0, 300.0, 1000.0),
-            ),
-            fem.Support(
-                2,
-                13856974.44,
-                ((179.216, -41.3020), (-58.4332, 150.9910)),
-                pedestal=fem.Pedestal(0.0, (824463616.55, 74877667.76), 8965.15),
-            ),
-        ],
-        model=fem.Model(True, True, False),
-    )
-
-
-def grows_only_above(rotor, speed):
-    """Judged by the full model's eigenvalues on both sides."""
-    before, after = (
-        whirl_exactly(rotor, factor * speed, 4).eigenvalues.real.max() for factor in (1 - 1e-5, 1 + 1e-5)
-    )
-    return before < 0 < after
-
-
-def test_a_veering_does_not_exchange_the_mode():
-    rotor = veering()
-    thresholds = [fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 160)]
-    for one in thresholds:
-        assert one.threshold == pytest.approx(213.8314, rel=1e-5)
-        assert (one.mode, one.warnings) == (4, ())
-    assert grows_only_above(rotor, thresholds[0].threshold)
-    # The Campbell diagram finds growth on the mode itself: the same speed.
-    growing = fem.campbell(rotor, np.linspace(0.0, 1000.0, 41), 4).unstable
-    assert growing[0].first == pytest.approx(thresholds[0].threshold, rel=1e-7)
-
-
 @pytest.mark.parametrize(("loss", "highest"), [(1e-13, 5000.0), (1e-10, 700.0), (1e-7, 1000.0)])
 def test_a_threshold_does_not_depend_on_the_size_of_tiny_losses(loss, highest):
     # internal damping alone: stable up to the critical speed, whatever its size

@@ -77,13 +77,6 @@ def test_a_simply_supported_shaft_sags_as_the_closed_form():
     assert shear.y[4] - result.y[4] == pytest.approx(-G * LINE / 8 / GA, rel=1e-5)
 
 
-def test_a_clamped_shaft_hangs_from_its_clamp():
-    rotor = uniform(6, supports=[fem.Support(1, 1e17, tilting_stiffness=1e17)])
-    result = fem.static_deflection(rotor, direction=180.0)
-    assert result.x[-1] == pytest.approx(-G * LINE / 8 / EI, rel=1e-9)
-    assert result.reaction_x[0] == pytest.approx(G * LINE, rel=1e-9)
-
-
 @given(machines(elements=(2, 16)))
 @settings(max_examples=25, deadline=None)
 def test_reactions_carry_the_weight_and_balance_its_moment(rotor):
@@ -117,7 +110,6 @@ def test_a_rotor_that_is_not_held_falls(stiffness):
 
 def test_the_result_of_the_reference_rotor():
     result = fem.static_deflection(rotor23())
-    assert result.tables()[0].columns[2].values == pytest.approx(result.reaction_y, rel=1e-14)
     assert result.to_frame().shape == (24, 4)
     assert "largest deflection 631.3 µm at node 12" in result.summary()
     with pytest.raises(ValueError, match="speed must be finite and not negative"):

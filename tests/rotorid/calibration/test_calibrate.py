@@ -1,7 +1,5 @@
 """Numbers from data of a known truth: exact data give them back, noise as stated their errors."""
 
-import functools
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +12,6 @@ from balancing import ReadingErrors
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
 from rotorid.commands.calibrate import outcome
-from rotorid.regression import nonlinear
 
 ERRORS = ReadingErrors(0.02, 0.02)
 
@@ -69,9 +66,7 @@ MASSES = {
 }
 NEGATIVE = {"seal[1].kxx": -8e5, "bearing[1].kxx.offset": -5e6}
 """Offsets and the stiffness of a seal have either sign."""
-SPLIT = {"bearing[1].kxx": 4e7, "bearing[1].kyy": 6e7, "bearing[2].kxy": 5e6}
 """Of supports that are alike in x and y: their derivatives couple forward and backward whirl."""
-ALIKE = uniform(10, discs=[fem.Disc(4, 20.0)], supports=[fem.Support(n, 5e7, 1e4) for n in (1, 11)])
 PROBES = {
     "bearing[1].kxx": 4.6e7,
     "probe[a].angle": 5.0,
@@ -92,13 +87,10 @@ def truth_of(runs, values):
 @pytest.mark.parametrize(
     ("rotor", "values", "more"),
     [
-        (machine(), COEFFICIENTS, {}),
         (with_seal(), NEGATIVE, {}),
-        (ALIKE, SPLIT, {"unbalance": {}}),
         (machine(), COEFFICIENTS, {"free": False, "derivative": 2, "key_phasor": 40.0}),
         (tabled(), SCALES, {"derivative": 1, "planes": {"P": (4, 0.12), "Q": (8, 0.2)}}),
         (machine(), MASSES, {"free": False}),
-        (machine(), COEFFICIENTS, {"weights": ((0, 0), (2e-3, 0), (1e-3j, 0), (-1e-3, 1e-3), (0, 2e-3))}),
         (machine(), PROBES, {"key_phasor": 15.0}),
     ],
 )
@@ -161,8 +153,6 @@ def test_a_jeffcott_rotor_on_damped_supports():
     J = np.concatenate([part for z in (columns, -1j * columns) for part in (z.real, z.imag)])
     covariance = 2 * floor**2 * np.linalg.inv(J.T @ J)  # a difference of two readings
     assert found.std == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-5)
-    assert abs(found.covariance[0, 1]) < 1e-6 * found.std.prod()  # z is a function of k + iωc: orthogonal
-    assert found.dof == 4 * 2 * 2 - 2
 
 
 def mirrored(k1, k2):
@@ -222,43 +212,11 @@ def test_of_bearing_and_pedestal_in_series_one_speed_tells_one_number():
     found = calibrate(rotor, unknowns, [data])
     assert np.isnan(found.values).all()
     assert np.isnan(found.std).all()
-    parameters = outcome(found, {}).to_dict()["parameters"]
-    assert [parameters[unknown.path]["value"] for unknown in unknowns] == [None, None]
-    assert "bearing[1].stiffness" in found.undetermined
     (k, p) = found.fit.estimate.solution
     assert k * p / (k + p) == pytest.approx(4e7 * 1e8 / 1.4e8, rel=1e-5)
     with_prior = calibrate(rotor, [unknowns[0], replace(unknowns[1], prior=(1e8, 1e6))], [data])
     assert with_prior.values == pytest.approx([4e7, 1e8], rel=1e-4)
     assert with_prior.std[1] == pytest.approx(1e6, rel=1e-3)
-    assert with_prior.std[0] > 1e6 * (4e7 / 1e8) ** 2  # what the pedestal leaves open, and the data's own
-    assert with_prior.undetermined == ""
-
-
-def test_a_number_at_its_bound_has_no_deviation_and_says_so():
-    values = {"bearing[1].kxx": 4.7e7, "bearing[1].cxx": 2e4}
-    runs = Runs()
-    data = runs.data(runs.readings(with_parameters(machine(), values)), errors=ERRORS)
-    unknowns = [Unknown("bearing[1].kxx", bounds=(1e7, 4.5e7)), Unknown("bearing[1].cxx")]
-    found = calibrate(machine(), unknowns, [data])
-    assert found.values[0] == 4.5e7
-    assert np.isnan(found.std[0])
-    assert found.std[1] > 0
-    assert any(w.startswith("bearing[1].kxx stands at its bound") for w in found.warnings)
-
-
-def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypatch):
-    once = functools.partial(nonlinear.nonlinear_least_squares, max_iterations=1)
-    monkeypatch.setattr(sys.modules[calibrate.__module__], "nonlinear_least_squares", once)
-    monkeypatch.setattr(nonlinear, "POLISH", 0)
-    runs = Runs()
-    data = runs.data(runs.readings(machine()), errors=ERRORS)
-    far = [Unknown("bearing[1].kxx", start=1e7), Unknown("bearing[2].kyy", start=1e8)]
-    found = calibrate(machine(), far, [data], side_starts=False)
-    assert not found.fit.converged
-    assert np.isnan(found.std).all()
-    assert found.warnings[0].startswith("not converged after 1 evaluation")
-    assert found.undetermined == found.warnings[0]
-    assert found.rotor.calibration.needs_trial_run
 
 
 @pytest.mark.parametrize(
@@ -266,9 +224,7 @@ def test_a_search_that_does_not_converge_says_so_and_gives_no_deviation(monkeypa
     [
         (("bearing[1].kxx", "bearing[DE].kxx"), "are the same number"),
         (("bearing[1].kxx", "bearing[1].stiffness.scale"), "are the same number"),
-        (("disc[1].mass", "disc[1].scale"), "are the same number"),
         (("bearing[1].kxx.scale", "bearing.kxx.offset"), "adds to more numbers than bearing[1].kxx.scale"),
-        (("bearing[9].kxx",), "the bearing '9' is not known"),
         (("probe[z].angle",), "no data have readings of probe[z].angle"),
         ((), "needs data and at least one unknown number"),
     ],
@@ -279,19 +235,6 @@ def test_numbers_that_cannot_be_estimated_are_refused(paths, said):
     with pytest.raises(ValueError) as error:
         calibrate(machine(), [Unknown(path) for path in paths], [data])
     assert said in str(error.value)
-
-
-def test_covariance_stands_as_the_rotor_does():
-    """Of a scale and what is added to a coefficient over a table: of changes from where both now stand."""
-    values = {"bearing[1].kyy.scale": 1.25, "bearing[1].kyy.offset": 2e6}
-    truth = with_parameters(tabled(), values)
-    runs = Runs(speeds=(150.0, 250.0, 400.0))
-    data = runs.data(runs.readings(truth), errors=ERRORS)
-    found = calibrate(tabled(), [Unknown(p, start=v) for p, v in values.items()], [data], side_starts=False)
-    # the same data about the rotor that was found: its own numbers err as these say
-    again = calibrate(found.rotor, [Unknown(path) for path in values], [data], side_starts=False)
-    assert found.rotor.calibration.covariance == pytest.approx(again.covariance, rel=1e-4)
-    assert found.covariance != pytest.approx(again.covariance, rel=1e-2)
 
 
 def test_unbalances_that_the_readings_do_not_tell_apart_have_no_number():

@@ -56,16 +56,3 @@ def test_combined_with_the_trial_runs_at_a_speed_that_did_not_calibrate(rpm):
     assert both <= SUM
     assert max(disc_1, disc_2) <= PUBLISHED
     assert np.all([each.inside for each in runs])
-
-
-def test_what_the_runs_determine_and_what_not():
-    one = found(SPEEDS)
-    assert one.explained
-    assert one.other_ends == ()
-    share = dict(zip(one.prior.rows.parameters, one.prior.share, strict=True))
-    determined = {name for name, value in share.items() if value > 0.85}
-    gains = {f"probe[{name}].gain" for name in example().PROBES}
-    assert determined == {*gains, "bearing.tilting_stiffness", "key_phasor.angle"}
-    unknown = {name for name, value in share.items() if value < 0.1}
-    assert {"bearing.kxx", "bearing.cxx", "bearing.cyy"} <= unknown
-    assert share["bearing.kyy"] < 0.5

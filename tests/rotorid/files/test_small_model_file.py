@@ -109,23 +109,13 @@ def test_units_defaults_and_sums(tmp_path):
 @each_of(
     ("old", "new", "message"),
     [
-        ("nodes = [1, 5, 9]", "", r"key nodes: expected different whole numbers from 1 up, nodes ="),
-        ("[1, 5, 9]", "[1, 5, 5]", r"a node 1, 5 or 5 or a station"),
-        ("[1, 5, 9]", "[0, 5, 9]", r"key nodes: found '0', expected a number of 1 or more"),
-        ("masses_kg", "mass_kg", r"key mass_kg: .*did you mean 'masses_kg'"),
         ("80.5, 12", "80.5", r"masses: 3 finite numbers for 3 nodes"),
-        ("80.5", "-80.5", r"masses: 0 or more"),
-        ("80.5", "nan", r"key masses_kg: found 'nan', expected a finite number"),
         ("[-2e6, 4e6", "[-2.1e6, 4e6", r"stiffness: a symmetric matrix"),
-        (", [1e6, -2e6, 1e6]]", "]", r"stiffness: 3 × 3 finite"),
-        (", -2e6, 1e6]]", ", -2e6]]", r"key shaft_stiffness_N_per_m: .*rows of one length"),
         (
             "node = 1\n",
             "node = 2\n",
             r"key bearing\[1\].node: found '2', expected a node 1, 5 or 9",
         ),
-        ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
-        ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected .* angle"),
         (
             "[[unbalance]]",
             "[[bow]]\nnode = 5\nbow_um = 1\nangle_deg = 2\n" * 2 + "[[unbalance]]",

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from run_ups import drawn, table
 
 from rotorid.files import InputError
 from rotorid.files.runs import read_vectors
@@ -29,15 +28,6 @@ def test_numbers_by_hand(tmp_path):
     np.testing.assert_allclose(lag.covariances[0, 0, 0, 1], -sweep.covariances[0, 0, 0, 1])
 
 
-def test_a_table_comes_back(tmp_path):
-    _, sweep = drawn()
-    for lag in (False, True):
-        path = table(tmp_path / "v.csv", [sweep], lag=lag)
-        (back,) = read_vectors(path, "lag" if lag else "lead")
-        np.testing.assert_allclose(back.vectors, sweep.vectors, rtol=1e-9)
-        np.testing.assert_allclose(back.covariances, sweep.covariances, rtol=1e-8, atol=1e-20)
-
-
 def test_runs_have_their_own_speeds_and_order(tmp_path):
     """Rows in any order, by time; without times by speed; a sensor may lack."""
     text = HEAD + "b,700,DE,1,0,5,1,1\nb,650,DE,2,0,4,1,1\nb,650,NDE,3,0,4,1,1\n" + ROWS
@@ -47,7 +37,6 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
     assert np.isnan(b.vectors).tolist() == [[False, False], [False, True]]
     (bare,) = read(tmp_path, "run,speed_Hz,sensor,amplitude,phase_deg\na,9,x,1,0\na,8,x,2,0\n")
     assert bare.time is None
-    assert bare.covariances is None
     np.testing.assert_allclose(bare.speeds / 2 / np.pi, [8, 9])
     assert bare.labels.speed_unit == "Hz"
 
@@ -65,8 +54,6 @@ def test_runs_have_their_own_speeds_and_order(tmp_path):
             "column speed_rpm: found '901', expected 900 as in row 3",
         ),
         (HEAD.replace(",phase_std_deg", "") + ROWS.replace(",2,6", ",2").replace(",2,3", ",2"), "phase_std"),
-        (HEAD.replace("std_um_pp", "std_mm_s") + ROWS, "amplitude_std_mm_s.* a unit that converts"),
-        (HEAD.replace("time_s", "time_h") + ROWS, "one of the units s, ms, us or min"),
         ("run,speed_rpm,sensor,amplitude,phase_deg\na,9,x,1,0\na,9,x,2,0\n", "need a column time_s"),
     ],
 )

@@ -3,11 +3,9 @@
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.io import wavfile
 
-from rotorid.files import InputError, TableWarning
+from rotorid.files import InputError
 from rotorid.files.job import read_job
 
 SAMPLE = Path(__file__).parents[3] / "sample_data" / "waveforms"
@@ -17,19 +15,6 @@ SAMPLE = Path(__file__).parents[3] / "sample_data" / "waveforms"
 def job(tmp_path):
     shutil.copytree(SAMPLE, tmp_path, dirs_exist_ok=True)
     return tmp_path / "job.toml"
-
-
-def test_what_vectors_say_of_records_is_said_of_a_job(job):
-    rate, counts = wavfile.read(job.with_name("as_found.wav"))
-    wavfile.write(
-        job.with_name("as_found.wav"),
-        rate,
-        np.minimum(counts, [[2**15 - 1, int(counts[:, 1].mean()) + 400, 2**15 - 1, 2**15 - 1]]).astype(
-            np.int16
-        ),
-    )
-    with pytest.warns(TableWarning, match="run 'as_found': sensor 'A' is clipped"):
-        read_job(job)
 
 
 def test_a_run_up_in_a_job_wants_speeds(job):

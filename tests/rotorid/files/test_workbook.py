@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import numpy as np
@@ -78,26 +77,6 @@ def test_all_that_a_job_says_is_the_same_in_a_workbook(part, folder):
     assert differences(job, read_job(write_job(folder, ""))), "this part of the job must matter"
     found = [correct(estimate_influence(j.trials), limits=j.limits_of(j.trials.planes)) for j in (job, back)]
     np.testing.assert_array_equal(found[0].weights, found[1].weights)
-
-
-def test_digits_survive(tmp_path):
-    third, tiny = 1 / 3, 1.2345678901234567e-7
-    runs = [RUNS[0], *[[r, 1e3 * third, s, a * third, p * third + tiny] for r, _, s, a, p in RUNS[1:]]]
-    write_csv(tmp_path / "runs.csv", runs), write_csv(tmp_path / "weights.csv", WEIGHTS)
-    there_and_back(write_job(tmp_path, ""), tmp_path / "sheet.xlsx")
-
-
-def test_names_with_points_quotes_and_signs(tmp_path):
-    names = {"A": '3.5" probe', "B": "#2 it's"}
-    runs = [RUNS[0], *[[r, s, names[c], a, p] for r, s, c, a, p in RUNS[1:]]]
-    weights = [WEIGHTS[0], *[[r, f"#{p}.0", m, a] for r, p, m, a in WEIGHTS[1:]]]
-    for name, table in {"runs": runs, "weights": weights}.items():
-        text = "\n".join(",".join(f'"{str(c).replace(chr(34), chr(34) * 2)}"' for c in row) for row in table)
-        (tmp_path / f"{name}.csv").write_text(text, encoding="utf-8")
-    text = "".join(f"[slow_roll.{json.dumps(n)}]\namplitude = 0.1\nphase_deg = 3\n" for n in names.values())
-    _, back = there_and_back(write_job(tmp_path, text), tmp_path / "sheet.xlsx")
-    assert tuple(back.planes) == ("#1.0", "#2.0")
-    assert back.trials.sensors == ('3.5" probe', "#2 it's")
 
 
 def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):

@@ -9,7 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
-from tables_data import DATE, RUNS, WEIGHTS, complaints, replaced, the_only, write_book
+from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book
 from workbook_jobs import differences, filled, rows, with_stored_values
 
 from rotorid.files import read_job
@@ -37,19 +37,12 @@ def european(table):
 def test_the_form_has_headers_explanations_and_choices():
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
     assert tuple(book.sheetnames) == (*FORM, "notes")
+    notes = [(row[0], row[1]) for row in book["notes"].iter_rows(values_only=True)]
     for name in FORM:
-        sheet = book[name]
-        names = [cell.value for cell in sheet[1]]
-        assert None not in names
-        if name != "settings":
-            assert sheet.max_row == 1
-            for cell in sheet[1]:
-                assert cell.comment is not None, cell.coordinate
-                assert "Allowed" in cell.comment.text
-        notes = [(row[0], row[1]) for row in book["notes"].iter_rows(values_only=True)]
-        keys = names if name != "settings" else [cell.value for cell in book["settings"]["A"][1:]]
+        keys = [cell.value for cell in (book[name]["A"][1:] if name == "settings" else book[name][1])]
         assert {(name, key) for key in keys} <= set(notes)
-
+        for cell in () if name == "settings" else book[name][1]:
+            assert "Allowed" in cell.comment.text, cell.coordinate
     for (sheet, first), model in zip(NAMED.items(), (Plane, Sensor), strict=True):
         names = {cell.value for cell in book[sheet][1]} - {first, "note"}
         assert names <= {name for key in model.known_keys().values() for name in key.variants}
@@ -59,20 +52,17 @@ def test_the_form_has_headers_explanations_and_choices():
 
 def test_the_form_with_settings(tmp_path):
     """Excel keeps 2% as 0.02, which must not be read as 0.02 percent."""
-    path = filled(
-        tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=[{"plane": "1", "use": "no"}]
-    )
+    planes = [{"plane": "1", "use": "no"}]
+    path = filled(tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=planes)
     book = openpyxl.load_workbook(path)
     keys = [cell.value for cell in book["settings"]["A"]]
-    assert read_job(path).conventions.labels.phase == "lead"
-    for key, value in (("phase", "lag"), ("errors.phase_deg", "1,5")):
-        book["settings"].cell(keys.index(key) + 1, 2).value = value
+    phase, error = (book["settings"].cell(keys.index(key) + 1, 2) for key in ("phase", "errors.phase_deg"))
+    phase.value, error.value = "lag", "1,5"
     book.save(path)
     job = read_job(path)
     assert (job.conventions.labels.phase, job.used) == ("lag", ("2",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
-    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).number_format = "0%"
-    book["settings"].cell(keys.index("errors.phase_deg") + 1, 2).value = 0.02
+    error.value, error.number_format = 0.02, "0%"
     book.save(path)
     (complaint,) = complaints(read_job, path)
     assert "found '2%'" in str(complaint)
@@ -92,15 +82,10 @@ def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
 @each_of(
     ("sheet", "row", "column", "value", "shown", "words"),
     [
-        ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
-        ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
         ("planes", 3, "plane", "9", "9", "one of the job's planes, 1 and 2"),
         ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
-        ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
-        ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
         ("settings", 3, "value", "=1/2", "=1/2", "a formula with its stored value"),
-        ("settings", 2, "key", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
     ],
 )
 def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, value, shown, words):
@@ -117,20 +102,6 @@ def test_formulas_with_stored_values_count(tmp_path):
     with_stored_values(path, [4.9, 347, 0.5])
     job = read_job(path)
     assert differences(job, read_job(write_book(tmp_path / "plain.xlsx", BOOK))) == ()
-
-
-def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
-    path = write_book(tmp_path / "job.xlsx", {**BOOK, "Tabelle2": []})
-    plain = read_job(path)
-    book = openpyxl.load_workbook(path)
-    book["settings"].sheet_state = "hidden"
-    book["runs"].row_dimensions[3].hidden = True
-    for name in FORM:
-        book[name].cell(40, 1).value = "\u00a0 "
-        book[name].cell(2, 30).value = " "
-        book[name].cell(60, 12).number_format = "0.00"
-    book.save(path)
-    assert differences(plain, read_job(path)) == ()
 
 
 def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):

@@ -53,9 +53,3 @@ def test_a_tacho_with_damage():
     rpm = speed.lines[0]
     np.testing.assert_allclose(rpm.get_ydata(), 60 * (10 + 0.8 * rpm.get_xdata()), rtol=1e-3)
     assert signal.get_title() == "jitter 0.25° (standard deviation of a pulse)"
-
-
-def test_a_sound_tacho_is_shown_in_the_middle():
-    (signal, _), _ = drawn(missing=np.zeros(0), double=np.zeros(0))
-    assert np.mean(signal.get_xlim()) == pytest.approx(SECONDS / 2, abs=0.05)
-    assert len(curve(signal, "missing, bridged: 0")) == 0
