@@ -56,15 +56,6 @@ def test_rows_of_lesson_1_are_those_of_an_independent_derivation():
     np.testing.assert_allclose(Y, stack(np.array(right)), rtol=1e-13)
 
 
-def test_rows_of_task_21_are_the_printed_ones():
-    model = harmonic_model(["(p**3 + a1*p**2 + a2*p + a3)*X = F"], estimate=["a1", "a2", "a3"])
-    w, x, force = 1.7, 0.4 - 0.9j, 2.0
-    K, Y, *_ = build_rows(model, experiments(model, [w], {"F": force, "X": [x]}))
-    printed = [[-(w**2) * x.real, -w * x.imag, x.real], [-(w**2) * x.imag, w * x.real, x.imag]]
-    np.testing.assert_allclose(K, printed, rtol=1e-14)
-    np.testing.assert_allclose(Y, [force - w**3 * x.imag, w**3 * x.real], rtol=1e-14)
-
-
 def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
     truth = np.array([4.0, 1.5, 2.5])
     signals = simulate(lesson_1(), truth, np.array([8.0, 15.0, 20.0]), {"F": 5.0}).signals
