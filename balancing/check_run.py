@@ -42,9 +42,10 @@ from balancing.tables import (
     weight_rows,
 )
 from balancing.trials import Trials
-from rotorid.base.answer import Answer, Answered, Column, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, records, text
 from rotorid.base.text import figures, listing, sentence
 from rotorid.regression import solution, unstretch
 
@@ -161,7 +162,7 @@ class CheckComparison(Answered):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
         labels, readings = self.labels, self._columns()
-        sizes = {column.name: list(column.values) for column in readings}
+        sizes = {column.heading: list(column.values) for column in readings}
         mounted = [
             {"run": run, "weights": weight_rows(labels, self.planes, weights)}
             for run, weights in zip(self.runs, self.weights, strict=True)
@@ -170,7 +171,7 @@ class CheckComparison(Answered):
             {
                 "as_proposed": self.as_proposed,
                 "mounted": mounted,
-                "readings": rows(readings),
+                "readings": records(readings),
                 "chi_square": self.chi_square,
                 "degrees_of_freedom": self.n,
                 "error_degrees_of_freedom": None,
@@ -229,13 +230,13 @@ class CheckComparison(Answered):
             *(replace(column, values=list(column.values) * R) for column in places),
             *chain.from_iterable(vectors),
             covariance_column(labels, "covariance", covariance, before.size),
-            Column("distance", self.distance.ravel(), partial(figures, digits=2), "off by std"),
+            Column("distance", self.distance.ravel(), partial(figures, digits=2), title="off by std"),
         )
 
     def _readings_text(self) -> str:
         hidden = {"before", "before_phase_deg", "difference_phase_deg"}
         hidden |= {"distance"} if self.explained is None else set()
-        shown = [column for column in self._columns() if column.name not in hidden]
+        shown = [column for column in self._columns() if column.heading not in hidden]
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         table = text(shown, left=2 + (len(self.runs) > 1))
         return f"Vibration{unit}, predicted and achieved\n{table}"

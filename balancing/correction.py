@@ -26,9 +26,10 @@ from balancing.tables import (
     weight_columns,
     weight_rows,
 )
-from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import WIDTH, capital, cut, figures, listing
 
 if TYPE_CHECKING:
@@ -194,10 +195,10 @@ class Correction(Prediction, Answered):
                 "method": self.method,
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
-                "corrections": rows(self._weight_columns()),
+                "corrections": records(self._weight_columns()),
                 "mounted_in_last_run": mounted,
                 "add_to_mounted": self.work_rows(planes, self.to_add) if there else None,
-                "residuals": rows(residuals),
+                "residuals": records(residuals),
                 "rms_before": rms(old),
                 "rms_after": rms(new),
                 "rms_after_95": self.check_rms * scale,
@@ -239,7 +240,7 @@ class Correction(Prediction, Answered):
         labels, planes = self.labels, self.planes
         head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
         *columns, _, at = self.work_columns(planes, self.weights)
-        each = [head | row for row in rows((*columns, at))]
+        each = [head | row for row in records((*columns, at))]
         return OtherReading(words, each, self.places(planes, self.weights).tolist())
 
     def _weight_columns(self) -> tuple[Column, ...]:
@@ -318,14 +319,14 @@ class Correction(Prediction, Answered):
         plane, mass, *_ = weight_columns(labels, self.planes, self.weights)
         columns = [plane, mass, Column("angle", self.places(self.planes, self.weights), degrees)]
         if removed:
-            columns.insert(1, Column("", ["(remove)" if p in removed else "(add)" for p in self.planes], str))
+            columns.insert(1, Column("", ["(remove)" if p in removed else "(add)" for p in self.planes]))
         if self.region_known:
             sizes, angles = self.half_widths()
             widths = [f"± {figures(width * labels.weight_scale, 2)} {labels.weight_in}" for width in sizes]
             for p in np.flatnonzero(self.held):
                 widths[p] = "at its limit"
             turns = list(map(_angle_width, np.degrees(angles)))
-            columns += [Column("95 %", widths, str), Column("", turns, str)]
+            columns += [Column("95 %", widths), Column("", turns)]
         for other in self.others:  # the mass where that is another than the one shown
             places = map(degrees, other.places)
             masses = [figures(row["mass"]) for row in other.rows]
@@ -333,7 +334,7 @@ class Correction(Prediction, Answered):
                 place if size == figures(here) else f"{size} at {place}"
                 for size, place, here in zip(masses, places, mass.values, strict=True)
             ]
-            columns.append(Column(f"if {other.words}", cells, str))
+            columns.append(Column(f"if {other.words}", cells))
         taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
         conventions = f"{capital(labels.turning_in_words())}; phases as {labels.phase}{taken}"
         lines = [f"{conventions}; weights for the bare rotor."]
@@ -344,7 +345,7 @@ class Correction(Prediction, Answered):
             stays = {name: f"{figures(size)} at {place}" for name, size, place in each if size}
             cells = [stays.pop(name, "nothing") for name in self.planes]
             word = "remove" if removed == set(self.planes) else "add"
-            columns.append(Column(f"{word} if {cut(run, _NAME)!r} stays", cells, str))
+            columns.append(Column(f"{word} if {cut(run, _NAME)!r} stays", cells))
             also = [f"{words} in plane {name!r}" for name, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []

@@ -43,8 +43,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import figures, rpm, rpm_text
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ class Tolerance(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""
-        ends = rows(_limit_columns(self.bearings, self.bearing_limits))
+        ends = records(_limit_columns(self.bearings, self.bearing_limits))
         planes = _limit_columns(self.positions, self.limits)
         return {
             "grade": f"G{self.grade:g}",
@@ -131,7 +132,7 @@ class Tolerance(Answered):
             "specific_um": self.eccentricity * 1e6,
             "centre_of_mass_m": self.centre,
             "bearings": ends or None,
-            "planes": rows((Column("plane", self.planes), *planes)),
+            "planes": records((Column("plane", self.planes), *planes)),
             "rule": self.rule,
             "warnings": list(self.warnings),
         }
@@ -146,9 +147,9 @@ class Tolerance(Answered):
         limits = np.concatenate(([self.total], self.bearing_limits, self.limits)) * _GRAM_MM
         places = ("whole rotor", *names, *(f"plane {name}" for name in self.planes))
         return (
-            Column("place", places, str, ""),
-            Column("position_mm", at * 1e3, "at {:.6g} mm".format, ""),
-            Column("limit_g_mm", limits, figures, "g·mm"),
+            Column("place", places, title=""),
+            Column("position_mm", at * 1e3, "at {:.6g} mm".format, title=""),
+            Column("limit_g_mm", limits, figures, title="g·mm"),
         )
 
     @property

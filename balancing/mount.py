@@ -33,9 +33,10 @@ from balancing.tables import (
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:
@@ -89,11 +90,11 @@ class Mounted(Answered):
         )
         return plain(
             {
-                "planes": rows((*weight_columns(labels, c.planes, self.weights), actions)),
+                "planes": records((*weight_columns(labels, c.planes, self.weights), actions)),
                 "on_top_of": self.on_top_of,
                 "warnings": [],
-                "holes": rows(_columns(self)),
-                "residuals": rows(residuals),
+                "holes": records(_columns(self)),
+                "residuals": records(residuals),
                 **self._left(self.discrete, self.after),
                 "fewer": [self._left(one, one.residual) for one in self.discrete.fewer],
             }
@@ -150,7 +151,7 @@ class Mounted(Answered):
 
     def in_planes(self) -> list[str]:
         """What is in which hole of each plane, plane by plane."""
-        lines, every = [], rows(_columns(self))
+        lines, every = [], records(_columns(self))
         for plane in self.correction.planes:
             here = [row for row in every if row["plane"] == plane]
             words = [
@@ -285,10 +286,10 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
     gone = np.array([plane in c.remove for plane in planes])
     return (
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
-        Column("action", [_action(c, plane) for plane in planes]),
-        Column("hole", [place[1] for place in places], str),
-        Column("angle_deg", np.round(np.mod(angle + 180.0 * gone, 360), 9), "{:.1f}°".format, "angle"),
-        Column("mass", size, figures, labels.weight_in),
-        Column("unit", [labels.weight_unit] * len(places)),
-        Column("pieces", [place[3] for place in places], str),
+        Column("action", [_action(c, plane) for plane in planes], None),
+        Column("hole", [place[1] for place in places]),
+        Column("angle_deg", np.round(np.mod(angle + 180.0 * gone, 360), 9), "{:.1f}°".format, title="angle"),
+        Column("mass", size, figures, title=labels.weight_in),
+        Column("unit", [labels.weight_unit] * len(places), None),
+        Column("pieces", [place[3] for place in places]),
     )

@@ -21,10 +21,11 @@ from balancing.conventions import Labels
 from balancing.influence import Influence, match_speeds
 from balancing.tables import rms, three_figures, weight_rows
 from balancing.trials import Trials
-from rotorid.base.answer import Answer, Answered, Column, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, records, text
 from rotorid.base.text import counted
 from rotorid.regression import RCOND, gain
 
@@ -105,7 +106,7 @@ class Subsets(Answered):
                 "max_before": self.largest_before * scale,
                 "choices": self.choices,
                 "dependent_choices": self.dependent,
-                "rows": rows((*self._columns(), Column("weights", weights))),
+                "rows": records((*self._columns(), Column("weights", weights))),
             }
         )
 
@@ -132,11 +133,11 @@ class Subsets(Answered):
         mass = np.abs(self.weights).max(axis=1) * labels.weight_scale
         return (
             Column("planes", self.planes, ", ".join),
-            Column("rms_after", self.rms * scale, three_figures, "rms"),
-            Column("rms_expected", self.expected * scale, three_figures, "expected"),
-            Column("max_after", self.largest * scale, three_figures, "largest"),
-            Column("largest_weight", mass, three_figures, heaviest),
-            Column("condition_number", self.condition_number, three_figures, "condition"),
+            Column("rms_after", self.rms * scale, three_figures, title="rms"),
+            Column("rms_expected", self.expected * scale, three_figures, title="expected"),
+            Column("max_after", self.largest * scale, three_figures, title="largest"),
+            Column("largest_weight", mass, three_figures, title=heaviest),
+            Column("condition_number", self.condition_number, three_figures, title="condition"),
         )
 
 

@@ -25,9 +25,9 @@ from balancing.tables import (
     weight_columns,
 )
 from balancing.trials import Limits
-from rotorid.base.answer import Column, rows
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, records
 from rotorid.base.text import figures
 
 HELD = 1e-5
@@ -246,7 +246,7 @@ class Prediction:
     def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
         """Weights of planes as JSON types, and where to take material away from some."""
         columns = self.work_columns(planes, weights)
-        return rows(columns if self.remove else columns[:-2])
+        return records(columns if self.remove else columns[:-2])
 
     def limits_document(self) -> dict[str, Any] | None:
         """Of weights and angles, where to work, and of readings in the order of `residuals`; None: no limits.

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from balancing.conventions import Labels
 from balancing.errors import Reading, RunErrors
 from balancing.errors import rms as rms
-from rotorid.base.answer import Column, rows
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.tables import Column, records
 from rotorid.base.text import RPM, figures, rpm
 
 ROUNDING = 1e-12
@@ -35,24 +35,24 @@ def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) ->
     """plane, mass, unit and angle_deg of weights (P,), kg or kg·m."""
     mass, angle = labels.weight(weights)
     return (
-        Column("plane", planes, str),
-        Column("mass", mass, figures, labels.weight_in),
-        Column("unit", (labels.weight_unit,) * len(planes)),
-        Column("angle_deg", angle, degrees, "angle"),
+        Column("plane", planes),
+        Column("mass", mass, figures, title=labels.weight_in),
+        Column("unit", (labels.weight_unit,) * len(planes), None),
+        Column("angle_deg", angle, degrees, title="angle"),
     )
 
 
 def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
     """Weights of the planes as JSON rows."""
-    return rows(weight_columns(labels, planes, weights))
+    return records(weight_columns(labels, planes, weights))
 
 
 def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
     """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
     turns = np.repeat([rpm(speed) for speed in speeds], len(sensors))
     return (
-        Column("speed_rpm", turns, lambda turn: labels.speed_number(turn / RPM), labels.speed_in),
-        Column("sensor", tuple(sensors) * len(speeds), str),
+        Column("speed_rpm", turns, lambda turn: labels.speed_number(turn / RPM), title=labels.speed_in),
+        Column("sensor", tuple(sensors) * len(speeds)),
     )
 
 
@@ -91,8 +91,8 @@ def small(value: float, scale: float) -> str:
 def covariance_column(labels: Labels, name: str, covariance: FloatArray | None, count: int) -> Column:
     """Covariance (2, 2) of each of so many readings; None: not known."""
     if covariance is None:
-        return Column(name, [None] * count)
-    return Column(name, labels.vibration_covariance(covariance).reshape(-1, 2, 2))
+        return Column(name, [None] * count, None)
+    return Column(name, labels.vibration_covariance(covariance).reshape(-1, 2, 2), None)
 
 
 def vector_columns(
@@ -117,7 +117,7 @@ def vector_columns(
         size = np.where(size > nothing, size, 0.0)
     return (
         Column(name, size, three_figures),
-        Column(f"{name}_phase_deg", phase, lambda angle: degrees(angle, 0), "phase"),
+        Column(f"{name}_phase_deg", phase, lambda angle: degrees(angle, 0), title="phase"),
     )
 
 

@@ -35,9 +35,10 @@ import numpy as np
 from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm
 
@@ -138,7 +139,7 @@ class TrialWeight(Answered):
             "force_N": self.force,
             "load_N": self.load,
             "force_percent": self._share(),
-            "expected": rows(self._columns()) or None,
+            "expected": records(self._columns()) or None,
             "conventions": self.labels.conventions(),
             "warnings": self.warnings,
         }

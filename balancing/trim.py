@@ -17,9 +17,10 @@ from balancing.influence import match_speeds
 from balancing.mount import Mounted
 from balancing.tables import rms, small, three_figures, weight_rows
 from balancing.trials import Trials
-from rotorid.base.answer import COLUMNS, Answer, Answered, Column, text
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.base.text import capital, figures
 
 WORTH = 0.9
@@ -73,8 +74,8 @@ class LeftToDo(Answered):
         """What to do; what is mounted, and the trim in each plane."""
         c = self.correction
         columns = [
-            Column("plane", self.planes, str),
-            Column("mounted", [c.labels.weight_at(w) if w else "nothing" for w in self.there], str),
+            Column("plane", self.planes),
+            Column("mounted", [c.labels.weight_at(w) if w else "nothing" for w in self.there]),
         ]
         lines = []
         if self.word == "trim" and self.pieces is not None:
@@ -92,7 +93,7 @@ class LeftToDo(Answered):
                 else "nothing"
                 for plane, w, at in add
             ]
-            columns.append(Column("trim", cells, str))
+            columns.append(Column("trim", cells))
         table = text(columns, left=len(columns), width=COLUMNS)
         return Answer(f"{capital(self.word)}; {self.why}.", "\n".join([table, *lines]), to_mount=True)
 

@@ -29,10 +29,11 @@ from balancing.influence import Influence
 from balancing.regions import NORMAL_RADIUS, real_parts
 from balancing.tables import weight_columns
 from balancing.trials import Trials, check_names
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import capital, figures, listing
 from rotorid.regression import RCOND
 
@@ -137,7 +138,7 @@ class Unbalance(Answered):
         """As JSON types, in the labels' units and conventions; what is unknown is None."""
         return plain(
             {
-                "stations": rows(self._columns()),
+                "stations": records(self._columns()),
                 "method": self.method,
                 "rank": self.rank,
                 "condition_number": self.condition_number,
@@ -157,13 +158,13 @@ class Unbalance(Answered):
         station, size, unit, angle = weight_columns(self.labels, self.stations, self.unbalance)
         std = self.std * self.labels.weight_scale
         return (
-            replace(station, name="station"),
-            replace(size, name="unbalance", shown="{:.4g}".format),
+            replace(station, heading="station"),
+            replace(size, heading="unbalance", shown="{:.4g}".format),
             unit,
             angle,
-            Column("std", std, lambda one: f"± {figures(NORMAL_RADIUS * one, 2)}", "95 %"),
-            Column("own_share", self.own_share),
-            Column("determined", self.determined),
+            Column("std", std, lambda one: f"± {figures(NORMAL_RADIUS * one, 2)}", title="95 %"),
+            Column("own_share", self.own_share, None),
+            Column("determined", self.determined, None),
         )
 
     @property
@@ -176,7 +177,7 @@ class Unbalance(Answered):
         assumed = (self.labels.assumed_in_words(),) if self.labels.assumed else ()
         return Answer(
             f"{capital(self.words())} ({self.method}).",
-            text((*self._columns(), Column("", sure, str, "determined"))),
+            text((*self._columns(), Column("", sure, title="determined"))),
             assumed + self.warnings,
         )
 

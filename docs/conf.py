@@ -24,7 +24,7 @@ extensions = [
     "numpydoc",
     "myst_parser",
     "commands",
-    "pictures",
+    "plotted",
     "mathml",
     "names",
     "tables",
@@ -40,10 +40,10 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
+autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
-# Formulas become MathML while the pages are built: no script, no network, no LaTeX.
 html_math_renderer = "mathml"
 html_theme = "alabaster"
 html_theme_options = {

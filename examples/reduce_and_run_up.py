@@ -37,7 +37,7 @@ def main() -> dict[str, float]:
     whole = bearings(rotor, BearingsOptions(speeds="5000:8000:1000rpm")).result
     system = rotor_system(small, 500 * RPM, 9000 * RPM)
     resting = equilibrium(system, 5000 * RPM)
-    loads = np.abs(resting.load), np.abs(whole.found[0].load)
+    loads = np.abs(resting.load), np.abs(whole.equilibria[0].load)
     print("loads in N, of the small model and of the rotor:", *(np.round(load, 3) for load in loads))
     (lost,) = periodic_motion(system, 5000 * RPM, 8000 * RPM).branches[0].bifurcations
     assert whole.stability is not None

@@ -34,7 +34,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     speeds = np.arange(1000, 15001, 20) * RPM
     response = fem.unbalance_response(rotor, unbalance, speeds)
     peaks = fem.response_peaks(response, ("probe DE", 45), operating=OPERATING)
-    print(peaks.summary("µm", 1e6), end="\n\n")
+    print(peaks.summary(), end="\n\n")
 
     # Where it would become unstable.
     stability = fem.stability_threshold(rotor, 14000 * RPM, lowest=1000 * RPM)

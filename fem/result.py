@@ -39,7 +39,7 @@ class Result(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """The last of the tables: of modes, a row per node."""
-        return frame(self.tables()[-1])
+        return frame(self.tables()[-1].columns)
 
     @abstractmethod
     def sentence(self) -> str:

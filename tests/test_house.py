@@ -8,7 +8,10 @@ from pathlib import Path
 import dialect
 import house
 import pytest
-from option_pairs import options_of_commands
+import typer.main
+from typer.core import TyperGroup
+
+from rotorid.cli import application
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = house.PACKAGES
@@ -156,6 +159,26 @@ def test_what_the_floor_has_is_written_there_only(pattern):
 def test_no_plural_is_built_by_hand():
     """One function counts words: `counted`; no text says "mode(s)"."""
     assert lines_with(r"\} ?\w*\w\((?:e?s)\)|\} [\w ]*\{(?:''|'s') if ") == []
+
+
+def options_of_commands():
+    """Long names of the options of each command, by its name; of those of `fleet` as `fleet fit`."""
+
+    def commands(group, prefix=""):
+        for name, command in group.commands.items():
+            if isinstance(command, TyperGroup):
+                yield from commands(command, f"{name} ")
+            else:
+                yield f"{prefix}{name}", command
+
+    return {
+        name: [
+            max((word for word in option.opts if word.startswith("--")), key=len)
+            for option in command.params
+            if option.param_type_name == "option" and option.name != "help"
+        ]
+        for name, command in commands(typer.main.get_command(application()))
+    }
 
 
 def test_options_are_few():

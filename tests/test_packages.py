@@ -34,9 +34,12 @@ def test_an_import_does_not_load_what_only_some_commands_need(package):
     assert not loaded & set(HEAVY)
 
 
-def test_the_command_line_starts_without_numerics():
+def test_the_command_line_and_its_help_start_without_numerics():
+    shown = "import sys, rotorid.cli as c; c.application()([*typed], standalone_mode=False); "
     numerics = {"numpy", "fem", "balancing"}
-    assert run_python(f"import sys, rotorid.cli; print({numerics} & {{*sys.modules}})") == "set()\n"
+    for typed in ([], ["--help"]):
+        code = f"typed = {typed}; {shown}print({numerics} & {{*sys.modules}})"
+        assert run_python(code).endswith("\nset()\n"), typed
 
 
 def test_only_what_moves_loads_the_compiler():

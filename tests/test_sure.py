@@ -22,7 +22,7 @@ from balancing import (
 )
 from fem.parameters import with_parameters
 from rotorid.calibration import Unknown, calibrate
-from rotorid.fleet import fit_type, update
+from rotorid.fleet.machine_type import fit_type, update
 from rotorid.identify import AmplitudeErrors, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.fit_records import fit

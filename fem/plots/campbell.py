@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,6 @@ from rotorid.base.plot_style import (
     COLORS,
     QUIET,
     VERMILION,
-    WARNING,
     WIDTH,
     legend_above,
     look,
@@ -25,10 +24,7 @@ from rotorid.base.plot_style import (
     note,
     plain,
     plain_numbers,
-    rad_s_above,
-    scale_beside,
-    shade_operating,
-    shade_unstable,
+    second_scale,
 )
 from rotorid.base.text import RPM
 
@@ -41,11 +37,28 @@ if TYPE_CHECKING:
 
 _HIGHEST = 3.0  # logarithmic decrements above it are not drawn to scale
 _PALE = 0.35
+_WARNING = "#8a3d00"
 _STYLES: dict[float, dict[str, Any]] = {
     1.0: {"linestyle": "-", "marker": "^", "fillstyle": "full"},
     -1.0: {"linestyle": "--", "marker": "v", "fillstyle": "none"},
     0.0: {"linestyle": ":", "marker": "D", "fillstyle": "none"},
 }
+
+
+def shade_unstable(
+    ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
+) -> None:
+    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
+    for k, (first, last) in enumerate(ranges):
+        band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
+        band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
+
+
+def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
+    """Shade the range of operating speeds, rad/s, if there is one, on axes in rpm."""
+    if operating is not None:
+        first, last = operating
+        ax.axvspan(first * RPM, last * RPM, color="#000000", alpha=0.1, linewidth=0, label="operating range")
 
 
 def campbell_figure(campbell: Campbell, operating: tuple[float, float] | None = None) -> Figure:
@@ -83,8 +96,8 @@ def draw_campbell(
     shade_operating(ax, operating)
     shade_unstable(ax, [(window.first, window.last) for window in campbell.windows], "unstable")
     plain(ax)
-    rad_s_above(ax)
-    scale_beside(ax, 60.0, "whirl frequency, Hz")
+    second_scale(ax)
+    second_scale(ax, 60.0, "whirl frequency, Hz", "right")
     legend_above(ax, borderaxespad=ABOVE_SCALE)
     return ax
 
@@ -101,7 +114,7 @@ def draw_log_decrements(campbell: Campbell, ax: Axes, operating: tuple[float, fl
     ax.set(ylim=(low, high), xlabel="speed, rpm", ylabel="logarithmic decrement")
     ax.axhline(0.0, color="black", linewidth=1.1)
     ax.axhspan(low, 0.0, color=VERMILION, alpha=0.10, hatch="///", linewidth=0)
-    note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=WARNING)
+    note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=_WARNING)
     plain(ax)
     shade_operating(ax, operating)
     return ax
@@ -124,7 +137,7 @@ def draw_speed_map(
         ax.axhspan(first * RPM, last * RPM, color="black", alpha=0.07, linewidth=0, label="operating range")
     ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm (both log)")
     plain(ax)
-    scale_beside(ax, RPM, "critical speed, rad/s")
+    second_scale(ax, RPM, "critical speed, rad/s", "right")
     for scale in (ax, *ax.child_axes):
         plain_numbers(scale)
     legend_above(ax)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from fem.orbits import DIRECTION_NAMES, orbits
 from fem.peaks import smooth_curves
+from fem.plots.campbell import shade_operating, shade_unstable
 from fem.plots.rotor import draw_rotor
 from fem.rotor import SensorLike, as_sensor, label
 from fem.stability import Window, within
@@ -31,9 +32,7 @@ from rotorid.base.plot_style import (
     note,
     on_figure,
     plain,
-    rad_s_above,
-    shade_operating,
-    shade_unstable,
+    second_scale,
 )
 from rotorid.base.text import RPM, Shown
 
@@ -283,7 +282,7 @@ def _amplitudes(
         ax.set(yscale="log", ylim=(max(least / 2, 1e-6 * most), None))
         ylabel += " (log)"
     ax.set_ylabel(ylabel)
-    rad_s_above(ax)
+    second_scale(ax)
     legend_above(ax, borderaxespad=ABOVE_SCALE)
     return ax
 

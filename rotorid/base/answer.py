@@ -18,20 +18,6 @@ left 3 g at 20°
 Warning: the weight in plane 'A' is small
 <BLANKLINE>
 Every sensor: --table.
-
-Its tables are tuples of `Column`, of which `rows`, `frame` and `text` make JSON, a DataFrame and text:
-
->>> columns = (
-...     Column("mode", [1, 2], str),
-...     Column("speed_rpm", [2980.5, float("nan")], "{:.1f}".format, "rpm"),
-...     Column("whirl", ["forward", "mixed"]),
-... )
->>> rows(columns)[0]
-{'mode': 1, 'speed_rpm': 2980.5, 'whirl': 'forward'}
->>> print(text(columns))
-  mode         rpm
-  1         2980.5
-  2
 """
 
 from __future__ import annotations
@@ -39,16 +25,11 @@ from __future__ import annotations
 import re
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any
 
-from rotorid.base.json import cell
-from rotorid.base.text import WIDTH, capital, counted, cut, table
-
-if TYPE_CHECKING:
-    import pandas as pd
+from rotorid.base.text import capital, counted, cut
 
 LINES, COLUMNS = 12, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
@@ -202,49 +183,3 @@ def _shortened(lines: list[str], room: int, most: int) -> tuple[list[str], int]:
     ends = [k for k, line in enumerate(lines) if not line] or [len(lines)]
     shown = max([min(ends[0], max(room, most)), *(end for end in ends if end <= room)])
     return lines[:shown], sum(map(bool, lines[shown:]))
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column of a table.
-
-    Attributes
-    ----------
-    name
-        With its unit, as files and frames have it.
-    values
-        One cell a row; NaN or None where there is nothing.
-    shown
-        A cell as text; None: the column is not printed.
-    title
-        Over the column in text, where that is not the name.
-    """
-
-    name: str
-    values: Collection[Any]
-    shown: Callable[[Any], str] | None = None
-    title: str | None = None
-
-
-def rows(columns: Sequence[Column]) -> list[dict[str, Any]]:
-    """One dict a row, of JSON types."""
-    names = [column.name for column in columns]
-    cells = (cell(column.values) for column in columns)
-    return [dict(zip(names, row, strict=True)) for row in zip(*cells, strict=True)]
-
-
-def frame(columns: Sequence[Column]) -> pd.DataFrame:
-    """The same as a DataFrame."""
-    import pandas as pd
-
-    return pd.DataFrame({column.name: column.values for column in columns})
-
-
-def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
-    """The columns that are printed, all but the first `left` aligned to the right; nothing stays blank."""
-    printed = []
-    for each in columns:
-        if (shown := each.shown) is not None:
-            cells = ["" if value is None or value != value else shown(value) for value in each.values]
-            printed.append([each.name if each.title is None else each.title, *cells])
-    return table([list(row) for row in zip(*printed, strict=True)], left, width)

@@ -104,7 +104,9 @@ def off_axis(weights: ArrayLike) -> bool:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
-    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
-    parts = ((radial, along), (tangential, across))
-    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
+    size = np.abs(z)
+    unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
+    axes = np.stack((unit, 1j * unit), axis=-1)
+    turn = np.stack((axes.real, axes.imag), axis=-2)
+    sizes = np.stack(np.broadcast_arrays(radial, tangential), axis=-1)
+    return np.asarray((turn * sizes[..., None, :]) @ turn.swapaxes(-1, -2))

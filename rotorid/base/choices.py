@@ -43,11 +43,6 @@ def find(methods: Sequence[Method[_T]], name: str, what: str) -> Method[_T]:
     return methods[names(methods).index(one_of(name, what, names(methods)))]
 
 
-def described(methods: Sequence[Method[Any]]) -> str:
-    """All with their sentences, for help."""
-    return "; ".join(f"{method.name}: {method.about}" for method in methods) + "."
-
-
 def suggest(name: str, choices: Iterable[str]) -> str | None:
     """The choice nearest to a misspelt name, or None.
 

@@ -27,7 +27,6 @@ WIDTH, TEXT = 7.0, 9.0
 GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 """Behind words that stand on curves."""
-WARNING = "#8a3d00"
 ABOVE_SCALE = 4.2
 """Room, in letters, between axes and a legend above their second scale."""
 
@@ -126,34 +125,9 @@ def plain_numbers(ax: _AxesBase) -> None:
     ax.yaxis.set_minor_formatter(NullFormatter())
 
 
-def shade_unstable(
-    ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
-) -> None:
-    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
-    for k, (first, last) in enumerate(ranges):
-        band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
-        band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
-
-
-def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
-    """Shade the range of operating speeds, rad/s, if there is one, on axes in rpm."""
-    if operating is not None:
-        first, last = operating
-        ax.axvspan(first * RPM, last * RPM, color="#000000", alpha=0.1, linewidth=0, label="operating range")
-
-
-def rad_s_above(ax: Axes) -> None:
-    """A second scale, rad/s, above one in revolutions per minute."""
-    _second(ax.secondary_xaxis, "top", RPM).set_xlabel("speed, rad/s", fontsize=TEXT)
-
-
-def scale_beside(ax: Axes, unit: float, label: str) -> None:
-    """A second scale right of the first: of values in this unit."""
-    _second(ax.secondary_yaxis, "right", unit).set_ylabel(label, fontsize=TEXT)
-
-
-def _second(axis: Callable[..., _AxesBase], side: str, unit: float) -> _AxesBase:
-    """A second scale of values in a unit."""
-    scale = axis(side, functions=(lambda x: np.asarray(x) / unit, lambda x: np.asarray(x) * unit))
+def second_scale(ax: Axes, unit: float = RPM, label: str = "speed, rad/s", side: str = "top") -> None:
+    """A second scale, of values in this unit, above the axes or right of them."""
+    make: Callable[..., _AxesBase] = ax.secondary_xaxis if side == "top" else ax.secondary_yaxis
+    scale = make(side, functions=(lambda x: np.asarray(x) / unit, lambda x: np.asarray(x) * unit))
     scale.tick_params(labelsize=TEXT)
-    return scale
+    (scale.set_xlabel if side == "top" else scale.set_ylabel)(label, fontsize=TEXT)

@@ -8,6 +8,8 @@
 ...         Column("speed, rpm", (2980.5, float("nan")), "{:.1f}".format),
 ...     ),
 ... )
+>>> speeds.records[1]
+{'mode': 2, 'whirl': 'mixed', 'speed, rpm': None}
 >>> print(terminal(speeds))
   mode  whirl     speed, rpm
   1     forward       2980.5
@@ -25,11 +27,11 @@ import re
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.json import SCHEMA_VERSION, cell, now
-from rotorid.base.text import WIDTH
-from rotorid.base.text import table as aligned
+from rotorid.base.text import WIDTH, aligned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,31 +60,26 @@ class Column:
     heading
         What it holds, with its unit.
     values
-        One cell a row, one-dimensional; what is not finite becomes None, which is unknown.
+        One cell a row; what is not finite becomes None, which is unknown. Only JSON has lists in cells.
     shown
-        A value as a reader sees it; CSV and workbooks keep all digits.
+        A value as a reader sees it; CSV and workbooks keep all digits. None: `text` leaves the column out.
     key
         Where the JSON document of the result holds the values, `*` for the row from 0; empty: nowhere.
     scale
         What one unit of the document is in that of the heading.
-
-    Raises
-    ------
-    ValueError
-        For values that are not one-dimensional.
+    title
+        What `text` prints over the column, where that is not the heading.
     """
 
     heading: str
-    values: Sequence[Value] | NDArray[Any]
-    shown: Callable[[Any], str] = str
+    values: Sequence[Any] | NDArray[Any]
+    shown: Callable[[Any], str] | None = str
     key: str = ""
     scale: float = 1.0
+    title: str | None = None
 
     def __post_init__(self) -> None:
-        values = tuple(cell(value) for value in self.values)
-        if any(isinstance(value, list | dict) for value in values):
-            raise ValueError(f"the column {self.heading!r} must be one-dimensional")
-        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "values", tuple(map(cell, self.values)))
 
     @property
     def words(self) -> bool:
@@ -92,7 +89,7 @@ class Column:
     @property
     def texts(self) -> list[str]:
         """Cells as a reader sees them; blank where nothing is known."""
-        return ["" if value is None else self.shown(value) for value in self.values]
+        return ["" if value is None else (self.shown or str)(value) for value in self.values]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +108,7 @@ class Table:
     Raises
     ------
     ValueError
-        For columns of different lengths, and without any.
+        For columns of different lengths, lists in their cells, and without any.
     """
 
     name: str
@@ -121,6 +118,9 @@ class Table:
     def __post_init__(self) -> None:
         if len({len(column.values) for column in self.columns}) != 1:
             raise ValueError(f"the table {self.name!r} must have columns of one length")
+        for column in self.columns:
+            if any(isinstance(value, list | dict) for value in column.values):
+                raise ValueError(f"the column {column.heading!r} must be one-dimensional")
 
     def under(self, place: str) -> Table:
         """The same, of a result that stands at this place of a document."""
@@ -146,22 +146,43 @@ class Table:
     @property
     def records(self) -> list[dict[str, Value]]:
         """Values row by row, by their headings."""
-        return [dict(zip(self.headings, row, strict=True)) for row in self.rows]
+        return records(self.columns)
+
+
+def records(columns: Sequence[Column]) -> list[dict[str, Any]]:
+    """One dict a row, of JSON types."""
+    names = [column.heading for column in columns]
+    return [
+        dict(zip(names, row, strict=True)) for row in zip(*(each.values for each in columns), strict=True)
+    ]
+
+
+def frame(columns: Sequence[Column]) -> pd.DataFrame:
+    """The columns as a DataFrame; NaN where nothing is known."""
+    import pandas as pd
+
+    return pd.DataFrame({each.heading: [nan if x is None else x for x in each.values] for each in columns})
+
+
+def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
+    """Aligned text: words of the first `left` of the printed columns, and the first, to the left."""
+    printed = [column for column in columns if column.shown is not None]
+    texts = [[each.heading if each.title is None else each.title, *each.texts] for each in printed]
+    for k in range(1, left):
+        if not printed[k].words:
+            texts[k] = [cell.rjust(max(map(len, texts[k]))) for cell in texts[k]]
+    return aligned(texts, left, width)
 
 
 def terminal(table: Table, width: int = WIDTH) -> str:
     """Aligned text: words and the first column to the left, other numbers to the right."""
-    left = max([1, *(k for k, column in enumerate(table.columns, start=1) if column.words)])
-    texts = [[column.heading, *column.texts] for column in table.columns]
-    for k in range(1, left):
-        if not table.columns[k].words:
-            texts[k] = [text.rjust(max(map(len, texts[k]))) for text in texts[k]]
-    return aligned([list(row) for row in zip(*texts, strict=True)], left, width)
+    last = max((k for k, column in enumerate(table.columns, start=1) if column.words), default=1)
+    return text(table.columns, last, width)
 
 
 def csv(table: Table) -> bytes:
     """A CSV file; a note stands in a line with # above the header."""
-    return csv_bytes([table.note] if table.note else [], table.headings, table.rows)
+    return csv_bytes(table.headings, table.rows, table.note)
 
 
 def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
@@ -224,7 +245,9 @@ def html(table: Table, longest: int = LONG) -> Markup:
     from markupsafe import Markup
 
     count = len(table.columns[0].values)
-    rows = evenly(count, count if count <= longest else THINNED)
+    rows: Sequence[int] = range(count)
+    if count > longest:
+        rows = [round(i * (count - 1) / (THINNED - 1)) for i in range(THINNED)]
     heads, cells, letters = [], [], 0
     for column in table.columns:
         kind, texts = {} if column.words else {"class": "n"}, column.texts
@@ -259,24 +282,17 @@ def _number(column: Column, row: int, text: str) -> str:
     return _tag("span", text, {"data-key": key, **scale}) if key else text
 
 
-def frame(table: Table) -> pd.DataFrame:
-    """The table as a DataFrame."""
-    import pandas as pd
+def csv_bytes(names: Sequence[str], rows: Sequence[Sequence[Value]], note: str = "") -> bytes:
+    """A CSV file: a note (with the version above it), columns, rows; numbers with all their digits.
 
-    return pd.DataFrame({column.heading: list(column.values) for column in table.columns})
-
-
-def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
-    """A CSV file: comment lines (with the version above them), columns, rows; numbers with all their digits.
-
-    A table without comments stays one that every program reads.
+    A table without a note stays one that every program reads.
     """
-    versioned = [f"schema_version = {SCHEMA_VERSION}", *comments] if comments else []
-    lines = [f"# {one_line(comment)}" for comment in versioned]
+    above = [f"schema_version = {SCHEMA_VERSION}", note] if note else []
+    lines = [f"# {one_line(line)}" for line in above]
     lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
-    text = "\n".join([*lines, ""])
+    lines.append("")
     # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.
-    return text.encode("utf-8" if text.isascii() else "utf-8-sig")
+    return (whole := "\n".join(lines)).encode("utf-8" if whole.isascii() else "utf-8-sig")
 
 
 def _csv_cell(value: Value) -> str:
@@ -301,16 +317,3 @@ def one_line(text: str) -> str:
     if re.search(r"[\x00-\x1f\x7f]", line):
         raise ValueError(f"text with control characters cannot be written to a table: {text!r}")
     return line
-
-
-def evenly(n: int, most: int) -> list[int]:
-    """At most so many of n indices, evenly spread, the first and the last among them.
-
-    Examples
-    --------
-    >>> evenly(4, 12), evenly(281, 6)
-    ([0, 1, 2, 3], [0, 56, 112, 168, 224, 280])
-    """
-    if n <= most:
-        return list(range(n))
-    return [round(i * (n - 1) / (most - 1)) for i in range(most)]

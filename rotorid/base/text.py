@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -93,17 +93,16 @@ def listing(names: Iterable[str], conjunction: str = "or") -> str:
     return f"{', '.join(items[:-1])} {conjunction} {items[-1]}"
 
 
-def table(rows: list[list[str]], left: int = 1, width: int = WIDTH) -> str:
-    """Columns right-aligned, except for the first `left` ones; names are cut where the width needs it."""
-    widths, name = [max(map(len, column)) for column in zip(*rows, strict=True)], left - 1
+def aligned(columns: Sequence[Sequence[str]], left: int = 1, width: int = WIDTH) -> str:
+    """Columns of cells, the first `left` to the left, the others to the right; too long names are cut."""
+    widths, name = [max(map(len, column)) for column in columns], left - 1
     over = sum(widths) + 2 * len(widths) - width
     widths[name] = max(widths[name] - max(over, 0), 8)
-    lines = []
-    for row in rows:
-        cells = [cut(cell, wide) for cell, wide in zip(row, widths, strict=True)]
-        shown = [f"{cell:{'<' if i < left else '>'}{widths[i]}}" for i, cell in enumerate(cells)]
-        lines.append(("  " + "  ".join(shown)).rstrip())
-    return "\n".join(lines)
+    padded = [
+        [f"{cut(cell, wide):{'<' if k < left else '>'}{wide}}" for cell in column]
+        for k, (column, wide) in enumerate(zip(columns, widths, strict=True))
+    ]
+    return "\n".join(("  " + "  ".join(row)).rstrip() for row in zip(*padded, strict=True))
 
 
 def rpm(speed: float) -> float:

@@ -243,8 +243,8 @@ def _of_errors(
     that of g χ²(ν) of the same mean and variance; mean over what errors between runs may be.
     """
     theta = fit.estimate.solution
-    known, values = fit.estimate.solution_covariance, equations.values(theta)
-    free = np.flatnonzero(np.zeros(theta.size) if known is None else ~np.isnan(np.diag(known)))
+    estimated, values = fit.estimate.solution_covariance, equations.values(theta)
+    free = np.flatnonzero(np.zeros(theta.size) if estimated is None else ~np.isnan(np.diag(estimated)))
     G = prior.below(equations.jacobian(theta))[:, free]
     W = [rows.data.coefficients(equations.rotor, values)[0] for rows in equations.rows]
     every = [rows.spreads(each) for rows, each in zip(equations.rows, W, strict=True)]

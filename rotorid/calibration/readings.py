@@ -257,9 +257,11 @@ class ReadingRows:
         """
         run, basis, spreads = run_errors(self.data.trials), self.residual(W)[1], []
         for k in range(len(run.sizes) + (run.origin == "stated")):
-            own, columns = self.noise.at(np.array([1.0, *run.sizes[k % len(run.sizes)], 1.0]))
-            S, C, n, _ = own.shape
-            alone = block_diag(*covariance_root(own, np.einsum("...ii->...i", own)).reshape(-1, n, n))
+            separate, columns = self.noise.at(np.array([1.0, *run.sizes[k % len(run.sizes)], 1.0]))
+            S, C, n, _ = separate.shape
+            alone = block_diag(
+                *covariance_root(separate, np.einsum("...ii->...i", separate)).reshape(-1, n, n)
+            )
             shared = np.moveaxis(real_parts(columns), 0, -1)
             if k == len(run.sizes):
                 shared = block_diag(*shared.reshape(S, C * n, -1)).reshape(S, C, n, -1)

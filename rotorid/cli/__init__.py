@@ -77,7 +77,7 @@ def schema(
 
 def _work_of(name: str) -> Callable[..., Any]:
     """The function of a command; its module is loaded here."""
-    home = {"study": "rotorid.study", "fleet_fit": "rotorid.fleet.fit"}
+    home = {"study": "rotorid.study", "fleet_fit": "rotorid.fleet"}
     work: Callable[..., Any] = resolve_name(f"{home.get(name, f'rotorid.commands.{name}')}:{name}")
     return work
 

@@ -53,14 +53,13 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
 
     `choices` is a function of the command's module: registries by the names of the options.
     """
-    from rotorid.base.choices import described
-
     hints = get_type_hints(command.callback, include_extras=True)
     for parameter in command.params:
         declared: tuple[Any, ...] = getattr(hints.get(parameter.name), "__metadata__", ())
         choices = declared[1]() if declared[1:] and declared[1] else {}
         if parameter.name in choices:
-            parameter.help = f"{declared[0].help} {described(choices[parameter.name])}"
+            methods = "; ".join(f"{each.name}: {each.about}" for each in choices[parameter.name])
+            parameter.help = f"{declared[0].help} {methods}."
 
 
 def whole_paragraphs(text: str) -> str:

@@ -92,7 +92,7 @@ class Destination:
             For a file that could not be written, before any work is done, and for one that was read.
         """
         from rotorid.files.disk import write_files
-        from rotorid.files.problems import printable
+        from rotorid.files.problems import printable, refusal
 
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
             (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),
@@ -111,7 +111,10 @@ class Destination:
         built: dict[Path, bytes] = {}
         for path, _, build in asked:
             if path is not None:
-                file = build(made, path)
+                try:
+                    file = build(made, path)
+                except OSError as error:  # a workbook needs room for temporary files
+                    raise refusal(path, f"a file that can be written ({error.strerror})") from error
                 built |= file if isinstance(file, Mapping) else {path: file}
         check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
         write_files(built)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
-    from rotorid.fleet.posterior import TypeKnowledge
+    from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
@@ -98,9 +98,9 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         solved = solve(read, options)
     else:
         solved = solve(read, replace(options, refine=False))
-        read = as_proposed(read, solved.result, *solved.known)
+        read = as_proposed(read, solved.result, *solved.coefficients)
         solved = solve(read, options) if options.refine else solved
-    influence, runs = solved.known
+    influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
     mounted, check, left = None, None, None

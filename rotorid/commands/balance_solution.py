@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotorid.base.choices import Method
     from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
     from rotorid.files import Job
-    from rotorid.fleet.posterior import TypeKnowledge
+    from rotorid.fleet.machine_type import TypeKnowledge
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -165,7 +165,7 @@ class Solved(NamedTuple):
     """A correction with the coefficients and the runs that it is made of."""
 
     result: Correction
-    known: tuple[Influence, Trials | None]
+    coefficients: tuple[Influence, Trials | None]
     planes: Sequence[str]
     of_type: TypeKnowledge | None
 
@@ -201,24 +201,24 @@ def _test(job: Job) -> ConventionTest:
 def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
     of_type = None
     if options.machine_type is None:
-        known = choose(job, options.coefficients, refined=options.refine)
+        coefficients = choose(job, options.coefficients, refined=options.refine)
     else:
-        from rotorid.fleet.posterior import type_coefficients
+        from rotorid.fleet.machine_type import type_coefficients
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
-        known = of_type.influence, None
-    planes = planes or names(options.planes) or used_planes(job, known[0])
-    result = correct_job(job, known, planes, options)
-    return Solved(result if of_type is None else of_type.judged(result), known, planes, of_type)
+        coefficients = of_type.influence, None
+    planes = planes or names(options.planes) or used_planes(job, coefficients[0])
+    result = correct_job(job, coefficients, planes, options)
+    return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)
 
 
 def correct_job(
-    job: Job, known: tuple[Influence, Trials | None], planes: Sequence[str], options: BalanceOptions
+    job: Job, coefficients: tuple[Influence, Trials | None], planes: Sequence[str], options: BalanceOptions
 ) -> Correction:
     """Of some planes, with coefficients and the runs that give the vibration (None: theirs)."""
     from balancing import correct
 
-    influence, runs = known
+    influence, runs = coefficients
     return correct(
         influence,
         runs,
@@ -251,15 +251,15 @@ def with_other_conventions(
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
                 again = limited(read(phase=other.phase, angles=other.angles), options.max_mass, options.limit)
-                found = solve(again, options, solved.planes).result
+                correction = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue
         words = " and ".join(getattr(other, name).removesuffix(" rotation") for name in assumed)
-        same = next((each for each, one in others if _alike(one, found)), None)
+        same = next((each for each, one in others if _alike(one, correction)), None)
         if same is not None:
             same.append(words)
-        elif not _alike(result, found):
-            others.append(([words], found))
+        elif not _alike(result, correction):
+            others.append(([words], correction))
     readings = tuple(one.otherwise(listing(words)) for words, one in others)
     return replace(result, convention_test=test, others=readings)
 

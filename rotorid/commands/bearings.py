@@ -52,7 +52,7 @@ class BearingEquilibria:
 
     Attributes
     ----------
-    found
+    equilibria
         One for each speed.
     linear
         The rotor with bearing tables in place of its forces.
@@ -60,7 +60,7 @@ class BearingEquilibria:
         Of the linear rotor; None for one speed alone.
     """
 
-    found: Sequence[Equilibrium]
+    equilibria: Sequence[Equilibrium]
     linear: Rotor | SmallModel
     stability: Stability | None
 
@@ -69,7 +69,7 @@ class BearingEquilibria:
         """Names of the bearings."""
         from rotorid.motion.equilibrium import named
 
-        return [one.name or named(one).removeprefix("the ") for one in self.found[0].bearings]
+        return [one.name or named(one).removeprefix("the ") for one in self.equilibria[0].bearings]
 
     def table(self, every: int = 1) -> Table:
         """One row per bearing and speed, of each so many speeds and the last one."""
@@ -77,7 +77,7 @@ class BearingEquilibria:
 
         from rotorid.motion.linear_coefficients import coefficients
 
-        shown = [*self.found[:-1:every], self.found[-1]]
+        shown = [*self.equilibria[:-1:every], self.equilibria[-1]]
         bearings, forces = shown[0].bearings, shown[0].system.forces
         walled = [k for k, force in enumerate(forces) if force in bearings]
         K, C = (each[:, walled].reshape(-1, 4).T for each in coefficients(shown))
@@ -107,7 +107,7 @@ class BearingEquilibria:
         from rotorid.base.plot_style import on_figure
         from rotorid.motion.plots import draw_journals
 
-        return on_figure(lambda ax: draw_journals(self.found, self.labels, ax), height=4.6)
+        return on_figure(lambda ax: draw_journals(self.equilibria, self.labels, ax), height=4.6)
 
     def linear_files(self, path: Path) -> Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables.
@@ -121,7 +121,7 @@ class BearingEquilibria:
         from rotorid.files.rotor import rotor_file_bytes
         from rotorid.files.small_model import small_model_files
 
-        if len(self.found) < 2:
+        if len(self.equilibria) < 2:
             raise ValueError(f"{path}: a table over speed needs two speeds at least (--speeds)")
         if isinstance(self.linear, Rotor):
             return rotor_file_bytes(path, self.linear)
@@ -166,7 +166,9 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     small = "stiffness and damping are those at its centre, they hold for small orbits about it"
     films = [f"{named(f)}: {small}" for f in system.forces if isinstance(f, SqueezeFilm)]
     touched = dict.fromkeys(named(stop) for at in resting for stop in at.touched)
-    result = BearingEquilibria(found=resting, linear=linear_rotor(what.model, resting), stability=stability)
+    result = BearingEquilibria(
+        equilibria=resting, linear=linear_rotor(what.model, resting), stability=stability
+    )
     every = max(1, -(-(len(resting) - 1) // max(_ROWS // len(result.labels) - 1, 1)))
     table, warnings = result.table(), (*(f"the shaft rests on {stop}" for stop in touched), *films)
     document = {

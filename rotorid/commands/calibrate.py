@@ -96,7 +96,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
             raise ValueError(f"{path}: no rotor file can be written, {lacking}")
         return rotor_file_bytes(path, calibrated.rotor)
 
-    columns = [Column(each.name, [*each.values]) for each in parameter_columns(names, every)]
+    numbers = parameter_columns(names, every)
     parts = [parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()]
     return Outcome(
         result=calibrated,
@@ -105,7 +105,7 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
         more=(*parts,),
         beyond="all numbers, with 95 %",
         short=True,
-        file=Table("numbers", (*columns, Column("data_share", calibrated.data_share))),
+        file=Table("numbers", (*numbers, Column("data_share", calibrated.data_share))),
         files={".toml": rotor_files},
         keys=plain(document),
         warnings=calibrated.warnings,
@@ -122,8 +122,8 @@ def _part(calibrated: CalibratedRotor, which: BoolArray) -> tuple[tuple[str, ...
 
     part = Uncertain()
     part.values, part.errors_stated, part.dof = calibrated.values[which], True, 0
-    known = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
-    part.covariance = known[np.ix_(which, which)]
+    determined = np.where(np.isnan(calibrated.std), np.nan, calibrated.covariance)
+    part.covariance = determined[np.ix_(which, which)]
     return tuple(name for name, taken in zip(calibrated.names, which, strict=True) if taken), part
 
 
@@ -131,7 +131,7 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
     """The first numbers with one standard deviation, two a line."""
     import numpy as np
 
-    from rotorid.base.text import table
+    from rotorid.base.text import aligned
 
     stds = [np.nan] * len(names) if part.std is None else part.std
     cells = []
@@ -139,10 +139,10 @@ def _short(names: Sequence[str], part: Uncertain) -> str:
         digits = 4
         if std > 0 and value:  # as many as stand before the second digit of the error
             digits = max(2 + int(np.floor(np.log10(abs(value))) - np.floor(np.log10(std))), 1)
-        known = f"{figures(value, digits)} ± {error_figures(std)}"
-        cells += [name, "not determined" if np.isnan(value) else known]
+        number = f"{figures(value, digits)} ± {error_figures(std)}"
+        cells += [name, "not determined" if np.isnan(value) else number]
     cells += [""] * (-len(cells) % 4)
-    return table([cells[k : k + 4] for k in range(0, min(len(cells), 4 * _ROWS), 4)], left=4)
+    return aligned([cells[k : 4 * _ROWS : 4] for k in range(4)], left=4)
 
 
 class Prepared(NamedTuple):

@@ -100,7 +100,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     labels = job.trials.labels
     if stations is not None:
         labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
-    found = model_influence(
+    computed = model_influence(
         job.rotor,
         places.nodes,
         places.sensors,
@@ -111,4 +111,4 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         key_phasor=job.key_phasor,
         labels=labels,
     )
-    return found if job.rotor.calibration is None else calibrated(found, job, places)
+    return computed if job.rotor.calibration is None else calibrated(computed, job, places)

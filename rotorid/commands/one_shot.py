@@ -42,25 +42,25 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
     errors = Gaussian(none.blocks[0], none.columns, influence.reading, run_errors(job.trials))
-    found = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
+    with_errors = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
     if not calibration.needs_trial_run:
-        return found
-    warnings = *found.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
-    return replace(found, remarks=found.remarks._replace(warnings=warnings))
+        return with_errors
+    warnings = *with_errors.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(with_errors, remarks=with_errors.remarks._replace(warnings=warnings))
 
 
 def counted_before(job: Job) -> bool:
     """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
-    known = None if job.rotor is None else job.rotor.calibration
-    own = job.files[:2]  # the job, then its runs
-    return known is not None and any(sha256(file) in known.data.values() for file in own)
+    calibration = None if job.rotor is None else job.rotor.calibration
+    job_and_runs = job.files[:2]  # the job, then its runs
+    return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
 
 
 def needs_trial_run(job: Job, influence: Influence) -> bool:
     """Whether these coefficients are those of a model alone that contradicts its own data."""
-    known = None if job.rotor is None else job.rotor.calibration
+    calibration = None if job.rotor is None else job.rotor.calibration
     alone = influence is not job.influence and not job.trials.weights.any()
-    return known is not None and known.needs_trial_run and alone
+    return calibration is not None and calibration.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:

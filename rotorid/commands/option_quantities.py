@@ -52,11 +52,11 @@ def read_with_unit(text: str, what: str, unit: UnitReader, example: str) -> tupl
         raise ValueError(f"{what} {text.strip()!r}: expected {error}, such as {example}") from None
 
 
-def quantity(given: Amount, what: str, known: Mapping[str, Unit], example: str) -> float:
+def quantity(given: Amount, what: str, named_units: Mapping[str, Unit], example: str) -> float:
     """Read "500kg" or "500 kg" in SI."""
     if not isinstance(given, str):
         return given
-    value, unit = read_with_unit(given, what, units.one_of(dict(known)), example)
+    value, unit = read_with_unit(given, what, units.one_of(dict(named_units)), example)
     return unit.to_si(value)
 
 
@@ -206,7 +206,7 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
     """
     unit, sensors = units.vibration(job.trials.labels.vibration_unit), job.trials.sensors
 
-    def known(word: str) -> Unit:
+    def unit_of(word: str) -> Unit:
         other = units.vibration(word or unit.name)
         if other.kind != unit.kind:
             raise UnitError(
@@ -216,7 +216,7 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
 
     def read(value: Amount) -> tuple[float, Unit]:
         if isinstance(value, str):
-            return read_with_unit(value, what, known, "20")
+            return read_with_unit(value, what, unit_of, "20")
         return value * unit.scale, unit
 
     several = [given] if isinstance(given, str | Mapping) else given
@@ -261,7 +261,7 @@ def _limits(
     read: Callable[[Amount], tuple[float, Unit]],
     example: str,
     noun: str,
-    known: Sequence[str],
+    existing: Sequence[str],
     every: Sequence[str],
 ) -> dict[str, Quantity]:
     """Limits above 0 of known planes or sensors, or one of every."""
@@ -272,10 +272,10 @@ def _limits(
         texts = pairs(given, what, lambda _, text: text, example, lambda text: dict.fromkeys(every, text))
     limits = {}
     for name, text in texts.items():
-        if name not in known:
+        if name not in existing:
             raise ValueError(
-                f"{what} {given!r}: there is no {noun} {name!r}{did_you_mean(name, known)}; there are "
-                f"{listing(map(repr, known), 'and')}"
+                f"{what} {given!r}: there is no {noun} {name!r}{did_you_mean(name, existing)}; there are "
+                f"{listing(map(repr, existing), 'and')}"
             )
         value, unit = read(text)
         limits[name] = Quantity(f"{what} {text!r}", _above_zero(value, text, what, example), unit)
@@ -310,6 +310,6 @@ def grade(text: str | float) -> float:
     body = str(text).strip().lstrip("Gg").strip().replace(",", ".")
     value = float(body) if body.replace(".", "", 1).isdecimal() else float("nan")
     if value not in GRADES:
-        known = ", ".join(f"G{g:g}" for g in GRADES)
-        raise ValueError(f"there is no balance quality grade {str(text)!r}: the grades are {known}")
+        grades = ", ".join(f"G{g:g}" for g in GRADES)
+        raise ValueError(f"there is no balance quality grade {str(text)!r}: the grades are {grades}")
     return value

@@ -230,7 +230,7 @@ def band(given: Band | None, what: str = "--operating", usual: str = "rad_s") ->
     return low, high
 
 
-def _series(given: str, known: Mapping[str, Unit], usual: str, what: str) -> list[float]:
+def _series(given: str, unit_scales: Mapping[str, Unit], usual: str, what: str) -> list[float]:
     """First:last:step, or a list, in SI; each with a unit, or once at the end for all."""
     sign = ":" if ":" in given else ","
     parts = [WITH_UNIT.fullmatch(part) for part in given.split(sign)]
@@ -238,13 +238,13 @@ def _series(given: str, known: Mapping[str, Unit], usual: str, what: str) -> lis
     words = [part[2] if part else "" for part in parts]
     if not any(words[:-1]):
         words = [words[-1] or usual] * len(words)
-    scales = [known.get(spelt(word)) for word in words]
+    scales = [unit_scales.get(spelt(word)) for word in words]
     if (
         any(map(math.isnan, values))
         or not all(scales)
         or (sign == ":" and (len(values) != 3 or len({*words}) > 1))
     ):
-        others = listing(name.replace("_", "/") for name in known if name != usual)
+        others = listing(name.replace("_", "/") for name in unit_scales if name != usual)
         raise ValueError(
             f"{what} {given!r} is not a range: use FIRST:LAST:STEP or a list with commas, in "
             f"{usual.replace('_', '/')}, or with {others} at the end, or at every one"

@@ -377,8 +377,8 @@ def _of_tables(options: ReduceOptions) -> Reduction:
     asked = data.nodes if options.nodes is None else nodes(options.nodes, "--nodes")
     wanted = [named.get(str(node), node) for node in asked]
     data = modes_at(data, None, wanted, options.measured)
-    known, alpha = read_compliance(options.compliance, wanted)
-    order = [known.index(node) for node in wanted]
+    given_nodes, alpha = read_compliance(options.compliance, wanted)
+    order = [given_nodes.index(node) for node in wanted]
     used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
     springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
     if lost := springs.keys() - {*map(str, wanted)}:
@@ -398,13 +398,13 @@ def _of_tables(options: ReduceOptions) -> Reduction:
 
 def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:
     """The measured modes at these places only, in their order."""
-    known = [rotor.node(node) for node in data.nodes] if rotor is not None else list(data.nodes)
-    lost = [str(node) for node in wanted if node not in known]
+    measured = [rotor.node(node) for node in data.nodes] if rotor is not None else list(data.nodes)
+    lost = [str(node) for node in wanted if node not in measured]
     if lost:
         raise ValueError(
-            f"{path}: no shape was measured at {', '.join(lost)}; there are {', '.join(map(str, known))}"
+            f"{path}: no shape was measured at {', '.join(lost)}; there are {', '.join(map(str, measured))}"
         )
-    rows = [known.index(node) for node in wanted]
+    rows = [measured.index(node) for node in wanted]
     return dataclasses.replace(
         data,
         nodes=tuple(wanted),

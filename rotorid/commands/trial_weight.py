@@ -131,8 +131,8 @@ def _load(given: Amount) -> float:
     """Read "250kg" or "2500N" in N."""
     amount = given if not isinstance(given, str) else 0.0
     if isinstance(given, str):
-        known = units.MASS | units.FORCE
-        value, unit = read_with_unit(given, "--load", units.one_of(known), "250kg or 2500N")
+        load_units = units.MASS | units.FORCE
+        value, unit = read_with_unit(given, "--load", units.one_of(load_units), "250kg or 2500N")
         amount = unit.to_si(value) * (STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
     if not amount > 0:
         raise ValueError(f"--load {given!r}: expected a value above 0, such as 250kg or 2500N")

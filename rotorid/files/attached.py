@@ -300,30 +300,22 @@ def force_tables(forces: Iterable[NodeForce]) -> Written:
     return tables
 
 
-def support_tables(
-    supports: Sequence[Support], path: Path, *, ordered: bool = False
-) -> tuple[Written, dict[Path, bytes]]:
-    """Supports as tables of a file, in SI, and those over speed as files beside it.
-
-    Kinds are read one after another: where they are mixed (or `ordered`), all stand under `[[bearing]]`.
-    """
-    kinds = [support.kind for support in supports]
-    ordered = ordered or kinds != sorted(kinds)
+def support_tables(supports: Sequence[Support], path: Path) -> tuple[Written, dict[Path, bytes]]:
+    """Supports in order as tables `[[bearing]]`, in SI, and those over speed as files beside the file."""
     tables: Written = {}
     files: dict[Path, bytes] = {}
     for number, support in enumerate(supports, start=1):
-        section = "bearing" if ordered else support.kind
         values, columns = vars(support) | dict.fromkeys((*ENTRIES, "table")), _columns(support)
         if support.speeds:
             table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv")
             names = ["speed_rad_s", *(NAMES[name] for name in columns)]
             rows = [*zip(support.speeds, *columns.values(), strict=True)]
-            values["table"], files[table] = table.name, csv_bytes((), names, rows)
+            values["table"], files[table] = table.name, csv_bytes(names, rows)
         else:
             values |= {name: column[0] for name, column in columns.items()}
         if stand := support.pedestal:
             values |= {f"pedestal_{name}": stand.xy(name) for name in ENTRIES} | {"pedestal_mass": stand.mass}
-        tables.setdefault(section, []).append(in_si(KEYS[section], values))
+        tables.setdefault("bearing", []).append(in_si(SupportKeys, values))
     return tables, files
 
 

@@ -7,9 +7,8 @@ import re
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from decimal import Decimal
 from pathlib import Path
-from typing import SupportsIndex
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -54,7 +53,9 @@ KINDS = {
 """Columns by which a table is known that is taken for another kind."""
 _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
-UNCLEAR = Unit("?", "unclear")
+TEXT, UNCLEAR = Unit("", "text"), Unit("?", "unclear")
+"""Of a column of names, and of one whose unit is none."""
+FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 Source = str | Path | Grid | tuple[Path, ...]
 """A table: a file, the cells of a sheet, or, of runs, files with one run each."""
 
@@ -96,20 +97,14 @@ class Column:
 class Field:
     """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable).
 
-    `names` has the column of the file that each cell is from, where they are several.
+    `names` has the column of the file that each cell is from.
     """
 
     name: str
-    unit: Unit | None
+    unit: Unit
     cells: tuple[Cell, ...]
-    numbers: FloatArray
-    texts: tuple[str, ...]
+    values: Any
     names: tuple[str, ...]
-
-    @property
-    def heading(self) -> str:
-        """The first of its columns in the file."""
-        return self.names[0] if self.names else self.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +146,8 @@ class Table:
 
     def numbers(self, stem: str, missing: float = math.nan) -> FloatArray:
         """Values in SI, shape (rows,); `missing` everywhere if the table has no such column."""
-        if stem not in self.fields:
-            return np.full(len(self.rows), missing)
-        return self.fields[stem].numbers
+        values: FloatArray = self.fields[stem].values if stem in self else np.full(len(self), missing)
+        return values
 
     def steps(self, stem: str) -> FloatArray:
         """Steps in SI in which the numbers of a column without problems are written, shape (rows,)."""
@@ -161,14 +155,11 @@ class Table:
 
     def texts(self, stem: str) -> tuple[str, ...]:
         """Values of a text column."""
-        return self.fields[stem].texts
+        return tuple(self.fields[stem].values)
 
     def unit(self, stem: str) -> Unit:
-        """The unit of a column of numbers."""
-        unit = self.fields[stem].unit
-        if unit is None:
-            raise KeyError(stem)
-        return unit
+        """The unit of a column."""
+        return self.fields[stem].unit
 
     def shown(self, stem: str, index: SupportsIndex) -> str:
         """A cell as it stood in the file."""
@@ -176,13 +167,12 @@ class Table:
 
     def is_blank(self, stem: str) -> BoolArray:
         """Which cells of a column are empty, shape (rows,); none if the table has no such column."""
-        cells = self.fields[stem].cells if stem in self.fields else self.rows
+        cells = self.fields[stem].cells if stem in self else self.rows
         return np.array([cell == "" for cell in cells], dtype=bool)
 
     def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
         """Note a problem with one cell."""
-        field = self.fields[stem]
-        name = field.names[index] if field.names else field.name
+        name = self.fields[stem].names[index]
         self.problems.add(self.source, self.rows[index], name, self.shown(stem, index), expected)
 
     def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
@@ -273,8 +263,8 @@ def read_grid(
             return None
         title, rows = chosen
         place = header_place(rows, find)
-        source = sheet_source(path, title)
-        return make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
+        name = f"{path} (sheet {title!r})"
+        return make_grid(name, rows, "", problems, place=place, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data[:TOP] if top else data, problems)
     if text is None:
@@ -287,11 +277,6 @@ def source_name(source: Source) -> str:
     if isinstance(source, tuple):
         return listing(map(str, source), "and")
     return source.source if isinstance(source, Grid) else str(source)
-
-
-def sheet_source(path: Path, title: str) -> str:
-    """How messages name a sheet."""
-    return f"{path} (sheet {title!r})"
 
 
 def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
@@ -307,23 +292,23 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     unknown = [names[k] for k, name in near.items() if name is None]
     if not _has_columns(grid, columns, stems, missing, unknown, problems):
         return None
-    places: dict[str, tuple[int, Unit | None, Column]] = {}
+    places: dict[str, tuple[int, Unit, Column]] = {}
     for k, column in meant.items():
-        wrong, unit, suffix = "", None, names[k][len(column.stem) + 1 :] if column else ""
+        wrong = ""
         if column is None:
             wrong = f"a known column (did you mean {near[k]!r}?)" if near[k] else ""
         elif column.stem in places:
             wrong = f"the column once, not also {grid.header[places[column.stem][0]]}"
         else:
             try:
-                unit = column.unit(suffix) if column.unit else None
+                unit = column.unit(names[k][len(column.stem) + 1 :]) if column.unit else TEXT
             except UnitError as error:
                 wrong, unit = str(error), UNCLEAR
             places[column.stem] = k, unit, column
         if wrong:
             name = grid.named[0][k] if grid.named else names[k]
             problems.add(grid.source, grid.header_row, name, name, wrong)
-    of_numbers = [k for k, unit, _ in places.values() if unit is not None]
+    of_numbers = [k for k, unit, _ in places.values() if unit is not TEXT]
     commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
     comma = decimal_comma(commas, grid.separator)
     fields = {stem: _field(grid, *place, problems, comma=comma) for stem, place in places.items()}
@@ -377,10 +362,11 @@ def _has_columns(
         expected = (
             f"a header row with the names of columns, separated by , or ; or tabs: {possible}{names}{seems}"
         )
-        problems.drop(grid.source)  # that rows are longer than a title is no news
+        # that rows are longer than a title is no news
+        problems[:] = [problem for problem in problems if problem.file != grid.source]
         problems.add(*place, unknown[0] if stems else None, None, expected)
         return False
-    if missing and not problems.of(grid.source):
+    if missing and all(problem.file != grid.source for problem in problems):
         needed = listing([one.names[0] for one in missing], "and")
         what = f"columns {needed}" if len(missing) > 1 else f"a column {listing(missing[0].names)}"
         expected = f"{what}; the columns are {present}"
@@ -391,16 +377,13 @@ def _has_columns(
     return True
 
 
-def _field(
-    grid: Grid, index: int, unit: Unit | None, column: Column, problems: Problems, *, comma: bool
-) -> Field:
-    cells = tuple(row[index] for _, row in grid.rows)
-    names = tuple(row[index] for row in grid.named)
-    name = names[0] if len(set(names)) == 1 else grid.header[index]
+def _field(grid: Grid, index: int, unit: Unit, column: Column, problems: Problems, *, comma: bool) -> Field:
+    cells, header = tuple(row[index] for _, row in grid.rows), grid.header[index]
+    names = tuple(row[index] for row in grid.named) or (header,) * len(cells)
     doubtful: set[str] = set()
-    if unit is not None and not comma and grid.separator in (";", "\t"):
-        doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), grid.header[index])
-    nothing: str | float = "" if unit is None else math.nan
+    if unit is not TEXT and not comma and grid.separator in (";", "\t"):
+        doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), header)
+    nothing: str | float = "" if unit is TEXT else math.nan
     # most cells of a long table say what another one has said
     read: dict[Cell, str | float] = {"": nothing} if column.blank else {}
     for place, cell in enumerate(cells):
@@ -409,19 +392,17 @@ def _field(
                 read[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
         except NotANumber as error:
             if not column.lenient:
-                where = names[place] if names else name
-                problems.add(grid.source, grid.rows[place][0], where, show(cell), str(error))
+                problems.add(grid.source, grid.rows[place][0], names[place], show(cell), str(error))
     values = [read.get(cell, nothing) for cell in cells]
-    numbers = np.full(len(cells), math.nan) if unit is None else np.array(values, dtype=float)
-    texts = tuple(map(str, values)) if unit is None else ("",) * len(cells)
-    return Field(name, unit, cells, numbers, texts, names)
+    name = names[0] if len(set(names)) == 1 else header
+    return Field(name, unit, cells, values if unit is TEXT else np.array(values, dtype=float), names)
 
 
-def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *, comma: bool) -> str | float:
+def _value(cell: Cell, unit: Unit, separator: str, doubtful: set[str], *, comma: bool) -> str | float:
     """A name, or a number in SI; NotANumber says what is expected."""
     if isinstance(cell, BadCell):
         raise NotANumber(cell.expected)
-    if unit is None:
+    if unit is TEXT:
         text = show(cell)
         if not text:
             raise NotANumber("a name")
@@ -440,6 +421,8 @@ def _value(cell: Cell, unit: Unit | None, separator: str, doubtful: set[str], *,
     value = math.nan if unit is UNCLEAR else unit.to_si(written)
     if math.isinf(value):
         raise NotANumber("a finite number")
+    if unit.kind == "angle" and abs(value) > FULL_TURN:
+        raise NotANumber("an angle from -360 to 360 degrees")
     return value
 
 
@@ -475,11 +458,11 @@ def written_steps(cells: Sequence[Cell]) -> FloatArray:
 
 def _digits(text: str) -> tuple[int, int, int]:
     """Decimals, significant digits (none of 0), and at which power of ten the first one stands."""
+    mantissa, _, exponent = text.lower().partition("e")
+    whole, _, fraction = mantissa.partition(".")
+    digits, decimals = (whole + fraction).lstrip("+-0"), len(fraction) - int(exponent or 0)
     if float(text) == 0:  # also 1e-999
-        return max(0, -int(Decimal(re.sub("[eE].*", "", text)).as_tuple().exponent)), 0, 0
-    number = Decimal(text)
-    if len(number.as_tuple().digits) > _SURE:
-        number = Decimal(f"{float(text):.12g}")
-    exponent = int(number.as_tuple().exponent)
-    significant = (number.normalize() if exponent >= 0 else number).as_tuple().digits
-    return -exponent, len(significant), number.adjusted()
+        return len(fraction), 0, 0
+    if len(digits) > _SURE:
+        return _digits(f"{float(text):.12g}")
+    return decimals, len(digits if decimals > 0 else digits.rstrip("0")), len(digits) - 1 - decimals

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import cast, get_args
-
-import numpy as np
+from dataclasses import dataclass, field
+from typing import Any, get_args
 
 from balancing import Labels
-from rotorid.base.choices import did_you_mean
-from rotorid.base.text import Angles as Angles
-from rotorid.base.text import Phase as Phase
-from rotorid.base.text import Rotation as Rotation
-from rotorid.base.text import View as View
-from rotorid.base.text import listing
+from rotorid.base.text import Angles, Phase, Rotation
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
-ANGLES: tuple[Angles, ...] = get_args(Angles)
 ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
-STATED_ANGLES = (*ANGLES, *ROTATIONS)
-"""What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
-FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 
 
 @dataclass(frozen=True)
@@ -71,38 +60,21 @@ class Conventions:
                 f"not {self.speed_tolerance_percent!r}"
             )
 
-    def on(self, labels: Labels) -> Labels:
-        """Labels that also say how the rotor turns and from which end that is seen."""
-        stated = self.labels
-        return replace(labels, rotation=stated.rotation, view=stated.view, clock=stated.clock)
 
-
-def resolve_angles(stated: str, rotation: str | None) -> Angles:
-    """With or against the rotation, from one of `STATED_ANGLES` and the rotation seen from the same end.
+def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
+    """With or against the rotation, of clockwise too; `rotation` is seen from the same end.
 
     Raises
     ------
     ValueError
-        For another word, and for clockwise or counter-clockwise without a rotation.
+        For clockwise or counter-clockwise without a rotation.
     """
-    if stated not in STATED_ANGLES:
-        hint = did_you_mean(stated, STATED_ANGLES)
-        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {stated!r}{hint}")
-    if stated in ANGLES:
-        return stated
+    if stated not in ROTATIONS:
+        angles: Angles = stated
+        return angles
     if rotation is None:
         raise ValueError(
             f"angles that count {stated} need the direction of rotation seen from the same end: state "
             'rotation = "clockwise" or "counter-clockwise" in a job file, or angles with or against rotation'
         )
     return "with rotation" if stated == rotation else "against rotation"
-
-
-def as_phase(word: str) -> Phase:
-    """A checked word."""
-    return cast("Phase", word)
-
-
-def as_angles(word: str) -> Angles:
-    """A checked word."""
-    return cast("Angles", word)

@@ -234,7 +234,7 @@ def _as_one(upper: Sequence[str], lower: Sequence[str], *, weights: bool) -> lis
         read_headings([*row, *[""] * (width - len(row))], weights=weights) for row in (upper, lower)
     )
     for head, heading in zip(above, below, strict=True):
-        text = heading.name.strip("()[] -")
+        text = re.sub(r"[(\[](.*)[)\]]", r"\1", heading.name.strip(" -"))
         quantity = {"": "amplitude", "angle": "phase"}.get(head.stem, head.stem)
         fits = bool(text) and quantity in (*MEASURED, "vector") and readable(quantity, text)
         if re.fullmatch("[0-9.,+][0-9.,+-]*", text):

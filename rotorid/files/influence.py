@@ -19,10 +19,10 @@ from balancing import Gaussian, Influence, Labels, Reading, ReadingErrors, RunEr
 from rotorid.base import tables
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import SCHEMA_VERSION, plain
+from rotorid.base.text import Angles, Phase
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
-from rotorid.files.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 from rotorid.files.disk import read_bytes, write_files
 from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
@@ -116,12 +116,11 @@ def read_influence(
 
 def load_influence(
     source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
-) -> tuple[Influence, dict[str, str]] | None:
+) -> tuple[Influence, dict[str, Any]] | None:
     """As `read_influence`, from a file or from the cells of a sheet, and the conventions that it states."""
     if isinstance(source, Path) and source.suffix.lower() == ".json":
-        influence, stated = _from_json(source, problems), dict[str, str]()
-        if influence is not None:
-            stated = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
+        influence = _from_json(source, problems)
+        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in _STATED} if influence else {}
     else:
         before, grid = len(problems), read_grid(source, "influence", problems)
         table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
@@ -129,11 +128,8 @@ def load_influence(
             return None
         text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
         stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
-        written = Labels(
-            phase=as_phase(stated.get("phase") or phase or "lead"),
-            angles=as_angles(stated.get("angles") or angles or "with rotation"),
-        )
-        influence = _from_table(table, written, before)
+        usual = {"phase": phase or "lead", "angles": angles or "with rotation"}
+        influence = _from_table(table, Labels(**{**usual, **stated}), before)
     if influence is None:
         return None
     its = influence.labels
@@ -179,7 +175,6 @@ def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
     table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees")
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
     if reciprocal and (std or len({key[1:] for key in keys}) > 1):
         alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"

@@ -14,7 +14,7 @@ from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
-from rotorid.files.conventions import ROTATIONS, Conventions, as_angles, as_phase, resolve_angles
+from rotorid.files.conventions import ROTATIONS, Conventions, resolve_angles
 from rotorid.files.job_models import (
     READINGS,
     TABLES,
@@ -324,7 +324,7 @@ def _readings(
         settings.complain(problems, "weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
     phase, angles = settings.phase or stated_phase(runs), settings.angles
-    stated = dict[str, str]()
+    stated = dict[str, Any]()
     settings = settings.model_copy(update={"phase": phase})
     if source is not None:
         from rotorid.files.influence import fit_to_readings, load_influence
@@ -338,7 +338,8 @@ def _readings(
         influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:
         return None
-    labels = conventions.on(trials.labels if influence is None else influence.labels)
+    labels, its = conventions.labels, trials.labels if influence is None else influence.labels
+    labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
     usual, notes = Labels(), list[str]()
     if source is not None:
         name = source_name(source)
@@ -365,16 +366,16 @@ def _readings(
     return trials, influence, conventions, slow_roll
 
 
-def conventions_of(settings: JobSettings, stored: Mapping[str, str] | None = None) -> Conventions:
+def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = None) -> Conventions:
     """What the numbers of the tables mean: as the job says, or the stored coefficients."""
-    usual = {"phase": "lead", "angles": "with rotation"} | dict(stored or {})
-    angles, rotation, planes = settings.angles, settings.rotation, settings.planes.items()
+    usual: Mapping[str, Any] = stored or {}
+    rotation, planes = settings.rotation, settings.planes.items()
     labels = Labels(
-        phase=as_phase(settings.phase or usual["phase"]),
-        angles=as_angles(usual["angles"]) if angles is None else resolve_angles(angles, rotation),
+        phase=settings.phase or usual.get("phase", "lead"),
+        angles=resolve_angles(settings.angles or usual.get("angles", "with rotation"), rotation),
         rotation=rotation,
         view=settings.view if rotation else None,
-        clock=angles in ROTATIONS,
+        clock=settings.angles in ROTATIONS,
     )
     speed, limits = settings.speed, [one.limit for one in settings.sensors.values()]
     return Conventions(

@@ -15,7 +15,7 @@ from rotorid.base.json import cell as as_json
 from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, header_place, make_grid, show
-from rotorid.files.columns import REMARKS, sheet_source
+from rotorid.files.columns import REMARKS
 from rotorid.files.disk import read_bytes
 from rotorid.files.excel_workbook import is_workbook, read_workbook
 from rotorid.files.headings import find_header
@@ -55,8 +55,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
             else None
         )
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
-        source = sheet_source(path, titles[name])
-        place = header_place(rows, find)
+        source, place = f"{path} (sheet {titles[name]!r})", header_place(rows, find)
         grid = make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
         if grid is not None and name in TABLES:
             job.tables[name] = grid

@@ -17,10 +17,10 @@ from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorid.base.text import listing
+from rotorid.base.text import Phase, listing
 from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
-from rotorid.files.conventions import PHASES, Conventions, Phase
+from rotorid.files.conventions import PHASES, Conventions
 from rotorid.files.headings import (
     BOTH_UNITS,
     LONGEST,

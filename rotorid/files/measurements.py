@@ -17,7 +17,6 @@ from rotorid.base.text import Shown, listing, speed_axis, vibration_unit_words
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Table, make_table, read_grid
-from rotorid.files.conventions import FULL_TURN
 from rotorid.files.instruments import DERIVATIVE, read_responses
 from rotorid.files.model import HarmonicFile
 from rotorid.files.node_tables import read_modes
@@ -252,8 +251,7 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
         second = np.where(half, 0.0, table.numbers(other))
         wrong = np.where(blank, ~half, half & ~(is_polar & (first == 0)))
         table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
-        largest = FULL_TURN if is_polar else np.inf
-        table.must_be(other, np.abs(second) <= largest, "a phase from -360 to 360 degrees")
+
     if blank.all():
         table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
     if not is_polar:

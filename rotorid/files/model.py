@@ -250,35 +250,38 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
 
     def read(file: ModelFile) -> HarmonicFile:
         equations, inputs = file.equations, file.inputs
+        used = {*file.estimate}
         if file.M:
             equations, inputs = _of_amplitudes(file)
-            used = {*_TOKEN.findall(" ".join(equations))}
+            used &= {*_TOKEN.findall(" ".join(equations))}
             if lost := listing(sorted(file.estimate.keys() - used), "and"):
                 words = f"{lost}: in no equation of amplitudes, such as initial values: left out"
                 warnings.warn(f"{path}: {words}", TableWarning, stacklevel=5)
-            tables = {name: getattr(file, name) for name in ("estimate", "bounds", "start", "prior")}
-            kept = {name: {k: v for k, v in table.items() if k in used} for name, table in tables.items()}
-            file = file.model_copy(update=kept)
+        tables: list[Any] = [file.estimate, file.bounds, file.start, file.prior]
+        estimate, bounds, start, prior = (
+            {name: value for name, value in table.items() if name in used} for table in tables
+        )
         if not equations:
             raise ValueError("neither equations nor M and K; [states] are for `fit` and `simulate`")
         model = harmonic_model(
-            equations, known=file.known, estimate=[*file.estimate], inputs=inputs, varying=file.varying
+            equations, known=file.known, estimate=[*estimate], inputs=inputs, varying=file.varying
         )
         if file.M:
             strange = {*model.signals, *model.varying} - {*file.names, *file.outputs, *model.inputs}
-            for name in sorted(strange | (file.estimate.keys() & {*file.per_record})):
+            for name in sorted(strange | (used & {*file.per_record})):
                 raise ValueError(
                     f"{name} has no meaning for amplitudes: M, C and K hold parameters and known numbers; "
                     "what changes with the time t must be a measured input"
                 )
             if model.has_constant_terms:
                 raise ValueError("a load without any amplitude has no influence on amplitudes: leave it out")
-        errors, start = None, {name: value for name, value in file.estimate.items() if value is not None}
+        guesses = {name: value for name, value in estimate.items() if value is not None}
+        errors = None
         if given := file.errors:
             phase = math.radians(given.phase_deg)
             errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
         unmeasured = tuple({*model.outputs} - {*file.outputs} if file.outputs else ())
-        return HarmonicFile(model, file.bounds, start | file.start, errors, unmeasured, file.prior)
+        return HarmonicFile(model, bounds, guesses | start, errors, unmeasured, prior)
 
     return whole(_read(Path(path)), "model of amplitudes", read)
 
@@ -368,22 +371,17 @@ def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str]]:
         force = dict(zip(y, inputs, strict=True))
     powers, equations, put = {"*p**2": file.M, "*p": file.damping, "": file.K}, list[str](), dict[str, str]()
     for i, x in enumerate(y):
-        columns = [
-            (matrix[i][j], f"{power}*{z}") for j, z in enumerate(y) for power, matrix in powers.items()
-        ]
-        terms = [f"({entry}){factor}" for entry, factor in columns if entry != 0]
+        columns = [(matrix[i][j], power, z) for j, z in enumerate(y) for power, matrix in powers.items()]
+        terms = [f"({entry}){power}*{z}" for entry, power, z in columns if entry != 0]
         equations.append(f"{' + '.join(terms) or 0} = {force.get(x, 0)}")
-    wrong = sorted(force.keys() - {*y})
     for name, text in file.outputs.items():
         match = _SCALED.fullmatch(str(text))
-        shown = match[2] if match and match[2] in y and match[2] not in put else ""
-        wrong += [name] if name in y and name != shown else []
-        if match and shown:
-            put[shown] = f"({name}/{match[1]})" if match[1] else name
+        if match and match[2] in y and match[2] not in put:
+            put[match[2]] = f"({name}/{match[1]})" if match[1] else name
         else:
             equations.append(f"{name} = {text}")
-    names = [*file.estimate, *file.known, "p", *inputs, *dict.fromkeys([*y, *file.outputs])]
-    if wrong := wrong + [name for name in names if names.count(name) > 1]:
+    names = [*file.estimate, *file.known, "p", *inputs, *file.outputs, *(x for x in y if x not in put)]
+    if wrong := sorted(force.keys() - {*y}) + [name for name in names if names.count(name) > 1]:
         raise ValueError(
             f"{wrong[0]}: an amplitude needs a name of its own, a force one of {listing(y, 'or')}"
         )

@@ -13,7 +13,6 @@ from rotorid.base.arrays import FloatArray, polar
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
-from rotorid.files.conventions import FULL_TURN
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, one_of, ratio
 from rotorid.reduction import SmallModel
@@ -125,13 +124,11 @@ def _vectors(
     table: Table, where: str, sizes: Set[str], rotor: Rotor | SmallModel
 ) -> list[tuple[int, complex]]:
     """Nodes of the rows, and products of sizes with their angles; raises all problems."""
-    angle = table.numbers("angle")
-    table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
     for stem in sizes:
         table.must_be(stem, table.numbers(stem) >= 0, "a number of 0 or more")
     nodes, size = _nodes(table, where, rotor), np.prod([table.numbers(stem) for stem in sizes], axis=0)
     table.problems.stop()
-    return list(zip(map(int, nodes), polar(size, angle).tolist(), strict=True))
+    return list(zip(map(int, nodes), polar(size, table.numbers("angle")).tolist(), strict=True))
 
 
 def _nodes(table: Table, stem: str, rotor: Rotor | SmallModel | None) -> list[Node]:

@@ -91,14 +91,6 @@ class Problems(list[Problem]):
             raise AssertionError("nothing and no problem")
         return value
 
-    def drop(self, file: str) -> None:
-        """Forget those of a file."""
-        self[:] = [problem for problem in self if problem.file != file]
-
-    def of(self, file: str) -> list[Problem]:
-        """Problems of one file so far."""
-        return [problem for problem in self if problem.file == file]
-
     def refuse_newer(self, file: str, version: object) -> None:
         """Note a file of a later `schema_version`, which may mean something else, and what is none."""
         if isinstance(version, bool) or version not in range(1, SCHEMA_VERSION + 1):  # or 1.0, of a workbook

@@ -239,14 +239,15 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": path.name}
-    if path.suffix.lower() == ".toml":
+    data: Mapping[str, Any] = {"shaft": "the table itself"}
+    if is_file := path.suffix.lower() == ".toml":
         data = problems.need(read_toml(path, problems))
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             raise InputError([Problem(str(path), None, "shaft", None, expected)])
     file = problems.need(read_settings(RotorFile, data, str(path), problems))
-    parts, stations = _shaft(path.parent / file.shaft, file.material), dict[str, int]()
+    shaft, stations = path.parent / file.shaft if is_file else path, dict[str, int]()
+    parts = _shaft(shaft, file.material)
     at = places(range(1, len(parts["length"]) + 2), stations)
 
     def name(item: Station) -> None:
@@ -294,7 +295,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     problems, doubts = Problems(), Problems()
     table = problems.need(read_table(path, "rotor", COLUMNS, problems))
     values: dict[str, FloatArray] = {}
-    for stem in (column.stem for column in COLUMNS):
+    for stem in (column.stem for column in COLUMNS if column.unit):
         default = getattr(material, stem, 0.0)
         values[stem] = np.where(table.is_blank(stem), default, table.numbers(stem, default))
     elements, last = values["length"] != 0, np.arange(len(table)) == len(table) - 1
@@ -421,7 +422,7 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         "calibration": _calibration_tables(rotor.calibration) if rotor.calibration else {},
     }
     return {
-        shaft: csv_bytes((), [*columns], [*zip(*columns.values(), strict=True)]),
+        shaft: csv_bytes([*columns], [*zip(*columns.values(), strict=True)]),
         **tables,
         path: toml_bytes({name: part for name, part in document.items() if part}),
     }

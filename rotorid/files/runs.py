@@ -19,17 +19,11 @@ from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis, turned
-from rotorid.base.text import listing
+from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
-from rotorid.files.conventions import (
-    DEFAULT_TOLERANCE,
-    FULL_TURN,
-    Angles,
-    Conventions,
-    Phase,
-)
+from rotorid.files.conventions import DEFAULT_TOLERANCE, Conventions
 from rotorid.files.layout import MOUNTED, joined, read_runs_grids, stated_phase
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
@@ -313,7 +307,6 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
         return None
     table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
     table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
-    table.must_be("phase", np.abs(table.numbers("phase")) <= FULL_TURN, "a phase from -360 to 360 degrees")
     stems = [stem for stem in ("amplitude_std", "phase_std") if stem in table]
     if len(stems) == 1:
         expected = "amplitude_std_… and phase_std_deg together: one alone does not tell how a reading errs"
@@ -330,7 +323,7 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
 
 def _which_mm_s(table: Table, *, exchanged: bool) -> list[str]:
     """How mm/s alone are read, below a heading that does not say it."""
-    heading = table.fields["phase" if exchanged else "amplitude"].heading
+    heading = table.fields["phase" if exchanged else "amplitude"].names[0]
     unit = table.unit("amplitude").name
     if unit not in ("mm_s", "mm_s_rms") or re.search("mm_s|rms|peak|pk", heading, re.IGNORECASE):
         return []
@@ -352,7 +345,7 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
             "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, all "
             "amplitudes look like angles: state exchanged = true in the job, or exchanged = false"
         )
-        table.as_whole(table.fields["amplitude"].heading, expected)
+        table.as_whole(table.fields["amplitude"].names[0], expected)
 
 
 def _complain_about_twins(

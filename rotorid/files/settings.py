@@ -477,14 +477,7 @@ def toml_bytes(data: Mapping[str, Any], comments: Iterable[str] = ()) -> bytes:
     import tomli_w
 
     lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
-    lines.append(f"schema_version = {SCHEMA_VERSION}")
-    tables = {}
-    for name, part in data.items():
-        rows = part if isinstance(part, list) else []
-        if isinstance(part, dict) or (rows and isinstance(rows[0], dict)):
-            tables[name] = part
-        elif rows and isinstance(rows[0], list):
-            lines += [f"{name} = [", *(f"  {json.dumps(row)}," for row in rows), "]"]
-        else:
-            lines.append(f"{name} = {json.dumps(part)}")
-    return "\n".join([*lines, "", tomli_w.dumps(tables)]).encode()
+    text = tomli_w.dumps({"schema_version": SCHEMA_VERSION, **data})
+    # a list of numbers on one line
+    text = re.sub(r'\[\n\s+([^\[\]{}"]+?),\n\s*\]', lambda row: f"[{' '.join(row[1].split())}]", text)
+    return "\n".join([*lines, text]).encode()

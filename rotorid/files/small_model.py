@@ -245,7 +245,7 @@ def small_model_files(
     `equations` is the table of that name.
     """
     arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
-    supports, files = support_tables(model.supports, path, ordered=True)
+    supports, files = support_tables(model.supports, path)
     data: dict[str, Any] = {
         **{key: array.tolist() for key, array in arrays.items() if array.any() or "shaft" in key},
         **supports,

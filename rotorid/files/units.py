@@ -145,18 +145,8 @@ def one_of(units: dict[str, Unit]) -> UnitReader:
     return read
 
 
-def weight(name: str) -> Unit:
-    """The unit of a weight: a mass or a mass × radius.
-
-    Raises
-    ------
-    UnitError
-        For any other name.
-    """
-    unit = WEIGHT.get(spelt(name))
-    if unit is None:
-        raise UnitError(f"a unit of weight: {listing(WEIGHT)}, not {name!r}{did_you_mean(name, WEIGHT)}")
-    return unit
+weight = one_of(WEIGHT)
+"""The unit of a weight: a mass or a mass × radius."""
 
 
 def ratio(name: str) -> Unit:

@@ -21,7 +21,6 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
-from rotorid.files.conventions import as_phase
 from rotorid.files.instruments import DERIVATIVE, read_samples
 from rotorid.files.problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import (
@@ -327,7 +326,7 @@ def vectors_table(each: Sequence[Vectors], labels: Labels) -> tuple[Table, dict[
 
 
 def read_vectors_grid(
-    path: Path, phase: str | None, stated: Mapping[str, object] | None = None, *, moving: bool = False
+    path: Path, phase: Phase | None, stated: Mapping[str, object] | None = None, *, moving: bool = False
 ) -> tuple[Grid, Phase, tuple[Path, ...]]:
     """The vectors of a waveforms file as cells of a runs table, their phase convention, files that were read.
 
@@ -350,7 +349,7 @@ def read_vectors_grid(
         As `read_waveforms`, and for records of which there are no vectors.
     """
     waveforms = read_waveforms([path], stated)
-    labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=as_phase(phase))
+    labels = waveforms.labels if phase is None else replace(waveforms.labels, phase=phase)
     try:
         each = find_each(waveforms)
     except ValueError as error:

@@ -18,8 +18,8 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid, NotANumber, parse_number, show
-from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
-from rotorid.files.conventions import FULL_TURN, Conventions
+from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
+from rotorid.files.conventions import Conventions
 from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.layout import NUMBER, long_rows
 from rotorid.files.problems import InputError, Problems
@@ -153,7 +153,7 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
     if stem == "clock" and written:
         raise NotANumber("a time of the clock face, such as 10:20")
     if not written or (stem != "hole" and match is None):
-        raise NotANumber("a number of degrees, a hole of the plane or a clock, such as 10:20")
+        raise NotANumber("an angle from -360 to 360 degrees, a hole or a clock, such as 10:20")
     hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:

@@ -1,22 +1,160 @@
-"""Machines of a type: the table of their jobs, and what their influence coefficients have in common."""
+"""`fleet fit`: jobs of many machines as one table; coefficients of their type, and odd machines."""
 
-from rotorid.base.lazy_names import lazy_names
+from __future__ import annotations
 
-TYPE_CHECKING = False
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from rotorid.base.tables import Column, Table
+from rotorid.base.text import RPM, counted, figures
+from rotorid.report.outcome import Outcome, command, provenance
+
 if TYPE_CHECKING:
-    from rotorid.fleet.fit import FleetFitOptions as FleetFitOptions
-    from rotorid.fleet.fit import fleet_fit as fleet_fit
-    from rotorid.fleet.machine_type import MachineRecord as MachineRecord
-    from rotorid.fleet.machine_type import MachineType as MachineType
-    from rotorid.fleet.machine_type import fit_type as fit_type
-    from rotorid.fleet.posterior import update as update
+    from rotorid.base.arrays import FloatArray
+    from rotorid.fleet.machine_type import MachineType
 
-_HOME = {
-    **dict.fromkeys(("MachineRecord", "MachineType", "fit_type"), "machine_type"),
-    **dict.fromkeys(("FleetFitOptions", "fleet_fit"), "fit"),
-    "update": "posterior",
-}
+__all__ = ["FleetFitOptions", "fleet_fit"]
 
-__all__ = [*_HOME]
+_HEADS = ("rpm", "sensor", "plane", "influence", "°", "± % between", "± °", "± % within", "± ° ")
+"""Of the table, on a terminal."""
+_NO_REASON = "nothing that was tried makes it fit"
 
-__getattr__, __dir__ = lazy_names(__name__, _HOME)
+
+@dataclass(frozen=True)
+class FleetFitOptions:
+    """Options of `fleet fit`.
+
+    Attributes
+    ----------
+    machine_type : --type NAME
+        The type that is wanted, and that of jobs which do not say it; default: that of most jobs.
+    """
+
+    machine_type: str | None = None
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
+    outputs: ClassVar[Sequence[str]] = (".parquet", ".csv", ".xlsx")
+
+
+@command
+def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outcome:
+    """Read the jobs of a folder tree; how coefficients of a type differ between machines, odd machines.
+
+    Example: rotorid fleet fit sample_data/fleet --output fans.parquet
+
+    With `balance --type fans.parquet:fan-132` a machine of the type is balanced from its baseline.
+    .parquet has the coefficients of all jobs, .csv and .xlsx those of the type.
+
+    Parameters
+    ----------
+    tree : TREE
+        Folder with jobs (.toml) at any depth.
+    options
+        See there.
+
+    Raises
+    ------
+    ValueError
+        Without any job that gives coefficients, and for a type that is not there; UndeterminedError with
+        fewer than three machines.
+    """
+    from rotorid.fleet.jobs import arrow, parquet, read_tree
+    from rotorid.fleet.machine_type import type_of_fleet
+
+    options = options or FleetFitOptions()
+    fleet, undetermined, damaged = read_tree(Path(tree), options.machine_type or "")
+    unreadable = [f"{path} cannot be read: {why}" for path, why in damaged.items()]
+    types = fleet.drop_duplicates("job")["machine_type"].value_counts().drop("", errors="ignore")
+    if types.empty:
+        words = f"{tree}: no balancing job in it has a type (machine_type, or --type) and coefficients"
+        raise ValueError("\n".join([words, *unreadable]))
+    name = options.machine_type or str(types.index[0])
+    kind = type_of_fleet(fleet, name)
+    machines, jobs, table = len(kind.machines), int(kind.effects.jobs.sum()), _table(kind)
+    head = f"{name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. Coefficients differ between "
+    head += f"machines {_typical(kind, kind.effects.between)}"
+    notes = list(kind.notes)
+    if jobs > machines:
+        head += f"; from run to run of one {_typical(kind, kind.effects.within)}"
+    else:
+        notes.insert(0, "± within a machine is not determined by one job a machine")
+    if undetermined:
+        notes.append(f"the runs of {counted(len(undetermined), 'job')} do not determine coefficients")
+    if len(types) > 1:
+        notes.append(f"{counted(len(types) - 1, 'other type')} in the tree (--type NAME)")
+    odd, warnings = list[dict[str, object]](), list[str]()
+    for record, far in kind.odd:
+        each = {"machine": record.machine, "path": record.job, "times_the_limit": far**0.5}
+        odd.append(each | {"reason": kind.why_odd(record) or None})
+        why = f"it would fit if {odd[-1]['reason']}" if odd[-1]["reason"] else _NO_REASON
+        words = (
+            f"{record.machine} ({record.job}) is odd, {far**0.5:.2g} times as far off as machines of a type"
+        )
+        warnings.append(f"{words} are, and was left out: {why}")
+    unit = f"{kind.labels.vibration_unit or '1'}/{kind.labels.weight_unit}"
+    return Outcome(
+        result=kind,
+        sentences=(f"{head}. In {unit}, phases lead, angles with the rotation:",),
+        tables=(table.only(dict(zip(table.headings, _HEADS, strict=True))),),
+        file=table,
+        files={".parquet": lambda _: parquet(arrow("a fleet").Table.from_pandas(fleet))},
+        keys={
+            "machine_type": name,
+            "types": types.to_dict(),
+            "machines": list(kind.machines),
+            "jobs": jobs,
+            "unit": unit,
+            "phase": "lead",
+            "angles": "with rotation",
+            "rows": table.records,
+            "odd": odd,
+            "left_out": kind.left_out,
+            "undetermined": undetermined,
+            "damaged": damaged,
+        },
+        warnings=(*warnings, *unreadable),
+        notes=tuple(notes),
+        title="Type of machines",
+        provenance=provenance((), options, tree=str(tree)),
+    )
+
+
+def _scatter(kind: MachineType, covariance: FloatArray) -> FloatArray:
+    """One standard deviation along coefficients, %, and across, degrees, (2, n)."""
+    import numpy as np
+
+    along, across = np.sqrt(np.diag(covariance)).reshape(-1, 2).T / np.abs(kind.mean.ravel())
+    return np.array([100 * along, np.degrees(np.arctan(across))])
+
+
+def _table(kind: MachineType) -> Table:
+    """One row per speed, sensor and plane: mean coefficients, and one standard deviation of each kind."""
+    import numpy as np
+
+    W, scale = kind.mean, kind.labels.vibration_scale / kind.labels.weight_scale
+    s, c, p = np.indices(W.shape).reshape(3, -1)
+    within = kind.effects.within if kind.effects.jobs.max() > 1 else np.nan * kind.effects.within
+    scatter = np.concatenate((_scatter(kind, kind.effects.between), _scatter(kind, within)))
+    names = ("between_percent", "between_deg", "within_percent", "within_deg")
+    tenths = "{:.1f}".format
+    columns = (
+        Column("speed_rpm", np.round(kind.speeds[s] * RPM, 9), "{:.6g}".format),
+        Column("sensor", np.array(kind.sensors)[c]),
+        Column("plane", np.array(kind.planes)[p]),
+        Column("influence", np.abs(W).ravel() * scale, partial(figures, digits=3)),
+        Column("phase_deg", np.degrees(np.angle(W)).ravel() % 360.0, tenths),
+        *(Column(name, values, tenths) for name, values in zip(names, scatter, strict=True)),
+    )
+    return Table("coefficients", columns)
+
+
+def _typical(kind: MachineType, covariance: FloatArray) -> str:
+    """Root mean square over the coefficients, in words."""
+    import numpy as np
+
+    percent, degrees = np.sqrt(np.mean(_scatter(kind, covariance) ** 2, axis=1)).tolist()
+    if not percent:
+        return "no more than the errors of their runs explain"
+    return f"by {figures(percent, 2)} % and {figures(degrees, 2)}°"

@@ -9,21 +9,20 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
 import re
 import warnings
-import zipfile
 from contextvars import Context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Labels, UndeterminedError, estimate_influence
+from balancing import Influence, Labels, UndeterminedError, estimate_influence
+from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
 from rotorid.files import InputError, read_job
-from rotorid.files.disk import each_file_once, file_content
-from rotorid.files.problems import Problem, Problems
+from rotorid.files.disk import each_file_once
+from rotorid.files.problems import Problem, Problems, printable
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 
@@ -34,12 +33,11 @@ if TYPE_CHECKING:
     from rotorid.files import Job
 
 COLUMNS = (
-    *("job", "machine", "machine_type", "date", "quantity", "weight_kind", "vibration_unit", "weight_unit"),
-    *("runs", "sensor", "plane", "speed_rad_s", "radius_m", "re", "im", "std"),
+    *("job", "machine", "machine_type", "date", "quantity", "vibration_unit", "weight_unit", "runs"),
+    *("sensor", "plane", "mounted", "speed_rad_s", "re", "im", "std"),
 )
 """Of the table: `job` is the path of the job below the tree, `runs` the SHA-256 of its readings."""
 _DATE = re.compile(r"([\s_-]*\d{4}-\d\d-\d\d)*[\s_-]*")
-_SHEET = re.compile(rb'<(?:\w+:)?sheet\s[^>]*?\bname="([^"]*)"')
 
 
 def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], dict[str, str]]:
@@ -48,34 +46,28 @@ def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], d
     Parameters
     ----------
     tree
-        A folder with jobs at any depth, or a job. Hidden files are left out, links not followed out of it.
+        A folder with jobs at any depth. Hidden files are left out.
     machine_type
         Of the jobs that neither say it nor lie at least two folders deep, in that of their type; "": none.
 
     Raises
     ------
     OSError
-        Without such a folder or file.
+        Without such a folder.
     """
     import pandas as pd
 
-    root, tables = tree.resolve(strict=True), [pd.DataFrame(columns=list(COLUMNS))]
-    undetermined, damaged = list[str](), dict[str, str]()
-    inputs: set[Path] = set()
-    files = sorted(tree.rglob("*")) if tree.is_dir() else [tree]
-    # settings first: the workbooks that they name as tables are no jobs
-    for count, file in enumerate(sorted(files, key=lambda file: file.suffix.lower() != ".toml"), 1):
-        path = _printable(file.relative_to(tree) if file != tree else Path(file.name)).as_posix()
-        hidden = re.search(r"(^|/)(\.|~\$)", path) or not file.resolve().is_relative_to(root)
-        if hidden or not file.is_file() or file.resolve() in inputs:
+    tables, undetermined, damaged = [pd.DataFrame(columns=list(COLUMNS))], list[str](), dict[str, str]()
+    files = sorted(tree.resolve(strict=True).rglob("*.toml"))
+    for count, file in enumerate(files, 1):
+        path = printable(file.relative_to(tree.resolve()).as_posix())
+        if f"/{path}".count("/."):
             continue
         folders = path.split("/")
+        usual = folders[0] if len(folders) > 2 else machine_type
         try:
             # apart from what the command keeps of files that it reads: those of a whole tree are too many
-            job = Context().run(_read_job, file)
-            if job is not None:
-                inputs |= {one.resolve() for one in job.files}
-                tables.append(table_of(job, path, folders[0] if len(folders) > 2 else machine_type))
+            tables += Context().run(_read_job, file, path, usual)
         except UndeterminedError:
             undetermined.append(path)
         except (ValueError, OSError, ArithmeticError, MemoryError) as error:
@@ -84,48 +76,55 @@ def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], d
     return pd.concat(tables[1:] or tables, ignore_index=True), undetermined, damaged
 
 
-def _read_job(file: Path) -> Job | None:
-    """The job of settings with runs or weights, and of a workbook with such a sheet; None: no job."""
-    names: set[str] = set()
-    with each_file_once(), warnings.catch_warnings(action="ignore"):
-        if file.suffix.lower() == ".toml":
-            problems = Problems()
-            names = {*problems.need(read_toml(file, problems))}
-        elif file.suffix.lower() == ".xlsx":
-            try:
-                with zipfile.ZipFile(io.BytesIO(file_content(file))) as archive:
-                    sheets = _SHEET.findall(archive.read("xl/workbook.xml"))
-            except Exception as error:  # of any kind, where it is damaged
-                raise ValueError(f"{file}: expected an intact Excel workbook") from error
-            names = {name.decode("utf-8", "replace").strip().casefold() for name in sheets}
-        return read_job(file) if names & {"runs", "weights"} else None
-
-
-def table_of(job: Job, path: str = "", machine_type: str = "") -> pd.DataFrame:
-    """Rows of one job, of this type unless it says another; UndeterminedError without coefficients."""
+def _read_job(file: Path, path: str, machine_type: str) -> list[pd.DataFrame]:
+    """The rows of a job, of this type unless it says another; none of a file that is no job."""
     import pandas as pd
 
-    with warnings.catch_warnings(action="ignore"):
-        influence = job.influence or estimate_influence(job.trials)
-    labels, keys = job.trials.labels, job.settings
-    s, c, p = np.indices(influence.W.shape).reshape(3, -1)
-    W, planes = influence.W.ravel(), [influence.planes[k] for k in p]
-    variances = np.diagonal(influence.channels(known=True), axis1=-2, axis2=-1)[..., 2:]
-    values = (
-        *(path, machine_of(job), keys.machine_type or machine_type, str(keys.date or "")),
-        *(*kind_of(labels), labels.vibration_unit, labels.weight_unit, runs_of(job)),
-        *([influence.sensors[k] for k in c], planes, influence.speeds[s]),
-        *([job.radii.get(plane, np.nan) for plane in planes], W.real, W.imag),
-        np.sqrt(variances.reshape(-1, 2).mean(axis=-1)),
-    )
-    return pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))
+    with each_file_once(), warnings.catch_warnings(action="ignore"):
+        problems = Problems()
+        if not {"runs", "weights"}.intersection(problems.need(read_toml(file, problems))):
+            return []
+        job = read_job(file)
+        measured = estimate_influence(job.trials)
+    labels, keys, W = job.trials.labels, job.settings, measured.W
+    s, c, p = np.indices(W.shape).reshape(3, -1)
+    rows = {
+        "job": path,
+        "machine": machine_of(job),
+        "machine_type": keys.machine_type or machine_type,
+        "date": str(keys.date or ""),
+        "quantity": quantity_of(labels),
+        "vibration_unit": labels.vibration_unit,
+        "weight_unit": labels.weight_unit,
+        "runs": runs_of(job),
+        "sensor": [measured.sensors[k] for k in c],
+        "plane": [measured.planes[k] for k in p],
+        "mounted": [mounted_in(job, measured.planes[k]) for k in p],
+        "speed_rad_s": measured.speeds[s],
+        "re": W.real.ravel(),
+        "im": W.imag.ravel(),
+        "std": known_errors(measured).ravel(),
+    }
+    return [pd.DataFrame(rows)]
 
 
-def kind_of(labels: Labels) -> tuple[str, str]:
-    """What is read ("" unknown), and what weights are."""
+def known_errors(measured: Influence) -> FloatArray:
+    """Standard deviation of either part of coefficients, (S, C, P); 0 where errors are assumed."""
+    variances = np.diagonal(measured.channels(known=True), axis1=-2, axis2=-1)[..., 2:]
+    return np.asarray(np.sqrt(variances.reshape(*measured.W.shape, 2).mean(axis=-1)))
+
+
+def quantity_of(labels: Labels) -> str:
+    """What is read; "" unknown."""
     unit = labels.vibration_unit
-    quantity = vibration(unit).kind.replace("length", "displacement") if unit else ""
-    return quantity, "unbalance" if labels.unbalances else "mass"
+    return vibration(unit).kind.replace("length", "displacement") if unit else ""
+
+
+def mounted_in(job: Job, plane: str) -> str:
+    """What the weights of a plane are: masses at another radius act otherwise."""
+    if job.trials.labels.unbalances:
+        return "unbalance"
+    return f"mass at {1e3 * job.radii[plane]:.3g} mm" if plane in job.radii else "mass"
 
 
 def runs_of(job: Job) -> str:
@@ -135,13 +134,8 @@ def runs_of(job: Job) -> str:
 
 def machine_of(job: Job) -> str:
     """As the job says; else its folder, or the first above it whose name is not a date alone."""
-    folders = (folder.name for folder in _printable(job.files[0].resolve()).parents)
+    folders = (printable(folder.name) for folder in job.files[0].resolve().parents)
     return job.settings.machine or next((name for name in folders if not _DATE.fullmatch(name)), "")
-
-
-def _printable(path: Path) -> Path:
-    """A path with � for what is no UTF-8, which tables cannot hold."""
-    return Path(os.fsencode(path).decode("utf-8", "replace"))
 
 
 def arrow(what: str) -> Any:  # noqa: ANN401 - a module

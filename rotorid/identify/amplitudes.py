@@ -367,21 +367,21 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     measured, inputs = experiments.table(model.outputs), experiments.table(model.inputs)
     given = np.asarray(~np.isnan(measured))
     factors = model.multipliers(experiments.frequencies, experiments.varying)
-    known = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1) | experiments.free
-    usable = known & given.any(axis=1)
+    excited = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1) | experiments.free
+    usable = excited & given.any(axis=1)
     hidden = ~given.any(axis=0)
     left_out = [f"{model.outputs[j]} is measured nowhere" for j in np.flatnonzero(hidden)]
     what = "input or varying quantity" if model.varying else "input"
     for i, name in enumerate(experiments.names):
         lost = [o for o, g in zip(model.outputs, given[i] | hidden, strict=True) if not g]
-        if not known[i]:
+        if not excited[i]:
             left_out.append(f"experiment {name}: left out, for not every {what} is known")
         elif lost or not usable[i]:
             left_out.append(f"experiment {name}: {', '.join(lost) or 'everything'} not measured")
     if not usable.any():
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
     forced, free = (np.flatnonzero(usable & kind) for kind in (~experiments.free, experiments.free))
-    rows = np.repeat((given & known[:, None])[:, :, None], 2, axis=2)
+    rows = np.repeat((given & excited[:, None])[:, :, None], 2, axis=2)
     rows[free, :, 1] = False
     rows[free, [reference_amplitude(shape.real) for shape in measured[free]], 0] = False
     if not (model.power % 2).any():
@@ -395,12 +395,12 @@ def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: Co
     """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across."""
     whiten = np.zeros((len(experiments), len(outputs), 2, 2))
     for j, name in enumerate(outputs):
-        known, errors = experiments.covariances, experiments.errors
-        if known and errors is None and name not in known:
+        covariances, errors = experiments.covariances, experiments.errors
+        if covariances and errors is None and name not in covariances:
             raise ValueError(
                 f"errors are known for some outputs but not for {name}: state them with [errors]"
             )
         whiten[:, j] = inverse_roots(
-            amplitudes[:, [j]], errors, known[name][:, None] if name in known else None
+            amplitudes[:, [j]], errors, covariances[name][:, None] if name in covariances else None
         )[:, 0]
     return whiten

@@ -279,9 +279,7 @@ def combined(problem: Problem, estimate: Estimate) -> Estimate:
         if seen and np.linalg.matrix_rank([*rows, gradient], tol=1e-6) > len(rows):
             rows.append(gradient)
             words = str(usual(expression)).replace("**", "^").replace("*", "·")  # such as a·b^2/c
-            cov = estimate.solution_covariance
-            std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
-            chosen.append(Combination(words, value, std, slope))
+            chosen.append(estimate.combination(words, value, slope))
     if len(rows) < rank:
         tangents = estimate.combinations
         chosen = [replace(c, words=f"(near these values) {c.words}", std=None) for c in tangents]

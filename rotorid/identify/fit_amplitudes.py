@@ -178,7 +178,7 @@ def output_error(
     """Fit predicted to measured amplitudes from a start (n,)."""
     names, data, point = comparison.model.parameters, comparison.experiments, begin
     residual, jacobian = evaluated_once(comparison.residuals)
-    known = prior_rows(names, prior or {}, ridge, begin, jacobian)
+    added = prior_rows(names, prior or {}, ridge, begin, jacobian)
     iterations, moved = 0, np.inf
     for left in reversed(range(REWEIGHTINGS + 1)):
         fit = nonlinear_least_squares(
@@ -190,7 +190,7 @@ def output_error(
             bounds=bounds or None,
             loss=loss,
             near=left < REWEIGHTINGS,
-            prior=known,
+            prior=added,
         )
         iterations += fit.iterations
         std = np.zeros(len(begin)) if fit.std is None else fit.std
@@ -203,7 +203,7 @@ def output_error(
         comparison = comparison.reweighted(point)
         residual, jacobian = evaluated_once(comparison.residuals)
     J = jacobian(point)
-    did = effect(known, J, fit.estimate.residuals, point, at_bounds=fit.at_bounds)
+    did = effect(added, J, fit.estimate.residuals, point, at_bounds=fit.at_bounds)
     estimate = did.apart(fit.estimate) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
     return replace(fit, estimate=estimate, message=message), comparison, did, J

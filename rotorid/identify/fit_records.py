@@ -107,8 +107,8 @@ def fit(  # noqa: PLR0913
     problem = Problem(model, several, integrator, rtol)
     (low, high), names = problem.model.bounds.T, problem.model.parameters
     begin = inside(_start(problem, start or {}), low, high)
-    known = for_copies(model, len(several), model.prior)
-    problem.prior = prior_rows(names, known, ridge, begin, problem.jacobian)
+    priors = for_copies(model, len(several), model.prior)
+    problem.prior = prior_rows(names, priors, ridge, begin, problem.jacobian)
 
     def search(problem: Problem, theta: FloatArray) -> Iterations:
         near = (1e-8, 1e-5) if tolerance is None else (1e-6, 0.1)

@@ -252,10 +252,10 @@ def _scaled_together(model: HarmonicModel, rows: Rows) -> list[IntArray]:
 
     holds = np.zeros((len(model.equations), rows.K.shape[1]), dtype=bool)
     np.logical_or.at(holds, model.equation, model.of_unknowns != 0)
-    known = np.bincount(np.nonzero(rows.used)[1] // 2, rows.Y != 0, len(holds)) > 0
+    fixed = np.bincount(np.nonzero(rows.used)[1] // 2, rows.Y != 0, len(holds)) > 0
     count, part = connected_components(holds @ holds.T)
     groups = [
-        np.flatnonzero(holds[part == k].any(axis=0)) for k in range(count) if not known[part == k].any()
+        np.flatnonzero(holds[part == k].any(axis=0)) for k in range(count) if not fixed[part == k].any()
     ]
     return [group for group in groups if len(group)]
 

@@ -218,7 +218,7 @@ class FittedModes:
         """Why there are no modes to go on with, in words: at most one clause a mode."""
         words, by_noise = [] if self.fit.converged else [self.fit.message], self.by_noise()
         speeds = self.readings.speeds
-        known = self.fit.std is not None
+        intervals = self.fit.std is not None
         for mode, ((low, high), values) in enumerate(zip(self.ends, self.values.T, strict=True)):
             omega, zeta, error, other = values
             near = speeds[(3 * low - 2 * high <= speeds) & (speeds <= 3 * high - 2 * low)]
@@ -230,7 +230,7 @@ class FittedModes:
                     f"{name} stands on one frequency, perhaps a wild reading: measure closer by, or say in "
                     "--bands where modes are"
                 )
-            elif known and not 2 * error < high - low:
+            elif intervals and not 2 * error < high - low:
                 words.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
             elif not near.min() < omega < near.max():  # in a fast sweep it stands beside its peak
                 words.append(f"{name} is read on one side only")
@@ -345,6 +345,5 @@ class FittedModes:
         if self.undetermined:
             estimate = replace(estimate, values=estimate.values * np.nan, covariance=None)
         else:
-            table = self.file_table()
-            modes = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+            modes = self.file_table().records
         return dict(plain({**estimate.to_dict(), "modes": modes, "warnings": self.warnings}))

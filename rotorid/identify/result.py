@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import Answer, Answered, Column, frame, rows, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import counted, percent, sentence
 from rotorid.identify.amplitudes import Experiments
 from rotorid.identify.linear_start import LinearFit
@@ -128,17 +129,19 @@ class Identification(Answered, Uncertain):
             rows_of = [f"equation {e + 1}" for e in range(left.shape[1])]
         n, e = left.shape
         return (
-            Column("experiment", np.repeat(self.experiments.names, e), str),
-            Column("frequency_rad_s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format, "rad/s"),
-            Column("row", rows_of * n, str),
-            Column("re", left.real.ravel(), "{:.3g}".format, "left, re"),
-            Column("im", left.imag.ravel(), "{:.3g}".format, "left, im"),
+            Column("experiment", np.repeat(self.experiments.names, e)),
+            Column(
+                "frequency_rad_s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format, title="rad/s"
+            ),
+            Column("row", rows_of * n),
+            Column("re", left.real.ravel(), "{:.3g}".format, title="left, re"),
+            Column("im", left.imag.ravel(), "{:.3g}".format, title="left, im"),
         )
 
     @property
     def residual_rms(self) -> float:
         """Over the real rows used; NaN where there are none."""
-        parts = np.concatenate([column.values for column in self.residuals[3:]])
+        parts = np.array([column.values for column in self.residuals[3:]], dtype=float)
         return float(np.sqrt(np.nanmean(parts**2))) if np.isfinite(parts).any() else np.nan
 
     def value(self, name: str) -> float:
@@ -166,7 +169,7 @@ class Identification(Answered, Uncertain):
                 "condition_number": self.estimate.condition_number,
                 "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
                 "correlation": None if correlation is None else by_name([*map(by_name, correlation)]),
-                "residuals": rows(self.residuals),
+                "residuals": records(self.residuals),
                 "normal_matrix": self.normal_matrix.to_dict(),
                 **(self.prior.to_dict() if self.prior else {}),
             }
@@ -200,8 +203,8 @@ class Identification(Answered, Uncertain):
             judgement = "\n".join(map(sentence, self.unidentifiable))
         else:
             n, condition = len(self.parameters), self.estimate.condition_number
-            known = "The parameter is" if n == 1 else f"All {n} parameters are"
-            judgement = f"{known} determined (condition number {condition:.3g})."
+            subject = "The parameter is" if n == 1 else f"All {n} parameters are"
+            judgement = f"{subject} determined (condition number {condition:.3g})."
             judgement = self.prior.judgement(judgement) if self.prior else judgement
         judgement += f" Method: {HEADINGS[self.method]}."
         if self.predicted and np.isfinite(self.residual_rms):

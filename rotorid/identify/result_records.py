@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base import tables
-from rotorid.base.answer import COLUMNS, Answer, Answered, frame
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
@@ -118,7 +118,7 @@ class Fit(Answered, Iterations):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std and the 95 % interval."""
-        return frame(parameter_columns(self.parameters, self.estimate))
+        return tables.frame(parameter_columns(self.parameters, self.estimate))
 
     @property
     def answer(self) -> Answer:

@@ -84,18 +84,18 @@ def _projected(
     typical = float(np.median(np.abs(table[:, : len(model.outputs)][:, seen[: len(model.outputs)]])))
     force = np.abs(model.multipliers(data.frequencies, data.varying))
     force = force * np.where(seen, np.abs(table), typical)[:, model.column]
-    known = (force * np.abs(model.coefficients[:, 0])).max(axis=1)
-    known[known == 0] = 1.0
+    size = (force * np.abs(model.coefficients[:, 0])).max(axis=1)
+    size[size == 0] = 1.0
 
     def projected(theta: FloatArray) -> FloatArray:
         A = model.matrices(theta, data.frequencies, data.varying)
         A = np.where(data.free[:, None, None], A.real, A)  # no odd powers of p
         v = np.einsum("nes,ns->ne", A[:, :, seen], table[:, seen])
         Q = np.linalg.qr(A[:, :, ~seen])[0]
-        r = (v - np.einsum("neh,nfh,nf->ne", Q, Q.conj(), v)) / known[:, None]
+        r = (v - np.einsum("neh,nfh,nf->ne", Q, Q.conj(), v)) / size[:, None]
         return np.concatenate((r.real.ravel(), r.imag.ravel()))
 
     alone = np.abs(model.exponents).sum(axis=1, keepdims=True) == 1
     slopes = np.abs(model.coefficients) @ (alone & (model.exponents == 1))
-    sizes, middle = np.median(force, axis=0)[:, None] * slopes, np.median(known)
+    sizes, middle = np.median(force, axis=0)[:, None] * slopes, np.median(size)
     return projected, np.array([middle / np.median(x[x > 0]) if x.any() else 1.0 for x in sizes.T])

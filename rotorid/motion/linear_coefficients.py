@@ -88,9 +88,9 @@ def threshold(
     lowest, highest = resting[0].speed, resting[-1].speed
     start = max(lowest, 1e-3 * highest)
     more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1].tolist()
-    known = {one.speed: one for one in resting}
-    known |= {one.speed: one for one in equilibria(system, sorted({*more, *system.knots[1:-1].tolist()}))}
-    linear = linear_rotor(rotor, [known[speed] for speed in sorted(known)])
+    rests = {one.speed: one for one in resting}
+    rests |= {one.speed: one for one in equilibria(system, sorted({*more, *system.knots[1:-1].tolist()}))}
+    linear = linear_rotor(rotor, [rests[speed] for speed in sorted(rests)])
     stable = _search(linear, lowest, highest)
     for share, steps in _AROUND:
         if stable.threshold is None:
@@ -99,7 +99,7 @@ def threshold(
         near = _search(linear_rotor(rotor, equilibria(system, (a, b))), a, b, steps)
         if near.threshold is not None:
             stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
-    ends = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(known)))[0][:1]
+    ends = () if isinstance(linear, SmallModel) else fem.judge(linear, np.array(sorted(rests)))[0][:1]
     again = tuple(
         f"about {speed_text(one.last)} it is stable again; `rotorid campbell` of the file that --output "
         "writes shows all such ranges"

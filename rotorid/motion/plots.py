@@ -19,7 +19,7 @@ from rotorid.base.plot_style import (
     new_figure,
     note,
     plain,
-    rad_s_above,
+    second_scale,
 )
 from rotorid.base.text import RPM, rpm_text
 from rotorid.motion.run import MotionRun
@@ -206,6 +206,6 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
     ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)
-    rad_s_above(ax)
+    second_scale(ax)
     pairs = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
     legend_above(ax, height=1.12, handles=list(pairs.values()), labels=list(pairs))

@@ -27,9 +27,10 @@ import numpy as np
 import fem
 from fem import Pencil, whole_rotor
 from fem.assembly import assemble, multiply
-from rotorid.base.answer import Answer, Answered, Column, text
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.base.text import counted, percent
 from rotorid.reduction.masses import like, mac
 from rotorid.reduction.reduce import Reduction
@@ -182,8 +183,8 @@ class Methods(Answered):
             [(row.frequencies, row.relative_error, row.mac) for row in self.rows], axis=1
         )
         columns = (
-            Column("method", np.repeat([row.name for row in self.rows], n), str),
-            Column("mode", [*range(1, n + 1)] * len(self.rows), str),
+            Column("method", np.repeat([row.name for row in self.rows], n)),
+            Column("mode", [*range(1, n + 1)] * len(self.rows)),
             Column("rad/s", frequencies, "{:.4f}".format),
             Column("error", errors, "{:+.3%}".format),
             Column("MAC", agreement, "{:.5f}".format),

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
-from rotorid.base.answer import COLUMNS, Answer, Answered, Column, frame, text
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import AnyArray, FloatArray, IndexArray, whole
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, text
 from rotorid.base.text import counted
 from rotorid.reduction.masses import (
     Normalisation,
@@ -234,12 +235,12 @@ class Placement(Answered):
         chosen = [*named.values()]
         macs = [f"{self.mac[i]:.4f} ({self.worst_mode[i]})" if i < self.ranked else "" for i in chosen]
         columns = (
-            Column("choice", [*named], str),
-            Column("error", 100 * self.error[chosen], "{:.4f}".format, "largest error, %"),
-            Column("mac", macs, str, "MAC (mode)"),
+            Column("choice", [*named]),
+            Column("error", 100 * self.error[chosen], "{:.4f}".format, title="largest error, %"),
+            Column("mac", macs, title="MAC (mode)"),
             Column("condition", self.condition[chosen], "{:.3g}".format),
-            Column("nodes", [", ".join(map(str, self.nodes[i])) for i in chosen], str),
-            Column("masses", [", ".join(f"{m:.1f}" for m in self.masses[i]) for i in chosen], str, "kg"),
+            Column("nodes", [", ".join(map(str, self.nodes[i])) for i in chosen]),
+            Column("masses", [", ".join(f"{m:.1f}" for m in self.masses[i]) for i in chosen], title="kg"),
         )
         return text(columns, width=COLUMNS)
 
@@ -333,10 +334,10 @@ def rank_nodes(
     )
     # best error first, of equal errors the larger MAC, then the lighter; then masses not positive,
     # then nothing determined
-    good, known = np.isfinite(error), np.isfinite(condition)
+    good, determined = np.isfinite(error), np.isfinite(condition)
     keys = np.where(good, (masses.sum(axis=1), -agreement, error), 0.0)
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
-    order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(known, 1, 2))))
+    order = np.lexsort((*np.round(keys, 10), np.where(good, 0, np.where(determined, 1, 2))))
     nodes = np.array(places, dtype=np.int32)[chosen[order]]
     book, note = None, ""
     try:
@@ -355,7 +356,7 @@ def rank_nodes(
         worst_mode=worst[order],
         condition=condition[order],
         ranked=int(good.sum()),
-        unphysical=int((known & ~good).sum()),
+        unphysical=int((determined & ~good).sum()),
         undetermined=int(np.isinf(condition).sum()),
         at_node=int(np.isnan(condition).sum()),
         modes=modes,

@@ -22,7 +22,7 @@ from rotorid.base.plot_style import (
     new_axes,
     plain,
     plain_numbers,
-    rad_s_above,
+    second_scale,
 )
 from rotorid.base.text import RPM, counted
 from rotorid.reduction.masses import like
@@ -197,7 +197,7 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
         for k, (low, high) in enumerate(running.left_out):
             panel.axvspan(low * RPM, high * RPM, color="0.9", label=None if k else words, zorder=0)
         panel.set_xlim(speeds[0], speeds[-1])
-    rad_s_above(above)
+    second_scale(above)
     legend_above(above, borderaxespad=ABOVE_SCALE)
     above.tick_params(labelbottom=False)
     # On a scale of what counts: where the small model is left out, the difference may leave the picture.
@@ -213,10 +213,10 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     """
     axes = ax or new_axes((WIDTH, 4.2))
     plain(axes)
-    known = np.concatenate((cost.full_decrement, cost.small_decrement))
-    known = known[np.isfinite(known)]
-    far = 20 * np.median(np.abs(known)) if known.any() else 1.0  # beyond nothing matters
-    low, high = np.clip([known.min(initial=-1e-9), known.max(initial=1e-9)], -far, far) * 1.1
+    finite = np.concatenate((cost.full_decrement, cost.small_decrement))
+    finite = finite[np.isfinite(finite)]
+    far = 20 * np.median(np.abs(finite)) if finite.any() else 1.0  # beyond nothing matters
+    low, high = np.clip([finite.min(initial=-1e-9), finite.max(initial=1e-9)], -far, far) * 1.1
     low -= 0.1 * high  # 0 is in sight with room below
     for name, decrement, threshold, style in (
         ("full rotor", cost.full_decrement, cost.full.threshold, FULL),
@@ -230,6 +230,6 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     label = "smallest logarithmic decrement\n(below 0 a motion grows)"
     axes.set(xlabel="speed, rpm", ylabel=label, ylim=(low, high))
     axes.margins(x=0.01)
-    rad_s_above(axes)
+    second_scale(axes)
     legend_above(axes, 2, borderaxespad=ABOVE_SCALE)
     return axes

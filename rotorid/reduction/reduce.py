@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike
 
 import fem
 from fem.assembly import ignored_inertia
-from rotorid.base.answer import Answer, Answered, Column, frame, text, together
+from rotorid.base.answer import Answer, Answered, together
 from rotorid.base.arrays import FloatArray, whole
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, frame, text
 from rotorid.base.text import RPM, counted, error_figures, percent
 from rotorid.reduction.masses import (
     Normalisation,
@@ -249,7 +250,7 @@ class Reduction(Answered):
 
         n, parts = len(self.nodes), {"masses": self._of_masses(), "modes": self._of_modes()}
         frames = [
-            frame((Column("table", [kind] * n), *(each for each in columns if each.name)))
+            frame((Column("table", [kind] * n), *(each for each in columns if each.heading)))
             for kind, columns in parts.items()
         ]
         whole = {"mode": "Int64"} if self.rotor is None else {"mode": "Int64", "node": "Int64"}
@@ -258,10 +259,10 @@ class Reduction(Answered):
     def _of_masses(self) -> tuple[Column, ...]:
         """Node, position and mass; what has no name is printed alone."""
         positions, std, three = self.positions, self.masses.std, "{:.3f}".format
-        at = () if positions is None else (Column("position_m", positions, three, "at, m"),)
-        spread = () if std is None else (Column("", std, error_figures, "±"),)
-        masses = Column("mass_kg", self.masses.solution, three, "mass, kg")
-        return (Column("node", self.nodes, str), *at, masses, *spread)
+        at = () if positions is None else (Column("position_m", positions, three, title="at, m"),)
+        spread = () if std is None else (Column("", std, error_figures, title="±"),)
+        masses = Column("mass_kg", self.masses.solution, three, title="mass, kg")
+        return (Column("node", self.nodes), *at, masses, *spread)
 
     def _of_modes(self) -> tuple[Column, ...]:
         """Number, both frequencies, error and MAC; what has no name is printed alone."""
@@ -269,14 +270,14 @@ class Reduction(Answered):
         still = ["" if np.isfinite(f) else "does not vibrate" for f in model]
         one, four = "{:.1f}".format, "{:.4f}".format
         return (
-            Column("mode", range(1, len(self.nodes) + 1), str),
-            Column("", model * RPM, one, "model, rpm"),
-            Column("frequency_rad_s", model, four, "rad/s"),
-            Column("", other * RPM, one, "rotor, rpm" if self.source == "rotor" else "measured, rpm"),
-            Column("rotor_frequency_rad_s", other, four, "rad/s"),
-            Column("relative_error", self.relative_error, lambda e: f"{100 * e:+.3f}", "error, %"),
-            Column("mac", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format, "MAC"),
-            *((Column("", still, str),) if any(still) else ()),
+            Column("mode", range(1, len(self.nodes) + 1)),
+            Column("", model * RPM, one, title="model, rpm"),
+            Column("frequency_rad_s", model, four, title="rad/s"),
+            Column("", other * RPM, one, title="rotor, rpm" if self.source == "rotor" else "measured, rpm"),
+            Column("rotor_frequency_rad_s", other, four, title="rad/s"),
+            Column("relative_error", self.relative_error, lambda e: f"{100 * e:+.3f}", title="error, %"),
+            Column("mac", np.where(np.isfinite(model), self.mac, np.nan), "{:.5f}".format, title="MAC"),
+            *((Column("", still),) if any(still) else ()),
         )
 
     @property
@@ -297,7 +298,7 @@ class Reduction(Answered):
         if (apart := self.separated) is not None:
             a, b = apart.supports
             columns = (
-                Column("mass at node", apart.nodes, str),
+                Column("mass at node", apart.nodes),
                 Column(f"% on node {a}", 100 * apart.fractions[:, 0], "{:.4g}".format),
                 Column(f"% on node {b}", 100 * apart.fractions[:, 1], "{:.4g}".format),
                 Column("shaft on rigid supports, m/N", np.diag(apart.delta), "{:.6g}".format),

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Answered, Column, rows
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.text import error_figures, listing, percent, sentence, table
+from rotorid.base.tables import Column, records
+from rotorid.base.text import aligned, error_figures, listing, percent, sentence
 
 WORD_TOLERANCE = 1e-7
 """A parameter whose share in the null space is below this is taken as determined."""
@@ -109,19 +110,21 @@ def parameter_columns(names: Sequence[str], numbers: Uncertain) -> tuple[Column,
 def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, str]) -> str:
     """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
-    for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, numbers)), strict=True):
-        digits = value_digits(value, std)
-        cells = [f"{value:.{digits}g}", error_figures(std), percent(std / abs(value)) if value else ""]
-        cells += [f"{end:.{digits}g}" for end in ends]
-        reason = why.get(name, "not determined" if np.isnan(value) else "")
-        lines.append([name, *("" if cell in ("nan", "unknown") else cell for cell in cells), reason])
+    for row in records(parameter_columns(names, numbers)):
+        name, value, std, *ends = row.values()
+        digits = value_digits(value or 0.0, std or 0.0)
+        estimate, *interval = ("" if each is None else f"{each:.{digits}g}" for each in (value, *ends))
+        error = "" if std is None else error_figures(std)
+        share = percent(std / abs(value)) if error and value else ""
+        reason = why.get(name, "" if estimate else "not determined")
+        lines.append([name, estimate, error, share, *interval, reason])
     filled = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    return table([list(line) for line in zip(*filled, strict=True)], width=COLUMNS)
+    return aligned(filled, width=COLUMNS)
 
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
-    each = (row.values() for row in rows(parameter_columns(names, numbers)))
+    each = (row.values() for row in records(parameter_columns(names, numbers)))
     return {
         name: {"value": value, "std": std, "ci95": None if low is None else [low, high]}
         for name, value, std, low, high in each
@@ -194,12 +197,17 @@ class Estimate(Answered, Uncertain):
             return ()
         if self.curved is not None:
             return self.curved
-        return tuple(self._combination(row) for row in echelon(self.row_space) if np.count_nonzero(row) > 1)
+        return tuple(
+            self.combination(combination_words(row, self.names), float(row @ self.solution), row)
+            for row in echelon(self.row_space)
+            if np.count_nonzero(row) > 1
+        )
 
-    def _combination(self, row: FloatArray) -> Combination:
+    def combination(self, words: str, value: float, slope: FloatArray) -> Combination:
+        """One of this value and these derivatives (n,) by the parameters, with its standard deviation."""
         cov = self.solution_covariance
-        std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
-        return Combination(combination_words(row, self.names), float(row @ self.solution), std, row)
+        std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
+        return Combination(words, value, std, slope)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

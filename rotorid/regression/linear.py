@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.answer import Column, text
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.regression.estimate import WORD_TOLERANCE, Estimate, unit_columns
 
 RCOND = 1e-12
@@ -256,7 +256,7 @@ def _real_problem(
         raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
     n = A.shape[1]
     labels = tuple(names or (f"θ{i + 1}" for i in range(n)))
-    if len(labels) != n or len(set(labels)) != n:
+    if not len(labels) == len(set(labels)) == n:
         raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
     if np.iscomplexobj(A) or np.iscomplexobj(y):
         A, y = stretch(A), stretch(y)
@@ -273,8 +273,8 @@ def _row_factors(weights: ArrayLike | None, sigma: ArrayLike | None, rows: int, 
         raise ValueError("give either weights or errors of Y, not both")
     stated = sigma is not None
     each = np.asarray(sigma if stated else 1.0 if weights is None else weights, dtype=np.float64)
-    fits = each.shape in ((), (rows,)) and np.isfinite(each).all() and not (each < 0).any()
-    if not fits or not (each.all() if stated else each.any()):
+    right = (each > 0 if stated else each >= 0).all() and each.any() and np.isfinite(each).all()
+    if not right or each.shape not in ((), (rows,)):
         raise ValueError(
             f"weights and errors need one finite entry per row of Y, {rows}: errors greater than zero, "
             f"weights not negative and not all 0; got {each.shape}"
@@ -299,7 +299,7 @@ class NormalMatrix:
         """As a table."""
         columns = (Column(n, row, "{:.6g}".format) for n, row in zip(self.names, self.matrix, strict=True))
         title = f"normal matrix of the last step, condition number {self.condition_number:.4g}"
-        return f"{title}\n{text((Column('', self.names, str), *columns), width=10_000)}"
+        return f"{title}\n{text((Column('', self.names), *columns), width=10_000)}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
@@ -309,5 +309,5 @@ class NormalMatrix:
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
     s = np.linalg.svd(K, compute_uv=False)
-    full = least_squares(K, np.zeros(len(K)), rcond=JACOBIAN_RCOND).full_rank
+    full = solution_and_rank(K, np.zeros(len(K)), rcond=JACOBIAN_RCOND)[1] == len(names)
     return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)

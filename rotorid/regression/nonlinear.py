@@ -249,7 +249,6 @@ class _Search:
                 rms = max(float(np.sqrt(np.mean(r**2))), np.finfo(float).tiny)
                 self.limit = HUBER * (1.4826 * float(np.median(r)) or rms)
             self.path.clear()
-            square = np.isinf(self.limit)
             with np.errstate(all="ignore"):  # the driver shortens steps that overflow
                 end = driver(
                     lambda x: np.array(self.residual(x), dtype=np.float64),  # copies: it scales in place
@@ -257,8 +256,8 @@ class _Search:
                     jac=self._at_accepted,
                     bounds=(self.lower, self.upper),
                     x_scale="jac",
-                    loss="linear" if square else "huber",
-                    f_scale=1.0 if square else self.limit,
+                    loss="linear" if np.isinf(self.limit) else "huber",
+                    f_scale=self.limit,
                     ftol=TOLERANCE,
                     xtol=TOLERANCE,
                     gtol=TOLERANCE,  # absolute: it depends on the units of the parameters

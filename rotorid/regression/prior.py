@@ -77,7 +77,7 @@ def prior_rows(
 
     ValueError for both of them, and a λ that is not above 0.
     """
-    if not (np.isfinite(ridge) and ridge >= 0) or (ridge and prior):
+    if not 0 <= ridge < np.inf or (ridge and prior):
         raise ValueError("--ridge takes a number above 0, such as 0.01, and a model without [prior]")
     value, std = np.array([prior.get(name, (0.0, np.inf)) for name in names]).T
     if ridge and start is not None and slopes is not None:
@@ -143,7 +143,7 @@ class PriorEffect:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         if self.rows.ridge:
             estimate = replace(estimate, covariance=None, solution_covariance=None)
-        chi_square = None if estimate.chi_square is None else float(self.best @ self.best)
+        chi_square = estimate.chi_square and float(self.best @ self.best)
         return replace(estimate, chi_square=chi_square, dof=len(self.best) - self.rank)
 
     def to_dict(self) -> dict[str, Any]:
@@ -179,9 +179,7 @@ def effect(
     std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=JACOBIAN_RCOND).std
     assert std is not None
     share = np.nan_to_num(1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
-    away = np.divide(
-        rows.residual(theta), np.sqrt(share), out=np.full(len(share), np.nan), where=share > SILENT
-    )
+    away = rows.residual(theta) / np.sqrt(np.where(share > SILENT, share, np.nan))
     step, rank = solution_and_rank(free, -r, rcond=JACOBIAN_RCOND)
     best = r + free @ step
     rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (best, r))

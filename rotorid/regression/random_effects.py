@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 from rotorid.regression.linear import covariance_root, solution
@@ -47,19 +48,19 @@ class RandomEffects:
     @cached_property
     def new_group(self) -> FloatArray:
         """Covariance (n, n) of a further group about the mean, which is none too well known itself."""
-        error = _in_blocks(self.error.mean(axis=0)) + self.within * np.mean(1 / self.jobs)
+        error = _of_means(self.error, self.within, self.jobs)
         return np.asarray(self.between + (self.between + error) / len(self.groups))
 
     def distance(self, y: FloatArray, error: FloatArray) -> float:
         """Squared Mahalanobis distance of a job (n,) of a further group, with own errors (n / 2, 2, 2)."""
-        covariance = self.new_group + self.within + _in_blocks(error)
+        covariance = self.new_group + self.within + block_diag(*error)
         least = _LEAST * np.maximum(np.diag(covariance), _LEAST * np.max(y**2))
         off = y - self.mean
         return float(off @ np.linalg.solve(covariance + np.diag(least), off))
 
     def known(self, m: int) -> tuple[FloatArray, FloatArray]:
         """Best linear prediction of group m from its own jobs and all groups, and its covariance (n, n)."""
-        error = _in_blocks(self.error[m]) + self.within / self.jobs[m]
+        error = _of_means(self.error[[m]], self.within, self.jobs[[m]])
         G = solution(self.between + error, self.between).T
         rest = np.eye(len(G)) - G
         covariance = rest @ self.new_group @ rest.T + G @ error @ G.T
@@ -79,11 +80,15 @@ def random_effects(y: FloatArray, error: FloatArray, group: IntArray) -> RandomE
     within, dof, several = np.zeros((y.shape[1],) * 2), len(y) - len(jobs), jobs[group] > 1
     if dof:
         left = np.tensordot(1 - 1 / jobs[group], error, 1) / dof
-        within = _without(shrunk((y - groups[group])[several], dof), _in_blocks(left))
+        within = _without(shrunk((y - groups[group])[several], dof), block_diag(*left))
     mean = groups.mean(axis=0)
-    left = _in_blocks(errors.mean(axis=0)) + within * np.mean(1 / jobs)
-    between = _without(shrunk(groups - mean, len(jobs) - 1), left)
+    between = _without(shrunk(groups - mean, len(jobs) - 1), _of_means(errors, within, jobs))
     return RandomEffects(mean, between, within, groups, errors, jobs)
+
+
+def _of_means(error: FloatArray, within: FloatArray, jobs: IntArray) -> FloatArray:
+    """What errors and the jobs leave in the means of groups, (n, n), on average."""
+    return np.asarray(block_diag(*error.mean(axis=0)) + within * np.mean(1 / jobs))
 
 
 def shrunk(off: FloatArray, dof: int) -> FloatArray:
@@ -168,9 +173,3 @@ def _distances(
         for j in np.flatnonzero(fold == k).tolist():
             distances[j] = effects.distance(y[j], error[j])
     return distances
-
-
-def _in_blocks(pairs: FloatArray) -> FloatArray:
-    """Covariance (2N, 2N) of pairs of numbers, (N, 2, 2), independent of each other."""
-    N = len(pairs)
-    return np.asarray(np.einsum("nij,nm->nimj", pairs, np.eye(N)).reshape(2 * N, 2 * N))

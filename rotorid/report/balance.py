@@ -74,8 +74,8 @@ def balance_report(
 
     result, mounted, check, left, verdict = made
     labels = result.labels
-    known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
-    places = {s: known[s] for s in result.sensors if s in known}
+    angles = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
+    places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
     first = Path(job.files[0]).resolve()
     names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
@@ -104,10 +104,7 @@ def balance_report(
             for plane, figure in _discs(result, job, mounted, left).items()
         ],
         unsplit=[plane for plane in result.planes if plain and plane in job.holes],
-        weights=html(_weights(document, result, job)) if plain else "",
-        trim="" if left is None else html(_trim(document, labels)),
-        holes="" if plain else _holes(document, labels, "mounting" if left is None else "left_to_do"),
-        stays=_if_run_stays(result) if plain else "",
+        **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
         verdict=""
         if verdict is None
@@ -118,6 +115,30 @@ def balance_report(
         trial_radii=any(plane.trial_radius for plane in job.planes.values()),
         slow_roll=job.slow_roll is not None,
     )
+
+
+def to_do(
+    document: Mapping[str, Any], result: Correction, job: Job, *, boxes: bool
+) -> dict[str, Markup | str]:
+    """Tables of what is to be done, as HTML, empty where there is nothing: see `balance_report`.
+
+    With `boxes` each row has one to tick on paper.
+    """
+
+    def shown(table: Table) -> Markup:
+        done = (_done(len(table.columns[0].values)),) if boxes else ()
+        return html(replace(table, columns=(*table.columns, *done)))
+
+    left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
+    part = "mounting" if left is None else "left_to_do"
+    pieces = not plain and document[part]["holes"]
+    nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
+    return {
+        "weights": shown(_weights(document, result, job)) if plain else "",
+        "trim": "" if left is None else shown(_trim(document, result.labels)),
+        "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
+        "stays": _if_run_stays(result) if plain else "",
+    }
 
 
 def degrees(angle: float) -> str:
@@ -149,11 +170,13 @@ def _work(document: Mapping[str, Any], path: str, weight: str, **more: str) -> l
     away = [row.get("action") == "remove" for row in rows]
     at = [row["angle_deg"] if row.get("remove_at_deg") is None else row["remove_at_deg"] for row in rows]
     nothing = [row["mass"] == 0 for row in rows]
+    shown = degrees if "hole" not in more else "{:.6g}°".format  # holes are where they are
+    key = "" if any(row.get("remove_at_deg") is not None for row in rows) else f"{path}.*.angle_deg"
     return [
         *_columns(document, path, {"plane": ("plane", str), **{key: (key, str) for key in more}}),
         Column("do", ["take away" if gone else "add" for gone in away]),
         *_columns(document, path, {"mass": (weight, _FOUR)}),
-        Column("angle", [None if no else angle for no, angle in zip(nothing, at, strict=True)], degrees),
+        Column("angle", [None if no else angle for no, angle in zip(nothing, at, strict=True)], shown, key),
     ]
 
 
@@ -180,7 +203,7 @@ def _weights(document: Mapping[str, Any], c: Correction, job: Job) -> Table:
         columns.append(Column(f"{unit} at radius", masses, _FOUR))
     held = [plane for plane, limit in zip(c.planes, c.held, strict=True) if limit]
     note = f"At its limit: {', '.join(held)}." if held else ""
-    return Table("", (*columns, _done(len(c.planes))), note)
+    return Table("", tuple(columns), note)
 
 
 def _trim(document: Mapping[str, Any], labels: Labels) -> Table:
@@ -188,15 +211,13 @@ def _trim(document: Mapping[str, Any], labels: Labels) -> Table:
     there: Headings = {"mass": (f"mounted, {labels.weight_in}", _FOUR), "angle_deg": ("at", degrees)}
     plane, *work = _work(document, "left_to_do.add", f"trim, {labels.weight_in}")
     mounted = _columns(document, "left_to_do.mounted", there)
-    return Table("", (plane, *mounted, *work, _done(len(plane.values))))
+    return Table("", (plane, *mounted, *work))
 
 
-def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Markup | str:
+def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Table:
     """What goes into each hole."""
-    if not (rows := document[part]["holes"]):
-        return "" if part == "left_to_do" else "Nothing: no piece makes it better."
     work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
-    return html(Table("", (*work, _done(len(rows)))))
+    return Table("", tuple(work))
 
 
 def _if_run_stays(c: Correction) -> Markup | str:

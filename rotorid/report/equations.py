@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Column, text
+from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
+from rotorid.base.tables import Column, text
 from rotorid.base.text import cut
 
 Expression = Any
@@ -95,7 +96,7 @@ class Equations:
         names = [cut(name, _LONGEST) for name in (*self.columns, f"| {right}")]
         values = (np.column_stack((self.matrix, self.right)) + 0.0).T
         numbers = [Column(*each, "{:.6g}".format) for each in zip(names, values, strict=True)]
-        first, wide = Column(f"{matrix} {unknowns} = {right}", self.rows, str), max(12, *map(len, names))
+        first, wide = Column(f"{matrix} {unknowns} = {right}", self.rows), max(12, *map(len, names))
         each = max((COLUMNS - 4 - max(map(len, self.rows))) // (wide + 2), 1)
         return [text((first, *numbers[k : k + each]), width=COLUMNS) for k in range(0, len(numbers), each)]
 
@@ -109,9 +110,9 @@ def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
 
-    told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
-    told = re.sub(r"\*\*(\d+)(?![\w.])", lambda found: found[1].translate(_RAISED), told)
-    return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
+    written = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
+    written = re.sub(r"\*\*(\d+)(?![\w.])", lambda power: power[1].translate(_RAISED), written)
+    return re.sub(r"(?<!\*)\*(?!\*)", "·", written)
 
 
 def _decimals(expression: Expression) -> Expression:
@@ -124,7 +125,7 @@ def _decimals(expression: Expression) -> Expression:
 
 def _sum(terms: Terms) -> str:
     """Coefficient times factor, term by term; 0 and 1 are not written."""
-    told = []
+    products = []
     for pair in terms:
         parts = [*map(_decimals, pair)]
         if 0 in parts:
@@ -136,5 +137,5 @@ def _sum(terms: Terms) -> str:
         words = (
             _words(one) if plain else f"({_words(one)})" for one, plain in zip(inside, bare, strict=True)
         )
-        told.append(sign + ("·".join(words) or "1"))
-    return " + ".join(told).replace("+ -", "- ") or "0"
+        products.append(sign + ("·".join(words) or "1"))
+    return " + ".join(products).replace("+ -", "- ") or "0"

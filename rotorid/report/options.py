@@ -64,9 +64,9 @@ def refuse(options: DataclassInstance, needless: Collection[str], why: str) -> N
 
 def check_choices(options: DataclassInstance, choices: Mapping[str, Sequence[Method[Any]]]) -> None:
     """Refuse names that no registry has, with the nearest one; None is the default."""
-    for option, known in choices.items():
+    for option, allowed in choices.items():
         if (name := getattr(options, option)) is not None:
-            find(known, name, option_name(option))
+            find(allowed, name, option_name(option))
 
 
 def plain(value: object) -> object:

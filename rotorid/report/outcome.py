@@ -131,7 +131,7 @@ class Outcome(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
-        return frame(self.table())
+        return frame(self.table().columns)
 
     def written(self, path: Path) -> Written:
         """What `--output` writes to a file of this name."""
@@ -188,16 +188,16 @@ def outcome_of(
     **more: Any,  # noqa: ANN401 - fields of an outcome
 ) -> Outcome:
     """The outcome of a result that has `answer`, `to_dict`, `to_frame`, and perhaps `figure`."""
-    told = answer or result.answer
+    shown = answer or result.answer
     draw = getattr(result, "figure", None)
     given: dict[str, Any] = {
-        "sentences": tuple(told.judgement.splitlines()),
-        "tables": tuple(filter(None, [told.numbers])),
-        "more": told.tables,
-        "beyond": told.more,
-        "warnings": told.warnings,
-        "notes": told.notes,
-        "to_mount": told.to_mount,
+        "sentences": tuple(shown.judgement.splitlines()),
+        "tables": tuple(filter(None, [shown.numbers])),
+        "more": shown.tables,
+        "beyond": shown.more,
+        "warnings": shown.warnings,
+        "notes": shown.notes,
+        "to_mount": shown.to_mount,
         "file": lambda: table_of(result.to_frame()),
         "pictures": {} if draw is None else {"": draw},
         "keys": getattr(result, "to_dict", None),
@@ -207,13 +207,13 @@ def outcome_of(
 
 def table_of(data: pd.DataFrame, name: str = "result") -> Table:
     """A DataFrame as a table; what pandas has as missing is unknown."""
-    known = data.notna()
+    present = data.notna()
     return Table(
         name,
         tuple(
             Column(
                 str(each),
-                [value if there else None for value, there in zip(data[each], known[each], strict=True)],
+                [value if there else None for value, there in zip(data[each], present[each], strict=True)],
             )
             for each in data
         ),

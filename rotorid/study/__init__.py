@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
-
-import numpy as np
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["StudyOptions", "study"]
 
-UNDETERMINED = "the readings do not determine a correction"
-
 
 @dataclass(frozen=True)
 class StudyOptions:
@@ -36,8 +32,6 @@ class StudyOptions:
     ----------
     samples : N from 1
         How many, in place of what the file says; a finished study is continued with more.
-    seed : N from 0
-        In place of what the file says.
     workers : N from 1
         Processes on this machine.
     scheduler : ADDRESS
@@ -47,7 +41,6 @@ class StudyOptions:
     """
 
     samples: int | None = None
-    seed: int | None = None
     workers: int = 1
     scheduler: str | None = None
     results: Path | str | None = None
@@ -79,6 +72,9 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         For files that cannot be, a result file of another study or of one that is running, a sample that
         fails, and workers that die.
     """
+    import numpy as np
+    from scipy.stats import binomtest
+
     from rotorid.files.disk import sha256
     from rotorid.fleet.jobs import arrow
     from rotorid.study.samples import draw_all, draw_machine, nominal
@@ -86,66 +82,38 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
 
     options = options or StudyOptions()
     read = read_study(file_of(file, "a study file"))
-    seed = read.seed if options.seed is None else options.seed
-    samples = read.samples if options.samples is None else options.samples
+    n = read.samples if options.samples is None else options.samples
+    if min(n, options.workers) < 1:
+        raise ValueError("--samples and --workers take a number from 1")
     results = None if options.results is None else Path(options.results)
-    if samples < 1 or seed < 0 or options.workers < 1:
-        raise ValueError("--samples and --workers take a number from 1, --seed one from 0")
-    if results is not None and results.suffix != ".parquet":
-        raise ValueError(f"--results {results}: the name of the file must end in .parquet")
     model, made = nominal(read), provenance(read.files, options)
-    identity = {"version": made["version"], "seed": seed, "inputs": [*map(sha256, read.files)]}
+    identity = {"version": made["version"], "seed": read.seed, "inputs": [*map(sha256, read.files)]}
     columns = {"sample": "int64"} | {f"ratio_{k}": "double" for k in range(read.corrections + 1)}
     columns |= {"runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
     schema = arrow("a study").schema([*columns.items()], {"study": json.dumps(identity)})
-    sample = partial(draw_machine, read, model.W)
-    with _cluster(options.scheduler) if options.scheduler else nullcontext(executor) as executor:
-        table = draw_all(sample, seed, samples, schema, results, executor, options.workers)
-    keys = {"kind": "balance", "samples": samples, "seed": seed, "warnings": list(model.warnings)}
-    return _outcome(table.to_pandas(), len(read.planes), keys, made)
+    with _workers(options, executor) as pool:
+        drawn = draw_all(partial(draw_machine, read, model.W), read.seed, n, schema, pool, results)
+    frame = drawn.to_pandas()
 
-
-def _cluster(address: str) -> Any:  # noqa: ANN401 - of Dask
-    """The executor of a Dask cluster."""
-    try:
-        from distributed import Client
-
-        return Client(address, timeout=10).get_executor()  # type: ignore[no-untyped-call]
-    except ImportError as error:
-        raise ValueError("--scheduler needs Dask: pip install dask[distributed]") from error
-    except (OSError, ValueError) as error:
-        raise ValueError(f"--scheduler {address}: no cluster answers there ({error})") from error
-
-
-def interval(k: int, n: int) -> list[float]:
-    """Of a probability at 95 % where k of n samples are so, exact (Clopper and Pearson)."""
-    from scipy.stats import binomtest
-
-    return [float(end) for end in binomtest(k, n).proportion_ci()]
-
-
-def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Mapping[str, Any]) -> Outcome:
-    """Probabilities to meet the limit after each correction, and whether regions of weights are honest."""
-    from rotorid.study.samples import UNSTABLE
-
-    ratios, n, shown = frame.filter(like="ratio_"), len(frame), "{:.4f}".format
-    most = ratios.shape[1] - 1
-    runs = [1, *range(planes + 2, planes + 2 + most)]
-    met = [int((frame["runs_needed"] <= one).sum()) for one in runs]
-    ends = np.array([interval(k, n) for k in met])
-    columns = (
-        Column("corrections", range(most + 1)),
-        Column("runs", runs),
-        Column("met", met),
-        Column("probability", np.divide(met, n), shown),
-        Column("low", ends[:, 0], shown),
-        Column("high", ends[:, 1], shown),
+    runs = [1, *range(len(read.planes) + 2, len(read.planes) + 2 + read.corrections)]
+    met = [int((frame["runs_needed"] <= count).sum()) for count in runs]
+    ends = np.array([binomtest(count, n).proportion_ci() for count in met])  # exact (Clopper and Pearson)
+    shown = "{:.4f}".format
+    table = Table(
+        "corrections",
+        (
+            Column("corrections", range(len(runs))),
+            Column("runs", runs),
+            Column("met", met),
+            Column("probability", np.divide(met, n), shown),
+            Column("low", ends[:, 0], shown),
+            Column("high", ends[:, 1], shown),
+        ),
     )
-    table = Table("corrections", columns)
     head = f"The limit is met by {100 * met[0] / n:.4g} % as built"
-    if most:
-        head += f" and {100 * met[-1] / n:.4g} % after at most {counted(most, 'correction')}"
-    reasons = frame["why"].dropna().where(lambda why: why == UNSTABLE, UNDETERMINED).value_counts().to_dict()
+    if read.corrections:
+        head += f" and {100 * met[-1] / n:.4g} % after at most {counted(read.corrections, 'correction')}"
+    reasons = frame["why"].value_counts().to_dict()
     notes = [f"{count} of {n} were not balanced: {why}" for why, count in reasons.items()]
     coverage = {}
     for name, warned in (("silent", False), ("warned", True)):
@@ -153,7 +121,7 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
         good, count = int((held == 1).sum()), len(held)  # unknown where there is no region
         coverage[name] = {"held": good, "corrections": count}
         if count:
-            low, high = (f"{100 * end:.1f}" for end in interval(good, count))
+            low, high = (f"{100 * end:.1f}" for end in binomtest(good, count).proportion_ci())
             notes.append(
                 f"first corrections with {'a' if warned else 'no'} warning: {good} of {count} of the 95 % "
                 f"regions hold the true one ({low} to {high} %)"
@@ -164,35 +132,51 @@ def _outcome(frame: pd.DataFrame, planes: int, keys: Mapping[str, Any], made: Ma
         tables=(table,),
         file=table,
         keys={
-            **keys,
+            "kind": "balance",
+            "samples": n,
+            "seed": read.seed,
+            "warnings": list(model.warnings),
             "probability": met[-1] / n,
             "interval": ends[-1].tolist(),
             "rows": table.records,
             "coverage": coverage,
             "not_balanced": reasons,
         },
-        pictures={"Largest readings over their limit.": partial(_figure, ratios)},
-        warnings=tuple(keys["warnings"]),
+        pictures={"Largest readings over their limit.": partial(_figure, frame.filter(like="ratio_"))},
+        warnings=tuple(model.warnings),
         notes=tuple(notes),
         title="Study of machines",
         provenance=made,
     )
 
 
+def _workers(options: StudyOptions, executor: Executor | None) -> AbstractContextManager[Executor]:
+    """Who draws: a Dask cluster, an executor that is given, or own processes."""
+    from rotorid.base.worker_processes import worker_pool
+
+    if not options.scheduler:
+        return nullcontext(executor) if executor else worker_pool(options.workers)
+    try:
+        from distributed import Client
+
+        pool: Executor = Client(options.scheduler, timeout=10).get_executor()  # type: ignore[no-untyped-call]
+    except ImportError as error:
+        raise ValueError("--scheduler needs Dask: pip install dask[distributed]") from error
+    except (OSError, ValueError) as error:
+        words = f"--scheduler {options.scheduler}: no cluster answers there ({error})"
+        raise ValueError(words) from error
+    return pool
+
+
 def _figure(ratios: pd.DataFrame) -> Figure:
-    """Below which ratio to the limit a share of the machines lies, as built and at last."""
-    from rotorid.base.plot_style import look, on_figure, plain, plain_numbers
+    """Shares of machines whose largest reading lies below a multiple of the limit."""
+    from rotorid.base.plot_style import on_figure, plain
 
     def draw(ax: Axes) -> None:
         plain(ax)
-        curves = {"as built": ratios["ratio_0"]}
-        if ratios.shape[1] > 1:
-            curves["after the last correction"] = ratios.ffill(axis=1).iloc[:, -1]
-        for k, (name, values) in enumerate(curves.items()):
-            ax.ecdf(values.dropna(), orientation="horizontal", label=name, **look(k))
-        ax.axhline(1.0, color="black", linewidth=0.8, label="limit")
-        ax.set(yscale="log", ylabel="largest reading over its limit", xlabel="share of machines below")
-        plain_numbers(ax)
-        ax.legend(frameon=False)
+        for k, values in enumerate(ratios.ffill(axis=1).dropna().T.to_numpy()):
+            ax.ecdf(values, label=f"after {counted(k, 'correction')}")
+        ax.set(xscale="log", xlabel="largest reading over its limit", ylabel="share of machines below")
+        ax.legend()
 
     return on_figure(draw)

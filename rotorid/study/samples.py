@@ -27,7 +27,7 @@ from fem import InfluenceCoefficients, Rotor, influence
 from fem.parameters import with_parameters
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.logs import progress
-from rotorid.base.worker_processes import single_threads, worker_pool
+from rotorid.base.worker_processes import single_threads
 from rotorid.files.disk import write_files
 from rotorid.fleet.jobs import arrow, parquet, read_parquet
 from rotorid.study.study_file import Study
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
+UNDETERMINED = "the readings do not determine a correction"
 UNSTABLE = "the drawn rotor is unstable, and has no steady response"
 CHUNK = 250
 """Samples that a worker draws before it gives them back: some seconds of work."""
@@ -62,13 +63,7 @@ def draw(sample: Sample, seed: int, numbers: list[int]) -> list[Row]:
 
 
 def draw_all(
-    sample: Sample,
-    seed: int,
-    samples: int,
-    schema: pa.Schema,
-    file: Path | None = None,
-    executor: Executor | None = None,
-    workers: int = 1,
+    sample: Sample, seed: int, samples: int, schema: pa.Schema, pool: Executor, file: Path | None = None
 ) -> pa.Table:
     """All samples, of which those are drawn that the file does not have.
 
@@ -80,37 +75,36 @@ def draw_all(
         Of what, and how many.
     schema
         Of the table, with `sample` first; its metadata say which study it is.
+    pool
+        Who draws.
     file
         The Parquet file that keeps them; None: nothing does.
-    executor, workers
-        Who draws; None: so many own processes.
 
     Raises
     ------
     ValueError
         For a file of another study or of one that is running, a sample that fails, and workers that die.
     """
-    rows: dict[int, Row] = {}
 
-    def table() -> pa.Table:
+    def kept() -> pa.Table:
         """The rows so far, which the file has then."""
-        whole = arrow("a study").Table.from_pylist([rows[k] for k in sorted(rows)], schema)
-        if file is not None:
-            write_files({file: parquet(whole)})
-        return whole
+        table = pa.Table.from_pylist([rows[k] for k in sorted(rows)], schema)
+        if file:
+            write_files({file: parquet(table)})
+        return table
 
-    with nullcontext() if file is None else _alone(file):
-        if file is not None and file.exists():
-            rows |= {row["sample"]: row for row in _read(file, schema)}
+    pa = arrow("a study")
+    with _alone(file) if file else nullcontext():
+        rows = _read(file, schema) if file and file.exists() else {}
         missing, due = [k for k in range(samples) if k not in rows], time.monotonic() + KEPT
         chunks = [missing[k : k + CHUNK] for k in range(0, len(missing), CHUNK)]
         try:
-            with single_threads(), nullcontext(executor) if executor else worker_pool(workers) as pool:
+            with single_threads():
                 for drawn in pool.map(partial(draw, sample, seed), chunks):
                     rows |= {row["sample"]: row for row in drawn}
                     progress.info("%d of %d samples", len(rows), samples)
                     if time.monotonic() > due:
-                        table()
+                        kept()
                         due = time.monotonic() + KEPT
         except (SampleError, OSError):
             raise
@@ -118,8 +112,8 @@ def draw_all(
             words = "a worker died, perhaps for want of memory; the same command goes on with --results"
             raise ValueError(f"{words} ({type(error).__name__}: {error})") from error
         finally:
-            whole = table()
-        return whole.slice(0, samples)
+            table = kept()
+        return table.slice(0, samples)
 
 
 @contextmanager
@@ -130,9 +124,10 @@ def _alone(file: Path) -> Iterator[None]:
         held = sqlite3.connect(lock, timeout=0)
         held.execute("BEGIN EXCLUSIVE")
     except sqlite3.OperationalError as error:
-        why = f"cannot be written ({error})"
-        if "locked" in str(error):
-            why = "a study is running on this file: wait for its end"
+        locked = "locked" in str(error)
+        why = (
+            "a study is running on this file: wait for its end" if locked else f"cannot be written ({error})"
+        )
         raise ValueError(f"{file}: {why}, or name another") from error
     try:
         yield
@@ -141,16 +136,15 @@ def _alone(file: Path) -> Iterator[None]:
         lock.unlink(missing_ok=True)
 
 
-def _read(file: Path, schema: pa.Schema) -> list[Row]:
-    """The samples of a file."""
+def _read(file: Path, schema: pa.Schema) -> dict[int, Row]:
+    """The samples of a file, by their numbers."""
     table = read_parquet(file, "the samples of a study: name another file")
     if not table.schema.equals(schema, check_metadata=True):
         raise ValueError(
             f"{file}: another study is kept here (its file, its rotor, the seed or the version of rotorid "
             "differs): name another file"
         )
-    rows: list[Row] = table.to_pylist()
-    return rows
+    return {row["sample"]: row for row in table.to_pylist()}
 
 
 def nominal(study: Study) -> InfluenceCoefficients:
@@ -165,7 +159,7 @@ def nominal(study: Study) -> InfluenceCoefficients:
 
 def _influence(study: Study, rotor: Rotor) -> InfluenceCoefficients:
     """Of unbalance in the planes and at the drawn nodes, in shares of the limits."""
-    places = [*study.planes.values(), *study.unbalance]
+    places = [*study.planes.values(), *study.nodes]
     model = influence(rotor, places, list(study.sensors.values()), study.speeds)
     return replace(model, W=model.W * study.gains[..., None])
 
@@ -176,49 +170,41 @@ def draw_machine(study: Study, W: ComplexArray, rng: np.random.Generator) -> Row
     `W` is that of `nominal`. `held`: the 95 % region of the first weights holds the true ones, those of the
     same weighing of readings without errors; `warned`: this correction had a warning.
     """
-    P, names = len(study.planes), (study.speeds, tuple(study.sensors), tuple(study.planes))
-    unit = 1 / np.abs(W[..., :P]).max(axis=(0, 1))  # moves one reading by its limit
+    P, stated = len(study.planes), (study.errors, study.run_errors)
+    trial = TRIAL / np.abs(W[..., :P]).max(axis=(0, 1))
     normal = rng.standard_normal(len(study.scatter))
-    u = [*study.unbalance.values()] * _normal(rng, len(study.unbalance))
+    unbalance = study.unbalance * _normal(rng, len(study.nodes))
     if study.scatter:
-        scattered = zip(study.scatter.items(), normal, strict=True)
-        values = {path: value * float(np.exp(spread * x)) for (path, (value, spread)), x in scattered}
+        each = zip(normal, study.scatter.items(), strict=True)
+        values = {path: value * float(np.exp(spread * x)) for x, (path, (value, spread)) in each}
         model = _influence(study, with_parameters(study.rotor, values))
         if model.windows:
             return {"why": UNSTABLE}
         W = model.W
-    W, bare = W[..., :P], W[..., P:] @ u
-    weights: list[ComplexArray] = []
-    readings: list[ComplexArray] = []
-
-    def largest(mounted: ComplexArray) -> float:
-        """Of the readings of a run with these weights."""
-        weights.append(mounted)
-        readings.append(_read_sensors(study, bare + W @ mounted, rng))
-        return float(np.abs(readings[-1]).max())
-
-    row: Row = {"ratio_0": largest(np.zeros(P, complex))}
-    if row["ratio_0"] <= 1:
-        return row | {"runs_needed": 1}
-    if not study.corrections:
-        return row
-    for trial in np.diag(np.where(study.trials > 0, study.trials, TRIAL * row["ratio_0"] * unit)):
-        largest(trial)
-    try:
-        for k in range(1, study.corrections + 1):
-            runs = tuple(f"run {r + 1}" for r in range(len(readings)))
-            trials = Trials(runs, *names, np.array(readings), np.array(weights))
+    W, bare = W[..., :P], W[..., P:] @ unbalance
+    row, mounted, readings = Row(), [np.zeros(P, complex)], list[ComplexArray]()
+    for k in range(study.corrections + 1):
+        readings.append(_read_sensors(study, bare + W @ mounted[-1], rng))
+        row[f"ratio_{k}"] = ratio = float(np.abs(readings[-1]).max())
+        if ratio <= 1:
+            return row | {"runs_needed": len(readings)}
+        if k == study.corrections:
+            break
+        if k == 0:
+            mounted += [*np.diag(ratio * trial)]
+            readings += [_read_sensors(study, bare + W @ weights, rng) for weights in mounted[1:]]
+        runs, names = tuple(map(str, range(len(readings)))), (tuple(study.sensors), tuple(study.planes))
+        trials = Trials(runs, study.speeds, *names, np.array(readings), np.array(mounted))
+        try:
             estimate = estimate_influence(replace(trials, errors=study.errors, run_errors=study.run_errors))
             correction = correct(estimate)
-            if k == 1 and (study.errors or study.run_errors):
+            if k == 0 and any(stated):
                 true = correct(replace(estimate, W=W, baseline=bare)).weights
                 held = bool(correction.region().holds(true)) if correction.region_known else None
                 row |= {"held": held, "warned": bool(correction.warnings)}
-            row[f"ratio_{k}"] = largest(correction.weights)
-            if row[f"ratio_{k}"] <= 1:
-                return row | {"runs_needed": len(readings)}
-    except UndeterminedError as error:
-        row["why"] = str(error).partition("\n")[0]
+        except UndeterminedError:
+            return row | {"why": UNDETERMINED}
+        mounted.append(correction.weights)
     return row
 
 

@@ -40,19 +40,12 @@ _SCATTER = 'percent by number of the rotor, such as "bearing[*].stiffness.scale"
 _NODE = "the node, a number from 1, or a station"
 Node = Whole | Text
 Percent = Annotated[NotNegative, Field(le=100)]
-Size = Annotated[Quantity, of(Positive)]
 
 
 class PlaneKeys(Settings):
     """A correction plane: `[planes.NAME]`."""
 
     node: Node = key(_NODE)
-    trial: NotNegative = key(
-        "trial unbalance; default: what moves a reading by half of the largest",
-        "trial_g_mm",
-        0.0,
-        units=units.UNBALANCE,
-    )
 
 
 class SensorKeys(Settings):
@@ -60,7 +53,7 @@ class SensorKeys(Settings):
 
     node: Node = key(_NODE)
     angle_deg: Turn = key("direction, with the rotation from x", default=0.0)
-    limit: Size = key(
+    limit: Annotated[Quantity, of(Positive)] = key(
         "largest amplitude allowed",
         "limit_um_pp limit_mm_s_rms",
         units=units.VIBRATION,
@@ -71,9 +64,9 @@ class SensorKeys(Settings):
 class UnbalanceKeys(Settings):
     """What is drawn at a node: `[unbalance.STATION]`."""
 
-    size: Size = key(
-        "size, drawn by Rayleigh: x and y are normal, any angle is as likely",
-        "rms_g_mm median_g_mm",
+    rms: Positive = key(
+        "root mean square of the size; x and y are normal, any angle is as likely",
+        "rms_g_mm",
         units=units.UNBALANCE,
         expected="how large the unbalance is",
     )
@@ -124,38 +117,36 @@ class Study:
 
     Attributes
     ----------
-    samples, seed, files
-        How many, of what, and what was read.
-    rotor, speeds
-        As built, and rad/s, (S,).
+    samples, seed, corrections
+        How many, of what, and at most so many corrections.
+    files, rotor, speeds
+        What was read; as built; rad/s, (S,).
     planes, sensors
         Nodes and places by name.
-    trials
-        Unbalance of each plane's trial run, kg·m, (P,); 0: by the rule.
     gains
         Shares of the limits per metre of deflection, (S, C).
-    unbalance
-        Standard deviation of x and y by node, kg·m.
+    nodes, unbalance
+        Where unbalance is drawn, and standard deviations of x and y, kg·m, (U,).
     scatter
         Numbers of the rotor by path, and standard deviations of their logarithms.
-    errors, run_errors, corrections
-        Of readings and from run to run, None where there are none; at most so many.
+    errors, run_errors
+        Of readings and from run to run, None where there are none.
     """
 
     samples: int
     seed: int
+    corrections: int
     files: tuple[Path, ...]
     rotor: Rotor
     speeds: FloatArray
     planes: Mapping[str, int]
     sensors: Mapping[str, Sensor]
-    trials: FloatArray
     gains: ComplexArray
-    unbalance: Mapping[int, float]
+    nodes: tuple[int, ...]
+    unbalance: FloatArray
     scatter: Mapping[str, tuple[float, float]]
     errors: ReadingErrors | None
     run_errors: RunScatter | None
-    corrections: int
 
 
 def read_study(path: str | Path) -> Study:
@@ -168,8 +159,8 @@ def read_study(path: str | Path) -> Study:
     """
     path, problems = Path(path), Problems()
     data = problems.need(read_toml(path, problems))
-    values = problems.need(read_settings(StudyKeys, data, str(path), problems))
-    file = path.parent / values.rotor
+    keys = problems.need(read_settings(StudyKeys, data, str(path), problems))
+    file = path.parent / keys.rotor
     rotor = read_rotor(file)
 
     def node(section: Settings, field: str, place: int | str) -> int:
@@ -179,58 +170,53 @@ def read_study(path: str | Path) -> Study:
             section.complain(problems, field, f"a node or station of the rotor: {error}")
             return 0
 
-    unbalance: dict[int, float] = {}
-    for place, drawn in values.unbalance.items():
-        rayleigh = np.sqrt(2 * np.log(2) if drawn.written("size").startswith("median") else 2)
-        at = node(values, "unbalance", place)
-        unbalance[at] = float(np.hypot(unbalance.get(at, 0.0), drawn.size.si / rayleigh))
-    planes = {name: node(plane, "node", plane.node) for name, plane in values.planes.items()}
-    sensors = {
-        name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
-        for name, sensor in values.sensors.items()
-    }
-    scatter = _scatter(values, rotor, problems)
+    planes = {name: node(plane, "node", plane.node) for name, plane in keys.planes.items()}
+    places = {name: node(sensor, "node", sensor.node) for name, sensor in keys.sensors.items()}
+    nodes = tuple(node(keys, "unbalance", place) for place in keys.unbalance)
+    scatter = _scatter(keys, rotor, problems)
     problems.stop()
-    speeds, errors = np.array(values.speeds), values.readings
-    per_metre = [
-        (1j * speeds if sensor.limit.unit.kind == "velocity" else 1.0 + 0 * speeds) / sensor.limit.si
-        for sensor in values.sensors.values()
-    ]
-    sizes = errors.amplitude_percent / 100, float(np.radians(errors.phase_deg)), errors.floor_percent / 100
+    limits, speeds, readings = [], np.array(keys.speeds), keys.readings
+    for sensor in keys.sensors.values():
+        per_metre = 1j * speeds if sensor.limit.unit.kind == "velocity" else 1.0 + 0 * speeds
+        limits.append(per_metre / sensor.limit.si)
+    sizes = (
+        readings.amplitude_percent / 100,
+        float(np.radians(readings.phase_deg)),
+        readings.floor_percent / 100,
+    )
     return Study(
-        values.samples,
-        values.seed,
+        keys.samples,
+        keys.seed,
+        keys.corrections,
         (path, *rotor_files(file)),
         rotor,
         speeds,
         planes,
-        sensors,
-        trials=np.array([plane.trial for plane in values.planes.values()]),
-        gains=np.stack(per_metre, axis=-1),
-        unbalance=unbalance,
-        scatter=scatter,
-        errors=ReadingErrors(*sizes) if any(sizes) else None,
-        run_errors=RunScatter(errors.run_percent / 100) if errors.run_percent else None,
-        corrections=values.corrections,
+        {name: Sensor(place, keys.sensors[name].angle_deg) for name, place in places.items()},
+        np.stack(limits, axis=-1),
+        nodes,
+        np.array([drawn.rms for drawn in keys.unbalance.values()]) / np.sqrt(2),
+        scatter,
+        ReadingErrors(*sizes) if any(sizes) else None,
+        RunScatter(readings.run_percent / 100) if readings.run_percent else None,
     )
 
 
-def _scatter(values: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tuple[float, float]]:
+def _scatter(keys: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tuple[float, float]]:
     """Numbers of the rotor by path, each once, with the standard deviation of its logarithm."""
-    scatter: dict[str, tuple[float, float]] = {}
-    taken: set[object] = set()
-    for pattern, percent in values.scatter.items():
+    scatter, taken = dict[str, tuple[float, float]](), set[object]()
+    for pattern, percent in keys.scatter.items():
         spread = float(np.sqrt(np.log1p((percent / 100) ** 2)))
         try:
-            paths = expand(rotor, pattern)
-            for path in paths:
+            values = {path: parameter_value(rotor, path) for path in expand(rotor, pattern)}
+            for path, value in values.items():
                 numbers = numbers_of(rotor, path)
                 if not numbers or numbers & taken:
                     raise ValueError(f"{pattern}: each number of the rotor once")
-                scatter[path] = parameter_value(rotor, path), spread
                 taken |= numbers
-            if not any(scatter[path][0] for path in paths):
+                scatter[path] = value, spread
+            if not any(values.values()):
                 raise ValueError(f"{pattern} is 0, and so is any share of it")
         except ValueError as error:
-            values.complain(problems, "scatter", f"numbers of the rotor: {error}")
+            keys.complain(problems, "scatter", f"numbers of the rotor: {error}")
     return scatter

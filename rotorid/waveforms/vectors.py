@@ -113,12 +113,12 @@ def find_vectors(
         sampling rate, and speeds that do not occur; with the name of the record.
     """
     try:
-        return _found(record, settings, tuple(orders), derivative, speeds)
+        return _vectors_at(record, settings, tuple(orders), derivative, speeds)
     except ValueError as error:
         raise ValueError(f"{record.source}: {error}") from None
 
 
-def _found(
+def _vectors_at(
     record: WaveformRecord,
     settings: TachoSettings,
     orders: tuple[int, ...],

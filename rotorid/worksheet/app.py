@@ -7,10 +7,9 @@ no other site can set. A page of another origin, or of another name for this add
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from importlib.resources import files as resources
 from typing import Any
 
@@ -19,9 +18,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from rotorid.worksheet.job_files import Conflict
 from rotorid.worksheet.page import ACTIONS, View
-from rotorid.worksheet.session import Refused, Session
+from rotorid.worksheet.session import Session
+from rotorid.worksheet.text_table import Conflict
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {
@@ -38,8 +37,6 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
 }
-_UNITS = {"load": "kg", "speed": "rpm", "radius": "mm"}
-"""In which the page asks for quantities of a trial weight."""
 Given = Mapping[str, Any]
 
 
@@ -57,8 +54,8 @@ async def edit(session: Session, given: Given) -> dict[str, Any]:
 
 async def do(session: Session, given: Given) -> dict[str, Any]:
     """What a button does."""
-    if given["do"] in ("undo", "redo"):
-        getattr(session.files, given["do"])()
+    if given["do"] == "undo":
+        session.files.undo()
     else:
         session.files.apply(ACTIONS[given["do"]](View(session.files, session.results), given))
     session.changed()
@@ -68,29 +65,18 @@ async def do(session: Session, given: Given) -> dict[str, Any]:
 async def trial(session: Session, given: Given) -> str:
     """A proposed trial weight."""
     if "with_job" in given:
-        return str(await session.drawing.ask("trial", session.files.job.name, {}))
-    options: dict[str, Any] = {key: text.replace(",", ".") for key, text in given.items() if text}
-    options |= {key: options[key] + unit for key, unit in _UNITS.items() if key in options}
-    if "reading_phase" in options:
-        options["reading_phase"] = float(options["reading_phase"])
-    return str(await session.drawing.ask("trial", None, options))
-
-
-async def runs(session: Session, given: Given) -> str:
-    """Picture of the runs of one sensor at one speed; nothing as long as nothing can be read."""
-    place = [given.get(key, "") for key in ("speed", "sensor")]
-    with contextlib.suppress(Refused):
-        return str(await session.drawing.ask("channel", session.files.job.name, *place))
-    return ""
-
-
-async def convention(session: Session, given: Given) -> str:
-    """Two drawings of how angles and phases count."""
-    return str(await session.drawing.ask("convention", given["phase"], given["angles"]))
+        return str(await session.worker.ask("trial", session.files.job.name, {}))
+    options: dict[str, Any] = {}
+    for name, text in given.items():
+        if text:
+            key, _, unit = name.partition(" ")
+            number = text.replace(",", ".")
+            options[key] = float(number) if unit == "deg" else f"{number}{unit}"
+    return str(await session.worker.ask("trial", None, options))
 
 
 ROUTES: Mapping[str, Callable[[Session, Given], Awaitable[dict[str, Any] | str]]] = {
-    **{f"/{one.__name__}": one for one in (state, edit, do, trial, runs, convention)},
+    **{f"/{one.__name__}": one for one in (state, edit, do, trial)},
     "/picture": lambda session, given: session.drawn("picture"),
     "/sheet": lambda session, given: session.drawn("sheet"),
 }
@@ -110,12 +96,6 @@ def application(session: Session, token: str, address: str, ready: Callable[[], 
     ready
         Is called when requests can be answered.
     """
-
-    @contextlib.asynccontextmanager
-    async def lifespan(app: Starlette) -> AsyncIterator[None]:
-        async with session.running():
-            ready()
-            yield
 
     async def answer(request: Request) -> Response:
         """A file of the page, or what is asked for; everything that is wrong as one sentence."""
@@ -138,11 +118,8 @@ def application(session: Session, token: str, address: str, ready: Callable[[], 
             why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
         return JSONResponse({"error": why}, status, HEADERS)
 
-    changing = ("/edit", "/do", "/trial")
-    routes = [
-        Route(path, answer, methods=["POST" if path in changing else "GET"]) for path in (*PAGE, *ROUTES)
-    ]
-    return Starlette(routes=routes, lifespan=lifespan)
+    routes = [Route(path, answer, methods=["GET", "POST"]) for path in (*PAGE, *ROUTES)]
+    return Starlette(routes=routes, lifespan=lambda _: session.running(ready))
 
 
 def _refusal(request: Request, token: str, address: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import re
 import tomllib
@@ -46,68 +45,40 @@ def value_of(key: str, text: str) -> Any:  # noqa: ANN401
     parts = [part.strip() for part in text.split(";") if part.strip()]
     if ":" in text:
         return {name.strip(): _one(value) for name, _, value in (part.partition(":") for part in parts)}
-    if len(parts) > 1 or (parts and key.startswith(_LISTS)):
-        return [_one(part) for part in parts]
-    return _one(parts[0]) if parts else None
+    values = [*map(_one, parts)]
+    if len(values) > 1 or (values and key.startswith(_LISTS)):
+        return values
+    return values[0] if values else None
 
 
 def _one(word: str) -> float | str:
-    word, number = word.strip(), word.strip().replace(",", ".")
+    number = word.strip().replace(",", ".")
     if not _NUMBER.fullmatch(number):
-        return word
+        return word.strip()
     return int(number) if number.lstrip("+-").isdigit() else float(number)
 
 
 def with_setting(data: bytes, key: Sequence[str], new: Any) -> bytes:  # noqa: ANN401
     """The job file with a setting changed, added, or (None) removed; ValueError where that is impossible."""
-    text = data.decode("utf-8-sig")
-    for way in (_at_its_place, _at_an_end):
-        with suppress(ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over odd files
-            written = way(text, key, new)
-            if settings_in(written.encode()) == _changed(settings_in(data), key, new):
-                return written.encode("utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8")
+    import tomlkit
+
+    settings = settings_in(data)
+    with suppress(ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over odd files
+        document = tomlkit.parse(data.decode("utf-8-sig"))
+        _change(settings, key, new)
+        _change(document, key, new)
+        written = tomlkit.dumps(document).encode()
+        if settings_in(written) == settings:
+            return written
     raise ValueError(f"{'.'.join(key)} cannot be changed here: change it in the job file itself")
 
 
-def _at_its_place(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
-    import tomlkit
-
-    settings = tomlkit.parse(text)
-    if len(key) == 1 and key[0] not in settings:
-        return _at_an_end(text, key, new)
-    return tomlkit.dumps(_changed(settings, key, _item(new)))
-
-
-def _at_an_end(text: str, key: Sequence[str], new: Any) -> str:  # noqa: ANN401
-    """A new table below all, another setting above the first: a comment above a table stays there."""
-    import tomlkit
-
-    added = tomlkit.dumps(_changed({}, key, _item(new)))
-    if len(key) > 1:
-        return f"{text.rstrip()}\n\n{added}"
-    first = re.search(r"^[^#\s]", text, re.MULTILINE)
-    at = first.start() if first else len(text)
-    return text[:at] + added + text[at:]
-
-
-def _item(value: Any) -> Any:  # noqa: ANN401
-    import tomlkit
-
-    if not isinstance(value, dict):
-        return None if value is None else tomlkit.item(value)
-    table = tomlkit.inline_table()
-    table.update(value)
-    return table
-
-
-def _changed(settings: Any, key: Sequence[str], new: Any) -> Any:  # noqa: ANN401
-    """Settings with one changed, or (None) without it and the tables that are empty then."""
-    top = copy.deepcopy(settings)
-    above = [top]
+def _change(settings: Any, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
+    """Change one setting, or (None) remove it and the tables that are empty then."""
+    above = [settings]
     for part in key[:-1]:
         above.append(above[-1].setdefault(part, {}))
     above[-1][key[-1]] = {} if new is None else new
     for table, part in zip(reversed(above), reversed(key), strict=True):
         if new is None and not table[part]:
             del table[part]
-    return top

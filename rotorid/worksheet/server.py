@@ -12,7 +12,6 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import FrameType
 
 HOST = "127.0.0.1"
 FIRST_PORT, PORTS = 49152, 16384
@@ -54,11 +53,6 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
     token = digest.hexdigest()[:32]
     usual = FIRST_PORT + int.from_bytes(digest.digest()[16:20]) % PORTS
 
-    class Server(uvicorn.Server):
-        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-            session.leave()
-            super().handle_exit(sig, frame)
-
     with socket.socket() as listening:
         if os.name == "posix":  # elsewhere it would let two programs have one port
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -73,8 +67,8 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
         app = application(session, token, address, lambda: show(f"http://{address}/#{token}"))
         # a worker that Ctrl+C finds half started may be reaped by two; the program ends it anyway
         logging.getLogger("asyncio").setLevel(logging.ERROR)
-        config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=1)
-        Server(config).run(sockets=[listening])
+        config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=2)
+        uvicorn.Server(config).run(sockets=[listening])
 
 
 def _secret() -> bytes:
@@ -83,11 +77,9 @@ def _secret() -> bytes:
     path, new = Path(state) / "rotorid" / "worksheet_key", secrets.token_bytes(32)
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with (
-            suppress(FileExistsError),
-            open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as f,
-        ):
-            f.write(new)
+        with suppress(FileExistsError):
+            path.touch(0o600, exist_ok=False)
+            path.write_bytes(new)
         kept = path.read_bytes()
         if len(kept) == len(new):
             return kept

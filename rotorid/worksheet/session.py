@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Any
 
 from rotorid.base.worker_processes import worker_pool
 from rotorid.worksheet.calculation import Results, answered
-from rotorid.worksheet.job_files import JobFiles
+from rotorid.worksheet.job_files import JobFiles, Stamp
 from rotorid.worksheet.page import page
 
 LOOK = 0.25
@@ -23,21 +23,17 @@ GRACE = 0.3
 """Seconds that a computation may go on when nobody wants it: a new process takes longer to start."""
 
 
-class Refused(ValueError):
-    """What was asked cannot be computed."""
-
-
 class Worker:
     """A process that computes in the folder of a job, one request at a time.
 
     Attributes
     ----------
     read
-        Names of all files that it has read so far, and when each was changed before that (ns).
+        Names of all files that it has read so far, each with its stamp before that.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.read: dict[str, int] = {}
+        self.read: dict[str, Stamp] = {}
         self._folder = str(folder)
         self._lock = asyncio.Lock()
         self._pool: Executor | None = None
@@ -48,7 +44,7 @@ class Worker:
 
         Raises
         ------
-        Refused
+        ValueError
             If it cannot be computed.
         """
         async with self._lock:
@@ -66,10 +62,10 @@ class Worker:
                 raise
             except BrokenProcessPool as error:
                 self.stop()
-                raise Refused("the calculation ended unexpectedly: try again") from error
+                raise ValueError("the calculation ended unexpectedly: try again") from error
         self.read |= answer["read"]
         if "refused" in answer:
-            raise Refused(answer["refused"])
+            raise ValueError(answer["refused"])
         return answer["value"]
 
     def stop(self) -> None:
@@ -94,44 +90,38 @@ class Session:
         The job on disk.
     version
         Grows with every change that a window should see.
-    drawing
-        The process that draws; beside it are one that answers at once, and one that may take its time.
+    worker
+        The process that computes and draws.
     """
 
     def __init__(self, files: JobFiles) -> None:
         self.files = files
         self.version = 1
-        self.front, self.drawing, self.aside = self._workers = [Worker(files.job.parent) for _ in range(3)]
+        self.worker = Worker(files.job.parent)
         self._notice = ""
         self.results = Results()
-        self._news, self._left = asyncio.Event(), False
+        self._news = asyncio.Event()
         self._computing: asyncio.Task[None] | None = None
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[None]:
-        """Compute, and look for changes from outside, until the page is closed."""
+    async def running(self, ready: Callable[[], object]) -> AsyncIterator[None]:
+        """Compute, and look for changes from outside, until the page is closed; say when it is `ready`."""
         self.changed()
         watching = asyncio.ensure_future(self._watch())
+        ready()
         yield
         for task in (watching, self._computing):
             if task is not None:
                 task.cancel()
-        for worker in self._workers:
-            worker.stop()
+        self.worker.stop()
 
-    async def after(self, version: int, seconds: float = 20.0) -> dict[str, Any]:
+    async def after(self, version: int, seconds: float = 1.0) -> dict[str, Any]:
         """The page that a window shows, as soon as it is newer, or after so many seconds."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
-                while self.version <= version and not self._left:
+                while self.version <= version:
                     await self._news.wait()
-        state = {"version": self.version, "busy": self.results.busy, "notice": self._notice}
-        return {**state, "html": page(self.files, self.results, self._notice)}
-
-    def leave(self) -> None:
-        """Answer those who wait for news, since the program ends."""
-        self._left = True
-        self._news.set()
+        return {"version": self.version, "html": page(self.files, self.results, self._notice)}
 
     def changed(self, notice: str = "") -> None:
         """Say that the files are others, and compute them anew; what is being computed is given up."""
@@ -139,15 +129,13 @@ class Session:
         if self._computing is not None:
             self._computing.cancel()
         self._publish(busy="computing")
-        self._computing = asyncio.ensure_future(self._compute(self.version))
+        self._computing = asyncio.ensure_future(self._compute())
 
     async def drawn(self, do: str) -> str:
         """The picture or the sheet of the answer."""
-        asked = self.results.asked
-        if asked is None:
+        if self.results.asked is None:
             raise ValueError("there is no answer yet")
-        worker = self.aside if asked.split or asked.refine else self.drawing  # which may take long
-        return str(await worker.ask(do, asked))
+        return str(await self.worker.ask(do, *self.results.asked))
 
     def _publish(self, **results: Any) -> None:  # noqa: ANN401
         self.results = self.results._replace(**results)
@@ -158,27 +146,16 @@ class Session:
     async def _watch(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            if names := self.files.look(self.front.read | self.aside.read):
+            if names := self.files.look(self.worker.read):
                 verb = "was" if len(names) == 1 else "were"
                 self.changed(f"{' and '.join(names)} {verb} changed by another program")
 
-    async def _compute(self, version: int) -> None:
-        """The weights at once; pieces in the holes and the trim aside, in place of these."""
-        seen, words = Results(), ""
+    async def _compute(self) -> None:
+        """The answer in place of what was there."""
+        seen = Results()
         if self.files.now.text is not None:
             try:
-                seen = await self.front.ask("whole_job", self.files.job.name, version)
-            except Refused as error:
+                seen = await self.worker.ask("whole_job", self.files.job.name, self.version)
+            except ValueError as error:
                 seen = Results(refused=str(error))
-        if (more := seen.more) is not None:
-            words = "choosing pieces for the holes" if more.split else "computing the trim"
-        self._publish(**{**seen._asdict(), "busy": words, "version": self.version})
-        if more is None or seen.answer is None:
-            return
-        answer, asked = seen.answer, seen.asked
-        try:
-            answer, asked = await self.aside.ask("balanced", more), more
-        except Refused as error:
-            warning = f"no {'trim' if more.refine else 'pieces'}: {error}"
-            answer = {**answer, "warnings": [*answer["warnings"], warning]}
-        self._publish(answer=answer, asked=asked, busy="", version=self.version)
+        self._publish(**{**seen._asdict(), "version": self.version})

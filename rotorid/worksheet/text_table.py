@@ -8,19 +8,20 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rotorid.base.tables import guarded
-from rotorid.files import runs, weights
 from rotorid.files.cells import SEP_LINE, Grid, clean, decimal_comma, decode, parse_text, show
-from rotorid.files.columns import REMARKS, column_of
 from rotorid.files.headings import find_header
-from rotorid.files.job_excel import TEXT_COLUMNS
 from rotorid.files.job_models import READINGS
 from rotorid.files.problems import InputError, Problems
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
+
+
+class Conflict(ValueError):
+    """What an edit changes is not what it was."""
 
 
 @dataclass(eq=False)
@@ -30,7 +31,7 @@ class Line:
     `number` is that of a spreadsheet; `id` what edits call the row.
     """
 
-    text: str
+    text: str = ""
     number: int = 0
     cells: list[str] = field(default_factory=list)
     id: str = ""
@@ -48,8 +49,8 @@ class Table:
         Names of the columns; the lines of the file, of a sheet its rows alone.
     read_only
         Why it cannot be edited, else empty.
-    separator, sign, newline, encoding
-        What stands between cells, in decimals ("" where there are none) and between lines; of the file.
+    separator, newline, encoding
+        What stands between cells and between lines; of the file.
     changed
         Whether it was edited.
     """
@@ -59,18 +60,24 @@ class Table:
     lines: list[Line] = field(default_factory=list)
     read_only: str = ""
     separator: str = ","
-    sign: str = ""
     newline: str = "\n"
     encoding: str = "utf-8"
     changed: bool = False
+
+    def columns(self) -> dict[str, str]:
+        """Names of the columns by what they hold."""
+        return {content(name): name for name in reversed(self.header)}
 
     def rows(self) -> Iterator[Line]:
         """Its rows."""
         return (line for line in self.lines if line.cells)
 
-    def row(self, row_id: object) -> Line | None:
-        """The row with this id, None if it is gone."""
-        return next((line for line in self.rows() if line.id == row_id), None)
+    def row(self, row_id: str) -> Line:
+        """The row with this id; Conflict if it is gone."""
+        for line in self.rows():
+            if line.id == row_id:
+                return line
+        raise Conflict(f"a row of {self.path.name} is not there any more")
 
     def column(self, name: str) -> int:
         """The place of a column; ValueError if there is none."""
@@ -81,16 +88,17 @@ class Table:
     def write(self, line: Line, cells: Mapping[str, str]) -> None:
         """Change some cells of a row."""
         for name, text in cells.items():
-            line.cells[self.column(name)] = self._written(name, clean(text))
+            line.cells[self.column(name)] = self._written(clean(text))
         stream = io.StringIO()
-        csv.writer(stream, delimiter=self.separator, lineterminator="").writerow(map(_plain, line.cells))
+        plain = [cell if _NUMBER.fullmatch(cell) else guarded(cell) for cell in line.cells]
+        csv.writer(stream, delimiter=self.separator, lineterminator="").writerow(plain)
         line.text, self.changed = stream.getvalue(), True
 
     def add(self, cells: Mapping[str, str]) -> None:
         """A new row below the last of the same run, else below all rows."""
-        rows, run = list(self.rows()), self.header.index("run") if "run" in self.header else 0
+        run, made = self.column("run"), Line(cells=[""] * len(self.header))
+        rows = list(self.rows())
         same = [line for line in rows if line.cells[run] == cells.get("run")]
-        made = Line("", cells=[""] * len(self.header))
         above = [*(line for line in self.lines if line.id == "header"), *rows, *same][-1]
         self.lines.insert(self.lines.index(above) + 1, made)
         self.write(made, cells)
@@ -98,9 +106,7 @@ class Table:
 
     def name_rows(self) -> None:
         """Give rows their ids: run, speed and sensor, or run, and how many times these stood above."""
-        names = [
-            k for k, name in enumerate(self.header) if name.partition("_")[0] in ("run", "speed", "sensor")
-        ]
+        names = [k for k, name in enumerate(self.header) if content(name) in ("run", "speed", "sensor")]
         times = Counter[str]()
         for line in self.rows():
             place = "|".join(line.cells[k] for k in names)
@@ -111,13 +117,19 @@ class Table:
         """The whole file."""
         return self.newline.join(line.text for line in self.lines).encode(self.encoding)
 
-    def _written(self, column: str, text: str) -> str:
+    def _written(self, text: str) -> str:
         """A number with the decimal sign of the file; 1,350 and 1.350 stay, since they may mean thousands."""
-        unclear = not decimal_comma([text.replace(".", ",")], "\t")
-        if is_text(column) or not _NUMBER.fullmatch(text) or unclear:
+        if not decimal_comma([text.replace(".", ",")], "\t"):
             return text
-        sign = self.sign or ("," if self.separator != "," and "," in text else ".")
-        return text.replace(",", ".").replace(".", sign)
+        numbers = " ".join(cell for line in self.rows() for cell in line.cells if _NUMBER.fullmatch(cell))
+        if self.separator == "," or "." in numbers:
+            return text.replace(",", ".")
+        return text.replace(".", ",") if "," in numbers else text
+
+
+def content(column: str) -> str:
+    """What a column holds, by its name."""
+    return "weight" if re.match("mass|unbalance", column) else re.split("[_ ]", column)[0]
 
 
 def read_table(path: Path, key: str, data: bytes) -> Table:
@@ -130,51 +142,28 @@ def read_table(path: Path, key: str, data: bytes) -> Table:
     grid = None if len(problems) else parse_text(path.name, text, problems, may_be_empty=True, find=find)
     if grid is None:
         return Table(path, read_only=str(InputError(problems)))
-    table = shown(path, key, grid)
-    rows = {line.number: line for line in table.lines}
-    texts = re.split(r"\r\n|\n|\r", text)
-    above = 1 if SEP_LINE.fullmatch(texts[0].strip(" \ufeff")) else 0
-    table.lines = [rows.get(k, Line("")) for k in range(1 - above, len(texts) + 1 - above)]
-    for line, its in zip(table.lines, texts, strict=True):
-        line.text = its
-    table.lines[grid.header_row - 1 + above].id = "header"
-    pairs = [pair for line in rows.values() for pair in zip(grid.header, line.cells, strict=True)]
-    numbers = [cell for name, cell in pairs if not is_text(name)]
-    if decimal_comma(numbers, grid.separator):
-        table.sign = ","
-    elif grid.separator == "," or any("." in cell for cell in numbers):
-        table.sign = "."
+    table, texts = shown(path, key, grid), re.split(r"\r\n|\n|\r", text)
+    rows = {grid.header_row: Line(id="header")} | {line.number: line for line in table.lines}
+    first = 0 if SEP_LINE.fullmatch(texts[0].strip(" \ufeff")) else 1
+    table.lines = [replace(rows.get(n, Line()), text=line) for n, line in enumerate(texts, first)]
     table.separator, table.newline = grid.separator, "\r\n" if "\r\n" in text else "\n"
     table.encoding = "utf-8" if data == text.encode() else "utf-8-sig"
     return table
 
 
 def shown(path: Path, key: str, grid: Grid) -> Table:
-    """What the reader of tables makes of a file or a sheet, without the lines between its rows."""
+    """What the reader of tables makes of a file or a sheet, without the lines between its rows.
+
+    Of other columns than those that the page writes it is not edited.
+    """
     rows = [Line("", n, [getattr(cell, "text", show(cell)) for cell in row]) for n, row in grid.rows]
-    table = Table(path, grid.header, rows, _untidy(path.name, key, grid.header))
+    table = Table(path, grid.header, rows)
+    form = ["run", "speed", "sensor", "amplitude", "phase"]
+    if key not in READINGS:
+        form = ["run", "plane", "weight", "angle"]
+    names = table.columns()
+    if not names.keys() >= {*form} or len(names) < len(grid.header):
+        why = f"{path.name} has other columns than {', '.join(form)}"
+        table.read_only = f"{why}: it is read as it is, edit it where it comes from"
     table.name_rows()
     return table
-
-
-def is_text(column: str) -> bool:
-    """Whether a column holds names or remarks, in which nothing is a number."""
-    return column in TEXT_COLUMNS or column.casefold().startswith(REMARKS)
-
-
-def _plain(cell: str) -> str:
-    """Without what a spreadsheet would run; numbers stay."""
-    return cell if _NUMBER.fullmatch(cell) else guarded(cell)
-
-
-def _untidy(name: str, key: str, header: Sequence[str]) -> str:
-    """Why a table of other columns is not edited; empty for the form that the page writes."""
-    columns = runs.COLUMNS if key in READINGS else weights.COLUMNS
-    stems = [column.stem for one in header if (column := column_of(one, columns)) is not None]
-    needed = {column.stem for column in columns if column.required}
-    if any(name.startswith("unbalance_") for name in header):
-        needed.discard("mass")
-    if needed <= set(stems) and len(set(stems)) == len(stems):
-        return ""
-    form = "run, speed, sensor, amplitude, phase" if key in READINGS else "run, plane, mass, angle"
-    return f"{name} has other columns than {form}: it is read as it is, edit it where it comes from"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal
 
-from balancing.regions import NORMAL_RADIUS, Region, reach, region_edge
+from balancing.regions import NORMAL_RADIUS, Region, half_width, reach, region_edge
 
 
 def test_the_region_of_normal_draws_is_that_of_chi_square():
@@ -33,3 +33,7 @@ def test_edges_turn_with_their_covariance():
     assert np.abs(edge.real).max() == pytest.approx(2 * NORMAL_RADIUS, rel=1e-4)
     assert np.abs(edge.imag - 1).max() == pytest.approx(NORMAL_RADIUS, rel=1e-4)
     assert reach(np.diag([4.0, 1.0])) == pytest.approx(2 * NORMAL_RADIUS)
+
+
+def test_half_widths_are_quantiles():
+    assert half_width(np.linspace(-1, 1, 2001)) == pytest.approx(0.95, abs=1e-3)

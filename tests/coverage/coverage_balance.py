@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,7 +158,7 @@ def line(name: str, found: Iterable[Outcome]) -> str:
     answered = [one for one in found if one.inside is not None]
     silent, warned = [[one.inside for one in answered if bool(one.words) == said] for said in (False, True)]
     return (
-        f"{name:<44}{_percent(silent):>6} of {len(silent):5d}{_percent(warned):>9} of {len(warned):4d}"
+        f"{name:<44}{percent(silent):>6} of {len(silent):5d}{percent(warned):>9} of {len(warned):4d}"
         f"{len(found) - len(answered):9d}"
     )
 
@@ -166,11 +166,12 @@ def line(name: str, found: Iterable[Outcome]) -> str:
 def told_of(found: Iterable[Outcome], least: int = 0) -> str:
     """Share of answers with a warning, of jobs with so many redundant readings."""
     said = [bool(one.words) for one in found if one.inside is not None and one.redundant >= least]
-    return f"{_percent(said)} % of {len(said)}"
+    return f"{percent(said)} % of {len(said)}"
 
 
-def _percent(values: Sequence[bool | None]) -> str:
-    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if values else "–"
+def percent(values: Sequence[Any]) -> str:
+    """Share of what is true."""
+    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if len(values) else "–"
 
 
 def main(jobs: int = 2500) -> None:
@@ -208,7 +209,7 @@ def main(jobs: int = 2500) -> None:
         for low, high in pairwise((0.0, 0.1, 0.2, 0.3, 0.5, 1.0, np.inf)):
             at = [one.inside for one in drawn if one.inside is not None and low <= one.relative < high]
             name = f"{method}: relative error of the weights {low:g} … {high:g}"
-            print(f"{name:<60}{_percent(at):>6} of {len(at)}")
+            print(f"{name:<60}{percent(at):>6} of {len(at)}")
 
 
 def assumed(times: float) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from coverage_balance import normal, percent
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
@@ -33,6 +34,7 @@ from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands.balance import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
 from rotorid.files import Conventions, Job
+from rotorid.files.job_models import Plane, Sensor
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
@@ -69,7 +71,7 @@ class Machine(NamedTuple):
     def unknowns(self, *, exact: bool = False) -> list[Unknown]:
         """What `rotorid calibrate --estimate "bearing[*].*" --prior "…=20%"` takes as unknown."""
         prior = "bearing[*].k*=20%, bearing[*].c*=20%"
-        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, "", exact=exact)
+        return unknowns(self.rotor, PROBES, "bearing[*].*", prior, exact=exact)
 
 
 class Truth(NamedTuple):
@@ -174,11 +176,6 @@ CASES: dict[str, dict[str, Any]] = {
 
 WHOLE = ("four speeds", "one speed")
 """Cases in which the model lacks nothing."""
-
-
-def normal(random: Random, *shape: int) -> ComplexArray:
-    """Complex, of variance 1 in each direction."""
-    return np.asarray(random.standard_normal(shape) + 1j * random.standard_normal(shape))
 
 
 def third_bearing(random: Random, rotor: fem.Rotor) -> fem.Rotor:
@@ -330,12 +327,12 @@ def distance(d: FloatArray, covariance: FloatArray) -> float:
 def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: ComplexArray) -> Balance:
     """Weights by this calibrated rotor, as `rotorid balance` finds them."""
     runs = trials(machine, speeds, readings, np.zeros((1, 2)))
-    nodes = dict(zip(runs.planes, machine.planes, strict=True))
-    places = dict(zip(PROBES, machine.sensors, strict=True))
-    conventions = Conventions()
-    return balance(
-        Job(runs, None, conventions, (), runs.planes, rotor=rotor, plane_nodes=nodes, sensor_places=places)
-    )
+    planes = {name: Plane(node=node) for name, node in zip(runs.planes, machine.planes, strict=True)}
+    sensors = {
+        name: Sensor(node=probe.node, angle_deg=probe.angle)
+        for name, probe in zip(PROBES, machine.sensors, strict=True)
+    }
+    return balance(Job(runs, None, Conventions(), (), planes, sensors, rotor=rotor))
 
 
 def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:
@@ -377,11 +374,6 @@ def lacks(name: str, found: Sequence[Outcome]) -> str:
         [one.good for one in found],
     ]
     return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>10}" for column in columns)
-
-
-def percent(values: Sequence[Any]) -> str:
-    """Share of what is true."""
-    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if len(values) else "–"
 
 
 def main(seed: int = 1, machines: int = 510) -> None:

@@ -14,6 +14,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
+from coverage_balance import normal
 from numpy.typing import NDArray
 
 from balancing import (
@@ -25,8 +26,7 @@ from balancing import (
     correct,
 )
 from balancing.regions import NORMAL_RADIUS
-from rotorid.fleet import MachineRecord, MachineType, fit_type, update
-from rotorid.fleet.posterior import LEVEL
+from rotorid.fleet.machine_type import LEVEL, MachineRecord, MachineType, fit_type, update
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
@@ -57,11 +57,6 @@ class Type(NamedTuple):
     speeds: NDArray[np.float64]
     sensors: tuple[str, ...]
     planes: tuple[str, ...]
-
-
-def normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
-    """Complex, of variance 1 in each direction."""
-    return np.asarray(rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
 
 
 def draw(rng: np.random.Generator, kind: str, machines: int = MACHINES) -> Type:

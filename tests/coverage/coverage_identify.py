@@ -8,7 +8,7 @@ deviation.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,16 +71,30 @@ def _two_masses(
 
 
 def simulate(case: Case, rng: np.random.Generator, *, stated: bool = True) -> Experiments:
-    """One repetition: readings with independent normal errors of amplitude and phase."""
-    n = len(case.frequencies)
-    loads = {name: np.full(n, complex(value)) for name, value in case.inputs.items()}
+    """One repetition."""
+    given = case.model, list(case.truth.values()), case.frequencies, case.inputs, case.errors, rng
+    return readings(*given, case.errors if stated else None)
+
+
+def readings(
+    model: HarmonicModel,
+    truth: Sequence[float],
+    frequencies: FloatArray,
+    inputs: Mapping[str, float],
+    errors: AmplitudeErrors | None = None,
+    rng: np.random.Generator | None = None,
+    stated: AmplitudeErrors | None = None,
+) -> Experiments:
+    """Amplitudes of a model, exact or with independent normal errors of size and phase."""
+    n = len(frequencies)
+    loads = {name: np.full(n, complex(value)) for name, value in inputs.items()}
     signals = dict(loads)
-    values = np.array(list(case.truth.values()))
-    for name, z in case.model.predict(values, case.frequencies, loads).items():
-        size = 1 + case.errors.relative * rng.standard_normal(n)
-        signals[name] = z * size * np.exp(1j * case.errors.phase * rng.standard_normal(n))
-    errors = case.errors if stated else None
-    return experiments(case.model, case.frequencies, signals, errors=errors, free=False)
+    for name, z in model.predict(np.array(truth), frequencies, loads).items():
+        signals[name] = z
+        if errors is not None and rng is not None:
+            size = 1 + errors.relative * rng.standard_normal(n)
+            signals[name] = z * size * np.exp(1j * errors.phase * rng.standard_normal(n))
+    return experiments(model, frequencies, signals, errors=stated, free=False)
 
 
 @dataclass(frozen=True)

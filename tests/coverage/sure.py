@@ -29,6 +29,11 @@ def blocks(name, page=None):
     return [text for found, text in BLOCK.findall(page) if found == name]
 
 
+def titles(text):
+    """What the lines of a table are about, without their numbers."""
+    return [re.split(r"  +[\d–]| [\d.–]+ % of", line)[0].rstrip() for line in text.splitlines() if line]
+
+
 def renewed(page, name, printed):
     """The page with what the program of a table prints now."""
     shown = blocks(name, page)

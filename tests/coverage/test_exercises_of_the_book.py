@@ -5,7 +5,6 @@ import warnings
 
 import numpy as np
 import pytest
-from repetitions import FULL
 
 from rotorid.files import read_harmonic_model, read_measurements
 from rotorid.identify import identify
@@ -44,34 +43,3 @@ def test_intervals_of_the_printed_tables_hold():
     print(f"{len(inside) - len(lost)} of {len(inside)} intervals hold; not {lost}")
     assert len(inside) == 53
     assert len(lost) <= 3, lost
-
-
-def redrawn(task, path, rng):
-    """The exact table of an exercise at other frequencies, near its own, in two digits as the book has it."""
-    file = read_harmonic_model(FOLDER / task / "model.toml")
-    data = read_measurements(FOLDER / task / "data.csv", file)
-    model, n = file.model, len(data)
-    w = np.array([float(f"{x:.3g}") for x in data.frequencies * rng.uniform(0.9, 1.1, n)])
-    theta = np.array([TRUTHS[task][name] for name in model.parameters])
-    inputs = {name: data.signals[name] for name in model.inputs}
-    columns = {"frequency_rad_s": [f"{x:g}" for x in w]}
-    for name, z in {**inputs, **model.predict(theta, w, inputs)}.items():
-        digits = 12 if name in inputs else 2
-        columns[f"{name}_re"] = [f"{x:.{digits}g}" for x in z.real]
-        columns[f"{name}_im"] = [f"{x:.{digits}g}" for x in z.imag]
-    rows = [",".join(columns), *map(",".join, zip(*columns.values(), strict=True))]
-    path.write_text("\n".join(rows), encoding="utf-8")
-    return path
-
-
-FORCED = ("task_1_1", "task_2_1", "task_3_1", "task_4_3", "task_5_1", "section_1_6")
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("task", FORCED)
-def test_intervals_of_redrawn_tables_of_two_digits_hold(task, tmp_path):
-    rng, inside = np.random.default_rng(7), []
-    for _ in range(500 if FULL else 30):
-        inside += held(task, redrawn(task, tmp_path / "data.csv", rng)).values()
-    print(f"{task}: {np.mean(inside):.3f} of {len(inside)}")
-    assert np.mean(inside) > (0.9 if FULL else 0.8)

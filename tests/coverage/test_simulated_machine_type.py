@@ -4,7 +4,7 @@ import coverage_fleet as example
 import numpy as np
 import pytest
 
-from rotorid.fleet import fit_type
+from rotorid.fleet.machine_type import fit_type
 
 
 def lower(share, n, deviations=3.0):

@@ -12,7 +12,7 @@ TWO = STUDY.replace(
     "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
 ).replace(
     "[unbalance.3]",
-    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nmedian_g_mm = 300\n[unbalance.4]",
+    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nrms_g_mm = 360\n[unbalance.4]",
 )
 
 

@@ -14,7 +14,7 @@ from rotorid.files.settings import Settings
 from rotorid.identify.expressions import FUNCTIONS
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+sys.path.append(str(ROOT / "docs" / "_ext"))
 
 from tables import key_lines, settings_of  # noqa: E402 - of docs/_ext
 

@@ -430,7 +430,7 @@ def _all() -> list[Case]:
     cases += [
         Case("fleet-nothing", "fleet fit sample_data/motion", "fleet"),
         Case("fleet-other", f"{fitted} --type fan-123", "fleet"),
-        Case("fleet-fit", f"{fitted} --plot t.png", "fleet"),
+        Case("fleet-fit", fitted, "fleet"),
         Case("fleet-fit-table", f"{fitted} --output t.csv --table", "fleet"),
         Case("type", f"{of_type}9/job.toml {typed}", "fleet", before=before),
         Case("type-refined", f"{of_type}1/job.toml {typed} --refine", "fleet", before=before),

@@ -44,10 +44,10 @@ class Mutation:
 MUTATIONS = (
     Mutation(
         "formula (50)'s weight",
-        "reduce-given-relative reduce-book reduce-everything",
-        "rotorid/reduction/equivalent/equivalent_masses_formula_50.py",
-        "return np.asarray(omega[..., None, :] ** 2)",
-        "return np.asarray(omega[..., None, :])",
+        "reduce-given-relative",
+        "rotorid/reduction/masses.py",
+        'factors = omega**2 if rows == "relative"',
+        'factors = omega if rows == "relative"',
     ),
     Mutation(
         "sign of phase lag",
@@ -74,8 +74,8 @@ MUTATIONS = (
         "one entry of the gyroscopic matrix",
         "campbell-compressor-coarse critical-compressor-map",
         "fem/elements.py",
-        "2 * model.gyroscopic * tilting,",
-        "2 * model.gyroscopic * tilting * (1 - 2 * np.diag(np.eye(6)[0]))[..., None],",
+        "turning = 2 * model.gyroscopic * tilting",
+        "turning = 2 * model.gyroscopic * tilting * (1 - 2 * np.diag(np.eye(len(tilting))[0]))[..., None]",
     ),
     Mutation(
         "the Student quantile",
@@ -93,7 +93,7 @@ MUTATIONS = (
     ),
     Mutation(
         "rounding of a hole's angle",
-        "split-holes split-stock holes-report",
+        "split-holes holes-report",
         "balancing/holes.py",
         "np.arange(int(n)) / int(n), 2 * np.pi)",
         "np.arange(int(n)) / int(n) + np.radians(0.5), 2 * np.pi)",

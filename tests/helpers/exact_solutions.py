@@ -4,10 +4,9 @@ from functools import partial
 
 import numpy as np
 import pytest
-from full_whirl import exact_modes
 
-from fem import WhirlModes, response
-from fem.assembly import both_planes
+from fem import WhirlModes, reference, response, solve_modes
+from fem.assembly import both_planes, project
 from fem.whirl import in_both_planes, missing_modes
 
 
@@ -28,12 +27,15 @@ SOLVERS = {"fast": fast, "exact": exactly}
 
 def whirl_exactly(rotor, speed, n=6):
     """`fem.whirl_modes` without a reduced basis."""
-    P = both_planes(rotor)
-    values, vectors, real, still = exact_modes(P, float(speed), n)
-    lam, x, y = in_both_planes(values, vectors[:, :, :: P.A.stride])
+    P, speeds = both_planes(rotor), np.array([float(speed)])
+    Q = project(P, np.eye(P.A.size))
+    whirl = solve_modes(Q, speeds, n, reference(P, speeds, 1)[1])
+    there, real = np.isfinite(whirl.values[0]), whirl.real[0]
+    vectors = Q.expand(whirl.vectors[0, there])
+    lam, x, y = in_both_planes(whirl.values[0, there], vectors[:, :, :: P.A.stride])
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
-    said = missing_modes(real, still, lam.size, n)
-    return WhirlModes(float(speed), lam, x.T / size, y.T / size, real, 0.0, rotor, said)
+    missing = missing_modes(real, int(whirl.still[0]), lam.size, n)
+    return WhirlModes(float(speed), lam, x.T / size, y.T / size, real, 0.0, rotor, missing)
 
 
 def frequency_response(model, omega):

@@ -1,9 +1,9 @@
 """Models and simulated readings that several tests of identification share."""
 
 import numpy as np
+from coverage_identify import NUMBERS, TWO_MASSES, readings
 
-from rotorid.identify.amplitudes import AmplitudeErrors, Experiments
-from rotorid.identify.amplitudes import experiments as gather
+from rotorid.identify.amplitudes import AmplitudeErrors
 from rotorid.identify.equations import harmonic_model
 from rotorid.identify.operator_model import HarmonicModel
 
@@ -23,45 +23,17 @@ def task51() -> tuple[HarmonicModel, np.ndarray, np.ndarray, dict]:
     return model, np.array([1000.0, 10.0]), np.array([10.0, 20.0, 30.0]), {"F": 10.0}
 
 
-TWO_MASSES = [
-    "(m1*p**2 + a1*p + c1)*X1 + (a*p + c)*X2 = F1",
-    "(a*p + c)*X1 + (m2*p**2 + a2*p + c2)*X2 = 0",
-]
-TWO_MASS_NUMBERS = {
-    "m1": 10.0, "m2": 5.0, "c1": 15e3, "c": -5e3, "c2": 5e3, "a1": 40.0, "a": -15.0, "a2": 15.0
-}  # fmt: skip
-
-
 def two_masses(
     estimate: tuple[str, ...] = ("a1", "a2", "a"),
 ) -> tuple[HarmonicModel, np.ndarray, np.ndarray, dict]:
     """[S] 1.6: two masses, natural frequencies 22.4 and 44.7 rad/s, three dampers unknown."""
-    known = {name: value for name, value in TWO_MASS_NUMBERS.items() if name not in estimate}
+    known = {name: value for name, value in NUMBERS.items() if name not in estimate}
     model = harmonic_model(TWO_MASSES, known=known, estimate=estimate)
-    truth = np.array([TWO_MASS_NUMBERS[name] for name in estimate])
+    truth = np.array([NUMBERS[name] for name in estimate])
     return model, truth, np.array([15.0, 20.0, 25.0, 40.0, 50.0]), {"F1": 100.0}
 
 
-def simulate(
-    model: HarmonicModel,
-    truth: np.ndarray,
-    frequencies: np.ndarray,
-    inputs: dict,
-    errors: AmplitudeErrors | None = None,
-    rng: np.random.Generator | None = None,
-    stated: AmplitudeErrors | None = None,
-) -> Experiments:
-    """Readings of a model, exact or with independent normal errors of amplitude and phase."""
-    loads = {name: np.full(len(frequencies), complex(value)) for name, value in inputs.items()}
-    exact = model.predict(truth, frequencies, loads)
-    signals = dict(loads)
-    for name, z in exact.items():
-        if errors is not None:
-            size = 1 + errors.relative * rng.standard_normal(len(z))
-            turn = np.exp(1j * errors.phase * rng.standard_normal(len(z)))
-            z = z * size * turn
-        signals[name] = z
-    return gather(model, frequencies, signals, errors=stated, free=False)
+simulate = readings
 
 
 def chain(masses: int) -> tuple[list[str], list[str]]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 KINDS = ("plain", "weighted", "max_weight", "residual", "both", "budget")
-SEEDS = {"minmax": range(72), "least-squares": range(100, 136)}
 
 
 @dataclass(frozen=True, eq=False)

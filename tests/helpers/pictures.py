@@ -47,13 +47,13 @@ COMMANDS = {
 
 
 @functools.cache
-def outcome_of(name):
-    """What a command of `COMMANDS` gives."""
+def outcome_of(line):
+    """What a command line gives; its files are in the sample data, _ stands for a blank in a name."""
     made, words = [], []
-    for word in COMMANDS[name].split():
-        known = sample_data() / word
-        words.append(str(known) if "." in word and known.is_file() else word)
-    words = [word.replace("probe_", "probe ").replace("impeller_", "impeller ") for word in words]
+    for word in line.split():
+        file = sample_data() / word
+        word = str(file) if "." in word and file.is_file() else word
+        words.append(word.replace("probe_", "probe ").replace("impeller_", "impeller "))
     with (
         mock.patch.object(Destination, "deliver", lambda self, what, work, options=None: made.append(work())),
         contextlib.redirect_stdout(io.StringIO()),
@@ -67,7 +67,7 @@ def figures_of(name):
     from balancing.plots import draw_plane, residual_figure
     from rotorid.base.plot_style import new_figure
 
-    made = outcome_of(name)
+    made = outcome_of(COMMANDS[name])
     figures = {caption or "picture": draw() for caption, draw in made.pictures.items()}
     if name.startswith("balance"):
         figures["readings"] = residual_figure(made.result, made.mounted, made.check)

@@ -38,8 +38,3 @@ def highest_share(n, share):
 def of_a_mean(n):
     """How far, in standard deviations of one repetition, the mean of n lies from the truth at most."""
     return DEVIATIONS / np.sqrt(n)
-
-
-def of_a_spread(n):
-    """How far, relatively, a standard deviation of n normal repetitions lies from the truth at most."""
-    return DEVIATIONS / np.sqrt(2 * (n - 1))

@@ -1,22 +1,13 @@
 """Makes the sheets of the tests, and reads which numbers they show, and whether these are the document's."""
 
-import contextlib
 import functools
-import io
 import json
 import re
-import sys
-import tempfile
 from dataclasses import dataclass
 from decimal import Decimal
 from html.parser import HTMLParser
-from pathlib import Path
-from unittest import mock
 
-import pytest
-
-import rotorid.cli
-from rotorid.samples import sample_data
+from pictures import outcome_of
 
 COMPRESSOR = (
     "response compressor/rotor.toml --unbalance compressor/unbalance.csv --speeds 1000:15000:500rpm "
@@ -38,7 +29,7 @@ COMMANDS = {
     "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",
     "identify singular": "identify identify/task_4_1/model.toml identify/task_4_1/data.csv",
 }
-"""Sheets by name: the command, its files in the sample data, _ for a blank in a name."""
+"""Sheets by name, as `outcome_of` reads a command line."""
 
 NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 ROUNDED = 3  # significant digits that a whole number with zeros at its end has at least
@@ -100,28 +91,9 @@ class Made:
 
 @functools.cache
 def make(name):
-    """Run a command of COMMANDS once in this process, with --report and --json."""
-    with tempfile.TemporaryDirectory() as folder:
-        words = []
-        for word in COMMANDS[name].split():
-            known = sample_data() / word
-            word = str(known) if "." in word and known.is_file() else word
-            words.append(word.replace("probe_", "probe "))
-        return run(*words, report=Path(folder) / "sheet.html")
-
-
-def run(*words, report):
-    """Run `rotorid WORDS --json --report FILE` in this process."""
-    printed = io.StringIO()
-    arguments = ["rotorid", *map(str, words), "--json", "--report", str(report)]
-    with (
-        mock.patch.object(sys, "argv", arguments),
-        contextlib.redirect_stdout(printed),
-        pytest.raises(SystemExit) as stop,
-    ):
-        rotorid.cli.main()
-    assert not stop.value.code, f"{' '.join(arguments)} ended with {stop.value.code}"
-    return Made(report.read_bytes(), json.loads(printed.getvalue()))
+    """The page of a command of COMMANDS, and its document."""
+    outcome = outcome_of(COMMANDS[name])
+    return Made(outcome.sheet(), json.loads(json.dumps(outcome.document, allow_nan=False)))
 
 
 class _Reader(HTMLParser):
@@ -168,16 +140,6 @@ class Sheet:
     @property
     def keys(self):
         return {element.key for element in self.shown}
-
-
-def rows_of(sheet, caption):
-    """Cells of the table with this caption, tags taken away."""
-    table = next(part for part in sheet.text.split("<table")[1:] if f"<caption>{caption}" in part)
-    body = table.split("<tbody>")[1].split("</tbody>")[0]
-    return [
-        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)]
-        for row in body.split("</tr>")[:-1]
-    ]
 
 
 def read_sheet(html):

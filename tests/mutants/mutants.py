@@ -3,16 +3,14 @@
 First the suite of `make test` runs once in a copy of the tree and writes down which test runs which function
 (kept in `.mutants/` until a file changes; tests that fail without any mutation are named and left out). Then
 every mutation is applied in a copy of its own, and the tests that run the mutated function are run until one
-fails: first those whose file is named after the module, then those whose file imports it, then the others;
+fails: first those whose file is named after the module, then those of its package, then the others;
 short ones first. All mutants have their first turn, then those that are alive get the rest, as time allows.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import hashlib
-import importlib
 import json
 import os
 import shutil
@@ -24,7 +22,6 @@ import time
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 import mutation as mutations
@@ -75,65 +72,24 @@ def of_documents(documents: list[dict]) -> Suite:
     return Suite(seconds, dict(runs), sorted(failing))
 
 
-def imported(path: Path, seen: frozenset[Path] = frozenset()) -> set[str]:
-    """Modules of the product that a test file imports, itself or through the helpers beside it."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names: list[tuple[str, str]] = []
-        if isinstance(node, ast.Import):
-            names = [(alias.name, "") for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [(node.module, alias.name) for alias in node.names]
-        for module, name in names:
-            if module.partition(".")[0] in mutations.PACKAGES:
-                found |= _defined_in(module, name)
-            for folder in (path.parent, ROOT / "tests" / "helpers", ROOT / "tests"):
-                helper = folder / f"{module.replace('.', '/')}.py"
-                if helper.is_file() and helper not in seen:
-                    found |= imported(helper, seen | {path, helper})
-                    break
-    return found
-
-
-@cache
-def _defined_in(module: str, name: str) -> frozenset[str]:
-    """The module itself, and the one where a name that it passes on is defined."""
-    found = {module}
-    if name:
-        value = getattr(importlib.import_module(module), name, None)
-        found.add(value.__name__ if hasattr(value, "__path__") else getattr(value, "__module__", module))
-        if f"{module}.{name}" in sys.modules:
-            found.add(f"{module}.{name}")
-    return frozenset(each for each in found if isinstance(each, str))
-
-
-def module_name(path: str) -> str:
-    """`fem.response` of `fem/response.py`."""
-    return path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
-
-
-def order(mutation: mutations.Mutation, suite: Suite, imports: dict[str, set[str]]) -> list[str]:
+def order(mutation: mutations.Mutation, suite: Suite) -> list[str]:
     """Tests for a mutation, those first that are most likely and quickest to find it.
 
-    At module level, where everything runs on import, and for what is compiled and tells nothing, all tests of
-    files that are named after the module or import it, then those that run any function of it.
+    At module level, where everything runs on import, and for what is compiled and tells nothing, tests that
+    run any function of the module, and those of its package.
     """
-    module = module_name(mutation.path)
-    own = {name: tests for name, tests in suite.runs.items() if name.startswith(f"{mutation.path}::")}
-    direct = own.get(f"{mutation.path}::{mutation.function}", set())
+    module = {name: tests for name, tests in suite.runs.items() if name.startswith(f"{mutation.path}::")}
+    package = f"tests/{Path(mutation.path).parent}/"
+    direct = module.get(f"{mutation.path}::{mutation.function}", set())
     if not direct:
-        direct = set().union(*own.values())
-        direct |= {t for t in suite.seconds if module in imports[t.partition("::")[0]]}
+        direct = set().union(*module.values(), (test for test in suite.seconds if test.startswith(package)))
     # values kept by a cache were computed in one test only: the others of its file come last
     files = {test.partition("::")[0] for test in direct}
     beside = {test for test in suite.seconds if test.partition("::")[0] in files} - direct
-    stem = module.rpartition(".")[2]
 
-    def rank(test: str) -> tuple[int, float, str]:
-        file = test.partition("::")[0]
-        named = Path(file).stem.removeprefix("test_").endswith(stem)
-        group = 0 if named else 1 if module in imports[file] else 2
-        return (group, suite.seconds[test], test)
+    def rank(test: str) -> tuple[bool, bool, float, str]:
+        named = Path(test.partition("::")[0]).stem.endswith(Path(mutation.path).stem)
+        return (not named, not test.startswith(package), suite.seconds[test], test)
 
     return sorted(direct, key=rank) + sorted(beside, key=rank)
 
@@ -277,10 +233,7 @@ def run(drawn: list[mutations.Mutation], jobs: int, minutes: float) -> tuple[lis
         )
         for test in suite.failing:
             print(f"  left out, fails without mutation: {test}")
-        sys.path.insert(0, str(ROOT))
-        files = {test.partition("::")[0] for test in suite.seconds}
-        imports = {file: imported(ROOT / file) for file in files}
-        mutants = [Mutant(each, order(each, suite, imports)) for each in drawn]
+        mutants = [Mutant(each, order(each, suite)) for each in drawn]
         for round_number, seconds in enumerate(TURNS):
             alive = [mutant for mutant in mutants if mutant.tests and not mutant.killer]
             with ThreadPoolExecutor(jobs) as pool:

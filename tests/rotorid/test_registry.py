@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.base.choices import Method, described, find, names
+from rotorid.base.choices import Method, find, names
 from rotorid.identify.fit_records import METHODS
 from rotorid.identify.simulation import INTEGRATORS
 
@@ -20,7 +20,6 @@ def test_names_are_unique_and_sentences_there(kind):
 
 def test_words():
     kind = (Method("one", "the first", 1), Method("other", "the second", 2))
-    assert described(kind) == "one: the first; other: the second."
     with pytest.raises(
         ValueError, match=r"^method 'othr' is not known \(did you mean 'other'\?\): one of one, other$"
     ):

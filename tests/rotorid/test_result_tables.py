@@ -1,6 +1,7 @@
 """`rotorid.base.tables`: a table told once, the same numbers from each of its writers."""
 
 import io
+import json
 import subprocess
 import sys
 
@@ -8,7 +9,8 @@ import numpy as np
 import openpyxl
 import pytest
 
-from rotorid.base.tables import Column, Table, csv, excel, frame, html, terminal
+from rotorid.base.json import plain
+from rotorid.base.tables import Column, Table, csv, excel, frame, html, records, terminal, text
 
 SPEEDS = Table(
     "critical speeds",
@@ -51,24 +53,53 @@ def test_a_workbook_has_a_sheet_for_each_table_and_no_formula():
 
 
 def test_html_escapes_words_and_tells_where_a_number_comes_from():
-    text = str(html(SPEEDS))
-    assert "<caption>critical speeds</caption>" in text
-    assert "&lt;mixed&gt;" in text
-    assert f'<span data-key="speeds.0" data-scale="{30 / np.pi!r}">2980.1</span>' in text
-    assert ">−4.0</span>" in text
-    assert ">–</span>" in text
-    assert '<p class="note">without damping</p>' in text
+    page = str(html(SPEEDS))
+    assert "<caption>critical speeds</caption>" in page
+    assert "&lt;mixed&gt;" in page
+    assert f'<span data-key="speeds.0" data-scale="{30 / np.pi!r}">2980.1</span>' in page
+    assert ">−4.0</span>" in page
+    assert ">–</span>" in page
+    assert '<p class="note">without damping</p>' in page
 
 
-def test_a_frame_has_the_values():
-    table = frame(SPEEDS)
-    assert list(table.columns) == ["mode", "whirl", "rpm"]
-    np.testing.assert_array_equal(table["rpm"], [2980.123456789, -4.0, np.nan])
+JOB = (
+    Column("plane", ("A", "B")),
+    Column("mass_g", np.array([1.25, np.nan]), "{:.2f}".format, title="g"),
+    Column("covariance", np.array([[1.0, 0.0], [np.inf, 2.0]]), None),
+    Column("runs", np.array([3, 4])),
+)
+
+
+def test_records_are_json_and_nothing_is_null():
+    written = records(JOB)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert written == [
+        {"plane": "A", "mass_g": 1.25, "covariance": [1.0, 0.0], "runs": 3},
+        {"plane": "B", "mass_g": None, "covariance": [None, 2.0], "runs": 4},
+    ]
+
+
+def test_a_frame_has_the_values_and_types_of_the_columns():
+    np.testing.assert_array_equal(frame(SPEEDS.columns)["rpm"], [2980.123456789, -4.0, np.nan])
+    table = frame((*JOB[:2], JOB[3], Column("std", [None, None])))
+    assert [str(kind) for kind in table.dtypes[1:]] == ["float64", "int64", "float64"]
+    assert list(table.columns) == ["plane", "mass_g", "runs", "std"]
+
+
+def test_text_prints_the_columns_that_say_how_and_headings_of_an_empty_table():
+    assert text(JOB) == "  plane        g  runs\n  A         1.25     3\n  B                  4"
+    assert text((Column("plane", []), Column("g", []))) == "  plane     g"
+
+
+def test_plain_reaches_into_everything():
+    values = plain({"a": {"b": (np.float64(1.0), np.int64(2), np.bool_(True), None, "x", [np.nan])}})
+    assert values == {"a": {"b": [1.0, 2, True, None, "x", [None]]}}
+    assert [type(value) for value in values["a"]["b"][:3]] == [float, int, bool]
 
 
 def test_columns_are_one_dimensional_and_of_one_length():
     with pytest.raises(ValueError, match="one-dimensional"):
-        Column("shape", np.eye(2))
+        Table("shape", (Column("shape", np.eye(2)),))
     with pytest.raises(ValueError, match="one length"):
         Table("shapes", (Column("node", [1, 2]), Column("mode", [1.0])))
     with pytest.raises(ValueError, match="one length"):

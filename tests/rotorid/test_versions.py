@@ -96,7 +96,7 @@ def test_a_table_of_a_later_version(tmp_path):
     path.write_text(f"# schema_version = {SCHEMA_VERSION + 1}\n{text}", encoding="utf-8")
     with pytest.raises(rotorid.InputError, match=LATER):
         rotorid.read_influence(path)
-    assert csv_bytes((), ("a",), [(1,)]) == b"a\n1\n"
+    assert csv_bytes(("a",), [(1,)]) == b"a\n1\n"
 
 
 @pytest.mark.parametrize("kind", ["job", "rotor", "small", "waveforms"])

@@ -1,14 +1,13 @@
-/* The worksheet's page: it shows the HTML that the server sends, and sends every cell that changes.
-A cell has its change as `data-edit`, a button its edits as `data-edits` or what it does as `data-do`; what has
-`data-keep` is filled here, what has `data-picture` by a drawing of that address. */
+/* It shows the HTML of the server, and sends every cell that changes, by its id; buttons have `data-edits`
+or what they `data-do`; what has `data-keep` is filled here. */
 const $ = (id) => document.getElementById(id);
 const typed = new Map(); // id of a cell → its change, until the page has it; with `why` if it was refused
-const queue = []; // what is still to be sent, in order
-let token = location.hash.slice(1);
+let last = Promise.resolve(); // of what is still to be sent, in order
+let waiting = 0;
+const token = location.hash.slice(1);
 let version = -1;
 let online = true;
 let savedWords = "all is saved";
-let channel = ""; // speed and sensor of the cell that was entered last
 
 /* Make elements as they come from the server; focus stays, and what is being typed. */
 function morph(old, now) {
@@ -18,9 +17,7 @@ function morph(old, now) {
   for (const { name } of [...old.attributes]) {
     if (!now.hasAttribute(name) && name !== "open") old.removeAttribute(name);
   }
-  for (const { name, value } of now.attributes) {
-    if (old.getAttribute(name) !== value && name !== "open") old.setAttribute(name, value);
-  }
+  for (const { name, value } of now.attributes) if (name !== "open") old.setAttribute(name, value);
   if (idle) fill(old);
   if (!("picture" in old.dataset)) morphChildren(old, now);
 }
@@ -42,13 +39,13 @@ function morphChildren(old, now) {
   while (place) [place] = [place.nextSibling, place.remove()];
 }
 
-const isCell = (one) => one.matches("input:not([type])");
+const isCell = (one) => one.matches("input.cell");
 const isIdle = (one) => isCell(one) && one.value === (one.saved ?? one.defaultValue);
 const fill = (cell) => (cell.value = cell.saved = typed.get(cell.id)?.text ?? cell.defaultValue);
 
 /* The server. What changes the job is sent one after the other, and again when the program was away. */
 async function ask(path, body) {
-  const headers = { "X-Rotorid-Token": token, "Content-Type": "application/json" };
+  const headers = { "X-Rotorid-Token": token };
   const answer = await fetch(path, { headers, ...(body && { method: "POST", body: JSON.stringify(body) }) });
   if (answer.ok) return answer;
   const refusal = await answer.json().catch(() => ({ error: `${answer.status} ${answer.statusText}` }));
@@ -64,7 +61,7 @@ async function refresh(after) {
   if (first) restoreTrial();
   showSaved();
   showConflicts();
-  document.querySelectorAll("[data-picture]").forEach(draw);
+  draw();
 }
 
 async function away({ status }) {
@@ -74,31 +71,31 @@ async function away({ status }) {
   await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 
-const send = (path, body) => new Promise((done, failed) => {
+function send(path, body) {
   tell("");
-  if (queue.push({ path, body, done, failed }) === 1) drain();
+  waiting += 1;
+  const sent = last.then(() => deliver(path, body));
+  last = sent.catch(() => {}).then(() => showSaved((waiting -= 1)));
   showSaved();
-});
-const act = (path, body) => send(path, body).then(() => true, ({ message }) => tell(message));
-
-async function drain() {
-  for (; queue.length; showSaved()) {
-    const { path, body, done, failed } = queue[0];
-    try {
-      await ask(path, body);
-      savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
-      while (!(await refresh(-1).then(() => true, away)));
-      done(queue.shift());
-    } catch (problem) {
-      if (problem.status && problem.status !== 403) failed(problem, queue.shift());
-      else await away(problem);
-    }
-  }
+  return sent;
 }
 
-/* Changes {id, label, edit, old, text} of cells, as one step. */
+async function deliver(path, body) {
+  for (;;) {
+    const problem = await ask(path, body).then(() => null, (error) => error);
+    if (!problem) break;
+    if (problem.status && problem.status !== 403) throw problem;
+    await away(problem);
+  }
+  savedWords = `saved ${new Date().toTimeString().slice(0, 8)}`;
+  while (!(await refresh(-1).then(() => true, away)));
+}
+
+const act = (path, body) => send(path, body).then(() => true, ({ message }) => tell(message));
+
+/* Changes {id, old, text} of cells, as one step. */
 function save(changes) {
-  const edits = changes.map(({ edit, old, text }) => ({ ...edit, old, new: text }));
+  const edits = changes.map(({ id, old, text }) => ({ cell: id, old, new: text }));
   const drop = () => changes.forEach((one) => typed.get(one.id) === one && typed.delete(one.id));
   const refuse = ({ message, status }) => Object.assign(changes[0], { why: message, status, changes, drop });
   changes.forEach((one) => typed.set(one.id, one));
@@ -111,11 +108,8 @@ function settle(changes) {
 }
 
 /* What was refused before replaces what is there now. */
-function changeOf(cell, text) {
-  const { id, dataset, defaultValue, saved = defaultValue } = cell;
-  const old = typed.get(id)?.why ? defaultValue : saved;
-  return { id, label: dataset.label, edit: JSON.parse(dataset.edit), old, text };
-}
+const changeOf = ({ id, defaultValue, saved = defaultValue }, text) => (
+  { id, old: typed.get(id)?.why ? defaultValue : saved, text });
 
 function add(parent, tag, text, dataset) {
   const made = parent.appendChild(document.createElement(tag));
@@ -126,10 +120,10 @@ function add(parent, tag, text, dataset) {
 
 function showConflicts() {
   const box = document.createElement("div");
-  for (const { id, label, text, why, status } of [...typed.values()].filter((one) => one.why)) {
+  for (const { id, text, why, status } of [...typed.values()].filter((one) => one.why)) {
     const theirs = $(id)?.defaultValue ?? "";
     const words = `another window (or program) wrote “${theirs}” here; you typed “${text}”. `;
-    const line = add(box, "p", `${label}: ${status === 409 ? words : why} `);
+    const line = add(box, "p", `${$(id)?.ariaLabel ?? id}: ${status === 409 ? words : why} `);
     add(line, "button", `Keep “${theirs}”`, { theirs: id });
     add(line, "button", `Write “${text}”`, { mine: id });
     $(id)?.setAttribute("aria-invalid", "true");
@@ -143,80 +137,54 @@ function tell(text) {
 }
 
 function showSaved() {
-  const lost = `not saved — the program is not running${queue.length ? `: ${queue.length} wait here` : ""}`;
-  $("saved").textContent = online ? (queue.length ? "saving…" : savedWords) : lost;
+  const words = waiting ? "saving…" : savedWords;
+  $("saved").textContent = online ? words : `not saved: ${waiting} wait here, the program is not running`;
   $("saved").className = online ? "" : "why";
 }
 
-async function draw(slot) {
-  let address = slot.dataset.picture;
-  if (!slot.checkVisibility()) return;
-  if (address && slot.id === "polar") address += channel;
+async function draw() {
+  const slot = $("overview");
+  const address = slot.dataset.picture;
   if (slot.drawn === address) return;
   slot.drawn = address;
-  if (!address) return slot.replaceChildren(); // no old picture stands beside new numbers
-  await new Promise((next) => setTimeout(next, 150)); // who goes through the cells wants the last one
-  if (slot.drawn !== address) return;
-  const svg = await ask(address).then((drawing) => drawing.text(), () => "");
-  if (slot.drawn === address && svg) slot.innerHTML = svg;
-  else if (slot.drawn === address) slot.drawn = null; // the next state asks again
+  slot.replaceChildren(); // no old picture stands beside new numbers
+  const svg = address && (await ask(address).then((drawing) => drawing.text(), () => ""));
+  if (slot.drawn === address) slot.innerHTML = svg;
+  if (!svg) slot.drawn = null; // the next state asks again
 }
 
 /* What a person does. */
 document.addEventListener("click", ({ target }) => {
   const button = target.closest("button");
-  const { edits, sure, go, theirs, mine } = button?.dataset ?? {};
-  if (sure && !confirm(sure)) return;
+  const { edits, go, theirs, mine } = button?.dataset ?? {};
   if (edits) act("/edit", { edits: JSON.parse(edits) });
   if (button?.dataset.do) act("/do", { ...button.dataset });
   if (go) $(go)?.focus();
   if (button?.id === "print") print();
   const { changes, drop } = typed.get(theirs ?? mine) ?? {};
-  if (mine) save(changes.map((one) => ({ ...one, why: "", old: $(one.id)?.defaultValue })));
+  if (mine) save(changes.map(({ id, text }) => ({ id, text, old: $(id)?.defaultValue })));
   if (theirs) settle(changes, drop());
 });
 document.addEventListener("submit", async (event) => {
   event.preventDefault();
   const form = event.target;
-  const fields = Object.fromEntries(new FormData(form));
+  const fields = Object.fromEntries(new FormData(form, event.submitter));
   if (form.id === "trial") return propose(fields);
   if (!(await act("/do", { do: form.dataset.do, ...fields }))) return;
-  for (const one of form.elements) delete one.saved;
   form.reset();
   $("setup").open = false;
-  if (form.id === "new-run") $("runs").lastElementChild.querySelectorAll("input")[1]?.focus();
 });
 document.addEventListener("change", ({ target }) => {
-  if (target.form?.id === "trial") localStorage.setItem(trialKey(), JSON.stringify(trialValues()));
-  if (!target.dataset.edit || isIdle(target)) return;
+  if (target.form?.id === "trial") localStorage.setItem(trialKey(), JSON.stringify([...new FormData($("trial"))]));
+  if (!isCell(target) || isIdle(target)) return;
   save([changeOf(target, target.value.trim())]);
   target.saved = target.value;
-});
-document.addEventListener("toggle", () => document.querySelectorAll("[data-picture]").forEach(draw), true);
-document.addEventListener("keydown", (event) => {
-  const { target, key } = event;
-  const step = { Enter: 1, ArrowDown: 1, ArrowUp: -1 }[key];
-  if (target.dataset.edit && step) {
-    const column = `td:nth-child(${target.parentNode.cellIndex + 1}) > input`;
-    const cells = [...target.closest("table").querySelectorAll(column)];
-    const next = cells[cells.indexOf(target) + step];
-    if (next) next.select(event.preventDefault());
-  } else if (key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && (!target.matches("input") || isIdle(target))) {
-    event.preventDefault();
-    act("/do", { do: event.shiftKey ? "redo" : "undo" });
-  }
-});
-document.addEventListener("focusin", ({ target }) => {
-  const [table, , speed, sensor] = target.id.split("|");
-  if (!/^(runs|check)$/.test(table)) return;
-  channel = `&speed=${encodeURIComponent(speed)}&sensor=${encodeURIComponent(sensor)}`;
-  draw($("polar"));
 });
 document.addEventListener("paste", (event) => {
   const { target } = event;
   const text = event.clipboardData.getData("text").replace(/[\r\n]+$/, "");
   const lines = text.split(/\r?\n/).map((line) => line.split(text.includes("\t") ? "\t" : ";"));
-  if (!target.dataset.edit || (lines.length < 2 && lines[0].length < 2)) return;
+  if (!isCell(target) || (lines.length < 2 && lines[0].length < 2)) return;
   const isWord = (word) => Number.isNaN(Number(word.trim().replace(",", ".")));
   while (!target.list && lines[1] && lines[0].every(isWord)) lines.shift();
   event.preventDefault();
@@ -230,14 +198,10 @@ document.addEventListener("paste", (event) => {
 });
 
 /* The fields of a trial weight stay in this browser. */
-const trialFields = () => [...$("trial").querySelectorAll("input, select")];
-const trialValues = () => trialFields().map((one) => (one.type === "checkbox" ? one.checked : one.value));
 const trialKey = () => `trial weight of ${$("job").textContent}`;
 function restoreTrial() {
-  JSON.parse(localStorage.getItem(trialKey()) || "[]").forEach((value, i) => {
-    const field = trialFields()[i];
-    if (field) field[field.type === "checkbox" ? "checked" : "value"] = value;
-  });
+  const kept = JSON.parse(localStorage.getItem(trialKey()) || "[]");
+  for (const [name, value] of kept) if ($("trial").elements[name]) $("trial").elements[name].value = value;
 }
 async function propose(fields) {
   const [box, answer] = [$("trial-answer"), ask("/trial", fields)];
@@ -251,6 +215,5 @@ async function print() {
   if (sheet) opened.location = URL.createObjectURL(sheet);
   else opened.close();
 }
-window.addEventListener("hashchange", () => tell((token = location.hash.slice(1)) && ""));
-window.addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
+window.addEventListener("beforeunload", (event) => waiting && event.preventDefault());
 for (;;) await refresh(online ? version : -1).catch(away);

@@ -71,14 +71,14 @@ class Served:
         return answer.status, json.loads(content) if kind.startswith("application/json") else content
 
     def state(self, after=0):
-        """What a window shows: its `html`, and of that `cells` with their attributes, `numbers`, `words`."""
+        """What a window shows: its `html`, and of that the texts of `cells`, `numbers`, `words`."""
         status, state = self.ask(f"/state?after={after}")
         assert status == 200, state
         page = html.unescape(state["html"])
-        cells = re.findall(r"<input id=\"([^\"]*)\" value=\"([^\"]*)\" data-edit='([^']*)'", state["html"])
-        state["cells"] = {
-            html.unescape(name): (html.unescape(text), json.loads(edit)) for name, text, edit in cells
-        }
+        state["busy"] = re.search('id="busy" role="status">([^<]*)<', page).group(1)
+        state["notice"] = "".join(re.findall('id="notice" role="status"><p>([^<]*)<', page))
+        cells = re.findall('<input id="([^"]*)" value="([^"]*)" class="cell"', state["html"])
+        state["cells"] = {html.unescape(name): html.unescape(text) for name, text in cells}
         state["numbers"] = dict(re.findall(r'data-key="([^"]*)"[^>]*>([^<]*)<', page))
         state["words"] = " ".join(re.sub("<[^>]*>", " ", page).split())
         return state
@@ -101,10 +101,9 @@ class Served:
         """Status and answer of one edit."""
         return self.ask("/edit", {"edits": list(edits)})
 
-    def type(self, cell, text, **more):
+    def type(self, cell, text):
         """Status and answer of a text in a cell, as the page sends it."""
-        old, edit = self.state()["cells"][cell]
-        return self.edit({**edit, "old": old, "new": text, **more})
+        return self.edit({"cell": cell, "old": self.state()["cells"][cell], "new": text})
 
     def kill(self):
         """As by kill -9."""
@@ -157,7 +156,7 @@ class SharedJobs:
 
 def _shown(state):
     """What the files of a job say in its state."""
-    return state["cells"], "The job says: phase lead, angles with" in state["words"]
+    return state["cells"], 'id="phase lead" aria-pressed="true"' in state["html"]
 
 
 def _put_back(folder, sample):

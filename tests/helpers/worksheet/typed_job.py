@@ -19,14 +19,15 @@ def type_job(window, sample, radius=None):
     window.type('[name="sensors"]', ", ".join(row["sensor"] for row in own[names[0]]))
     window.type('[name="speeds"]', runs[0]["speed_rpm"])
     window.push("#setup button")
-    window.push('[id="convention lead with rotation"]', SPACE)
+    window.push('[id="phase lead"]', SPACE)
+    window.push('[id="angles with rotation"]', SPACE)
     for name in names:
         card = f'[id="run {name}"]' if name != names[0] else "#baseline"
         mounted = [row for row in weights if row["run"] == name]
         if mounted:
             window.type('#new-run [name="name"]', name)
             window.type('#new-run [name="plane"]', mounted[0]["plane"])
-            window.push("#add-run")
+            window.push("#new-run button")
         for k, weight in enumerate(mounted, 1):
             cell = f'{card} tr:nth-child({k}) [id^="weights|"]'
             if k > 1:
@@ -40,6 +41,6 @@ def type_job(window, sample, radius=None):
             window.next(text)
         window.leave()
     for plane in dict.fromkeys(row["plane"] for row in weights) if radius else ():
-        window.type(f'[id="planes.{plane}.radius_mm"]', str(radius))
+        window.type(f'[id="planes|{plane}|radius_mm"]', str(radius))
         window.leave()
     window.saved()

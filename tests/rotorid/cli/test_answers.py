@@ -11,7 +11,6 @@ from rotorid.samples import sample_data
 SAMPLES = sample_data()
 COMPRESSOR, ROTOR = SAMPLES / "compressor" / "rotor.toml", SAMPLES / "rotor23.csv"
 RESPONSE = ("response", COMPRESSOR, "--unbalance", SAMPLES / "compressor" / "unbalance.csv")
-FIT = (SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinearization/record_noisy.csv")
 
 
 @pytest.mark.parametrize(
@@ -97,12 +96,6 @@ def test_half_a_table_of_weights_is_never_shown():
     assert "plane" not in told
     assert "8 more lines: --table." in told
     assert len(told.splitlines()) <= 24
-
-
-def test_what_is_to_be_mounted_stands_whole_and_the_rest_is_counted():
-    told = Answer("Judged.\n" * 20, "one\ntwo\n\nthree\nfour", to_mount=True).brief()
-    assert "one\ntwo" in told
-    assert "2 more lines: --table." in told
 
 
 def test_another_table_is_cut_by_rows():

@@ -10,7 +10,6 @@ import numpy as np
 import openpyxl
 import pytest
 from tables_data import write_csv
-from workbook_jobs import as_workbook
 
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import write_influence
@@ -81,15 +80,6 @@ def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
             assert (one["angle_deg"] + two["angle_deg"] + 180) % 360 == pytest.approx(180, abs=1e-6)
 
 
-@pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS])
-@pytest.mark.parametrize(("phase", "angles"), [("lead", "with"), ("lag", "against")])
-def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
-    files = shop(tmp_path, runs, phase, angles)
-    outcome = cli("balance", *files, *said(phase, None if runs is ON_AXIS else angles), "--json")
-    assert outcome.json["conventions"]["assumed"] == outcome.json["assumptions"] == []
-    assert outcome.json["other_readings"] == []
-
-
 @pytest.mark.parametrize(
     ("given", "assumed"),
     [(("lead", None), ["angles"]), ((None, "against"), ["phase"]), ((None, None), ["phase", "angles"])],
@@ -144,17 +134,6 @@ def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
     assert not any("contradict" in words for words in document["warnings"])
 
 
-def test_both_assumed_and_confirmed_needs_no_other_angles(cli, tmp_path):
-    """Lag on a tape against the rotation: the numbers are right, and the runs say that they go together."""
-    files = shop(tmp_path, TELLING, "lag", "against", noise=0.02)
-    document = cli("balance", *files, "--json").json
-    assert document["other_readings"] == []
-    assert "confirm 'lead' for angles with rotation" in document["assumptions"][1]
-    np.testing.assert_allclose(
-        on_the_tape(document["corrections"], "against"), BEST, atol=0.1 * np.abs(BEST).max()
-    )
-
-
 def test_weights_in_line_cannot_tell(cli, tmp_path):
     files = shop(tmp_path, [*ON_AXIS, {"left": (2, 180)}], noise=0.02)
     document = cli("balance", *files, "--json").json
@@ -207,9 +186,6 @@ def test_stored_coefficients(cli, tmp_path):
     expected = cli("balance", day, "--influence", stored, "--phase", "lead", "--json").json["corrections"]
     for row, other in zip(expected, document["other_readings"], strict=True):
         assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
-    write_influence(stored, balance(shop(tmp_path, OFF_AXIS)).influence)
-    assert "phase_lead_deg" in stored.read_text(encoding="utf-8")
-    assert cli("balance", shop(tmp_path, [{}])[0], "--influence", stored).code == 0
 
 
 def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
@@ -221,8 +197,6 @@ def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
     assert "<strong>If lag or against:</strong>" in page.read_text(encoding="utf-8")
     sheets = openpyxl.load_workbook(book)
     assert sheets["results other readings"].max_row == 4
-    own = as_workbook(job, tmp_path / "job.xlsx")
-    assert cli("balance", own, "--json").json["conventions"]["assumed"] == ["phase", "angles"]
 
 
 def test_computed_coefficients(cli, tmp_path):

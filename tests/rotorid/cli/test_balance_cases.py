@@ -148,24 +148,3 @@ def test_a_trim_is_of_pieces_where_the_mounted_ones_are_in_holes(cli, tmp_path):
         assert answer.startswith("Trim; ")
         assert " add " in ran.out
         assert "not as pieces: the holes in which weights of run 'check 2' stand are not named" in answer
-
-
-def test_weights_that_were_mounted_although_there_are_holes_are_stated(cli, tmp_path):
-    """`check_weights = "weights"`: those of the first line; else the pieces are taken to be mounted."""
-    for name in ("runs.csv", "weights.csv", "check.csv"):
-        (tmp_path / name).write_bytes((JOBS / "pieces_checked" / name).read_bytes())
-    job = (JOBS / "pieces_checked/checked.toml").read_text()
-    (tmp_path / "pieces.toml").write_text(job)
-    (tmp_path / "weights.toml").write_text(f'check_weights = "weights"\n{job}')
-    asked = {}
-    for name in ("pieces", "weights"):
-        found = cli("balance", tmp_path / f"{name}.toml", "--json").json
-        asked[name] = vectors(found["check"]["mounted"][0]["weights"])
-        exact = vectors(found["corrections"])
-    assert np.abs(asked["weights"] - exact).max() < 1e-9
-    assert np.abs(asked["pieces"] - exact).max() > 0.5
-    said = first(cli("balance", tmp_path / "weights.toml", "--split"))
-    assert "Taken to be mounted" not in said  # it is stated
-    (tmp_path / "bare.toml").write_text(job.split("[planes")[0])  # no holes
-    said = first(cli("balance", tmp_path / "bare.toml"))
-    assert "Taken to be mounted: the weights that were proposed; else state check_weights." in said

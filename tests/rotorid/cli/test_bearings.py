@@ -20,32 +20,13 @@ def shaft(forces, supports=()):
     return fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, forces=forces, supports=supports)
 
 
-def test_the_document_says_where_each_journal_is(cli):
-    found = cli("bearings", ROTOR, *SPEEDS, "--json").json
-    assert found["speeds_rad_s"] == pytest.approx(np.arange(1000, 9001, 1000) * np.pi / 30)
-    rows = pd.DataFrame(found["bearings"])
-    assert list(rows["bearing"][:2]) == ["left", "right"]
-    assert len(rows) == 18
-    # Ocvirk: S_s = η Ω R L³ / (4 c² W) = (1 − ε²)² / (ε √(16 ε² + π² (1 − ε²))), S = N η L D / W (R / c)²
-    e, S = rows["eccentricity"], rows["sommerfeld"]
-    ocvirk = (1 - e**2) ** 2 / (e * np.sqrt(16 * e**2 + np.pi**2 * (1 - e**2)))
-    np.testing.assert_allclose(np.pi * S * (50 / 110) ** 2, ocvirk, rtol=1e-8)
-    np.testing.assert_allclose(rows["film_m"], 1.5e-4 * (1 - e), rtol=1e-9)
-    attitude = np.degrees(np.arctan(np.pi * np.sqrt(1 - e**2) / (4 * e)))
-    np.testing.assert_allclose(rows["attitude_deg"], attitude, rtol=1e-8)
-    weight = 9.80665 * read_rotor(ROTOR).total_mass
-    np.testing.assert_allclose(rows.groupby("speed_rpm")["load_N"].sum(), weight, rtol=1e-8)
-    stability = found["stability"]
-    assert stability["status"] == "threshold"
-    assert stability["threshold_rpm"] == pytest.approx(6407.0, abs=0.1)
-    assert stability["whirl_ratio"] == pytest.approx(0.191, abs=5e-4)
-
-
 def test_the_threshold_does_not_depend_on_the_steps(cli):
     coarse, fine = (
         cli("bearings", ROTOR, "--speeds", f"1000:9000:{step}rpm", "--json").json["stability"]
         for step in (4000, 250)
     )
+    assert coarse["threshold_rpm"] == pytest.approx(6407.0, abs=0.1)
+    assert coarse["whirl_ratio"] == pytest.approx(0.191, abs=5e-4)
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
@@ -66,7 +47,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
     forces = [JournalBearing(node, "", **BEARING) for node in (1, 5)]
     light = fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, density=0.0, forces=forces)
     found = bearings(light, BearingsOptions(speeds=[100.0]))
-    assert found.result.found[0].eccentricity == pytest.approx(0)
+    assert found.result.equilibria[0].eccentricity == pytest.approx(0)
     assert found.figure().axes[0].get_title().startswith("no load")
 
 
@@ -87,20 +68,6 @@ def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
     assert (outcome.code, outcome.out) == (2, "")
     assert words in outcome.err
     assert not (tmp_path / "out.toml").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
-        (("--speeds", "3000rpm", "--output", "linear.toml"), "needs two speeds at least (--speeds)"),
-        ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
-    ],
-)
-def test_bad_options(cli, options, words):
-    outcome = cli("bearings", ROTOR, *options)
-    assert outcome.code == 2
-    assert words in outcome.err
 
 
 def test_the_linear_rotor_does_not_overwrite_its_own_shaft(cli, tmp_path):
@@ -156,4 +123,6 @@ def test_a_shaft_that_rests_on_its_stop_is_told(cli, tmp_path):
     rigid = SmallModel((1,), [20.0], [200.0], np.zeros((1, 1)), forces=[film, ring])
     found = bearings(rigid, BearingsOptions(speeds=[100.0, 200.0]))
     assert "the shaft rests on the stop 'ring' at node 1" in found.warnings
-    assert found.result.found[0].position == pytest.approx([-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6)
+    assert found.result.equilibria[0].position == pytest.approx(
+        [-1j * (200 + 1e7 * 1.5e-4) / 1.1e7], rel=1e-6
+    )

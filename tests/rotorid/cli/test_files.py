@@ -68,18 +68,6 @@ def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, mon
     assert sorted(job.iterdir()) == before
 
 
-def test_demo_does_not_write_into_the_sample_data(cli, tmp_path):
-    before = sorted(sample_data().rglob("*"))
-    (tmp_path / "link").symlink_to(sample_data())
-    for folder in (sample_data(), sample_data() / "turbo_job", tmp_path / "link"):
-        outcome = cli("demo", folder)
-        assert outcome.code == 2
-        assert "these are the sample data themselves" in outcome.err
-    assert sorted(sample_data().rglob("*")) == before
-    (tmp_path / "file").write_text("x", encoding="utf-8")
-    assert "this is a file" in cli("demo", tmp_path / "file").err
-
-
 @pytest.mark.parametrize(
     ("redirection", "words"), [(">&-", "standard output is closed"), ("> /dev/full", "No space left")]
 )
@@ -156,23 +144,6 @@ def test_a_unit_at_each_speed(text, expected):
 def test_speeds_that_are_none(text, words):
     with pytest.raises(ValueError, match=words):
         speeds(text)
-
-
-def test_dependent_planes_end_with_status_2(cli, tmp_path):
-    rows = ["run,speed_rpm,sensor,amplitude_um_pp,phase_deg"]
-    effect, base = np.array([2 + 1j, 1 - 2j, 3j]), np.array([5, 4j, 3 + 3j])
-    for run, size in (("b", 0), ("t1", 1), ("t2", 0.5 + 0.2j)):
-        for sensor, z in zip("ABC", base + effect * size, strict=True):
-            rows.append(f"{run},1000,{sensor},{abs(z):.3f},{np.degrees(np.angle(z)):.3f}")
-    (tmp_path / "runs.csv").write_text("\n".join(rows), encoding="utf-8")
-    (tmp_path / "weights.csv").write_text(
-        "run,plane,mass_g,angle_deg\nt1,L,5,0\nt2,R,5,0\n", encoding="utf-8"
-    )
-    files = tmp_path / "runs.csv", tmp_path / "weights.csv"
-    for options in ((), ("--errors", "1,1")):
-        outcome = cli("balance", *files, *options, "--json")
-        assert (outcome.code, outcome.out) == (2, "")
-        assert "planes 'L' and 'R' act alike at every sensor and speed" in outcome.err
 
 
 def test_speeds_of_vectors_without_a_unit_are_rad_s_as_of_other_commands(cli):

@@ -10,15 +10,10 @@ import pytest
 import fem
 from fem import JournalBearing, MuszynskaSeal
 from rotorid.commands.motion import MotionOptions, motion
-from rotorid.commands.moving import moving
 from rotorid.files import read_rotor, write_rotor
-from rotorid.motion.run import run
-from rotorid.motion.steady import begin
-from rotorid.motion.system import reduced_system
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
-SHORT = ("--speed", "4000rpm", "--time", "0.3s")
 
 
 @pytest.fixture
@@ -28,56 +23,10 @@ def unbalance(tmp_path):
     return path
 
 
-def test_the_document(cli, unbalance):
-    found = cli("motion", ROTOR, *SHORT, "--unbalance", unbalance, "--sensors", "12", "--json").json
-    assert list(found["positions_m"]) == ["12", "2", "22"]
-    z = np.array(found["positions_m"]["2"])
-    assert z.shape == (len(found["time_s"]), 2)
-    assert found["time_s"][-1] == 0.3
-    assert found["speed_rad_s"][0] == found["speed_rad_s"][-1] == pytest.approx(4000 * np.pi / 30)
-    assert found["angle_rad"][-1] == pytest.approx(0.3 * 4000 * np.pi / 30)
-    least, most = found["eccentricity"]["left"]
-    last = np.hypot(*z[found["time_s"].index(max(found["time_s"])) // 2 :].T) / 1.5e-4
-    assert last.min() - 1e-3 < least < most < last.max() + 1e-3
-    assert found["steady"] is False  # 20 turns
-    assert found["position_error"] < 1e-4
-    assert found["reduction"]["frequency_error"] < 0.01
-
-
-def test_the_document_has_what_the_first_sentence_says(cli, unbalance):
-    given = ("motion", ROTOR, "--run-up", "3000:2000rpm", "--time", "0.3", "--unbalance", unbalance)
-    furthest = cli(*given, "--json").json["furthest"]
-    first = " ".join(cli(*given).out.split())
-    assert f"at node {furthest['node']}, {1e6 * furthest['distance_m']:.1f}" in first
-    assert f"{furthest['speed_rad_s'] * 30 / np.pi:.6g} rpm" in first
-    end = cli("motion", ROTOR, *SHORT, "--displaced", "12=20um", "--json").json
-    assert {"steady", "trend", "change", "at_rest", "chaotic", "whirl_frequency_rad_s"} <= {*end}
-
-
-@pytest.mark.parametrize("acceleration", ["10", "10rad/s/s", "10rad/s²", "10rad/s2"])
+@pytest.mark.parametrize("acceleration", ["10", "10rad/s²"])
 def test_an_acceleration_in_rad_s_as_a_run_up(cli, acceleration):
     found = cli("motion", ROTOR, "--run-up", "300:303", "--acceleration", acceleration, "--json").json
     assert found["time_s"][-1] == pytest.approx(0.3)
-
-
-def test_more_modes_change_little(unbalance):
-    speed = 4000 * np.pi / 30
-    whole = moving(ROTOR, unbalance).system(speed, speed)
-    found = {}
-    for modes in (4, 12, 24, None):
-        system = reduced_system(whole, [12], modes)
-        q, v, _ = begin(system, speed, "rest", {}, 1e-6)
-        found[modes] = run(system, (speed, speed), 0.1, (q, v), nodes=(12,))
-    few, many, every, chosen = found.values()
-    swing = np.abs(every.z - every.z[0]).max()
-    assert np.abs(few.z - every.z).max() < 1e-2 * swing
-    assert max(np.abs(one.z - every.z).max() for one in (many, chosen)) < 2e-3 * swing
-    errors = [one.system.frequency_error for one in (every, many, few)]
-    assert errors == sorted(errors)
-    assert errors[-1] < 0.01
-    assert chosen.system.frequency_error <= 3e-4
-    options = MotionOptions(speed="4000rpm", time=0.1, unbalance=unbalance, sensors="12")
-    assert motion(ROTOR, options).result.motion.system.frequency_error <= 3e-4
 
 
 def test_a_start_in_steady_motion_has_no_transient(unbalance):
@@ -85,35 +34,6 @@ def test_a_start_in_steady_motion_has_no_transient(unbalance):
     end = motion(ROTOR, MotionOptions(**options)).result.end
     assert end.periodic
     assert end.period == pytest.approx(60 / 4000)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (("--speed", "0", "--time", "1"), "speed 0: the journal bearing 'left' at node 2"),
-        (("--speed", "4000rpm"), "--time is needed"),
-        (("--time", "1"), "one of --speed and --run-up is needed"),
-        (("--run-up", "4000rpm", "--time", "1"), "use FIRST:LAST"),
-        (("--run-up", "1000:2000rpm", "--acceleration", "3rpm"), "300rpm/s"),
-        (("--run-up", "1000:2000rpm", "--acceleration", "3rad/s"), "300rpm/s"),
-        (("--run-up", "1000:2000rpm", "--time", "1", "--acceleration", "3rpm/s"), "one of --time and --acc"),
-        (("--run-up", "1000:2000rpm", "--acceleration", "0rpm/s"), "must be above 0"),
-        ((*SHORT, "--acceleration", "3rpm/s"), "belongs to --run-up"),
-        (("--speed", "4000rpm", "--time", "-1"), "seconds above 0"),
-        ((*SHORT, "--displaced", "12=3"), "expected one of the units"),
-        ((*SHORT, "--displaced", "99=3um"), "node 99 does not exist"),
-        (
-            (*SHORT, "--displaced", "2=300um"),
-            "touches the wall of the journal bearing 'left' at node 2 after 0 s",
-        ),
-        ((*SHORT, "--sensors", "77"), "node 77 does not exist"),
-    ],
-)
-def test_what_is_impossible(cli, given, message):
-    told = cli("motion", ROTOR, *given)
-    assert told.code == 2
-    assert message in told.err
-    assert len(told.err.strip().splitlines()) == 1
 
 
 def test_a_shaft_that_touches_a_seal_in_a_run_up(cli, tmp_path, unbalance):
@@ -164,12 +84,3 @@ def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):
     for k, axis in enumerate("xy"):
         z = np.array(document["positions_m"]["22"])[:, k]
         np.testing.assert_allclose(table[f"{axis}_22_um"], 1e6 * z, rtol=1e-12)
-
-
-def test_a_motion_that_grows_is_not_asked_for_more_time_to_settle(cli):
-    """The shaft of this rotor whips above 6407 rpm."""
-    given = ("motion", ROTOR, "--displaced", "12=1um", "--time", "2")
-    assert "it grows, to a limit cycle or to a wall" in " ".join(
-        cli(*given, "--speed", "6600rpm").out.split()
-    )
-    assert "it dies down" in " ".join(cli(*given, "--speed", "4000rpm").out.split())

@@ -2,11 +2,9 @@
 
 import warnings
 
-import numpy as np
 import pytest
 from tables_data import write_csv
 
-import fem
 from rotorid.files import read_rotor
 
 PLAIN = [["length_mm", "diameter_mm"], [250, 40], [250, 40], [250, 40], [250, 40]]
@@ -25,7 +23,6 @@ WINDOW = (
     f'shaft="p4.csv"\n{INERTIA}[[disc]]\nnode=3\n{DISC}[[bearing]]\nnode=1\nstiffness_N_per_m=1e8\n'
     '[[bearing]]\nnode=5\nstiffness_N_per_m=1e8\n[[seal]]\nnode=3\ntable="win.csv"\n'
 )
-SIDE = "kxx=1e7\nkyy=2e7\ncxx=200\ncyy=200\n"
 
 
 @pytest.fixture
@@ -82,28 +79,6 @@ def test_both_crossings_within_one_interval(cli, crossings):
     cut = cli("campbell", crossings, "--speeds", "100,150,200", "-n", 1, "--json").json
     assert "the list of critical speeds is cut" in cut["damped_critical_speeds_cut"]
     assert damped["damped_critical_speeds_cut"] is None
-
-
-def test_peaks_are_those_of_the_model(cli, tmp_path):
-    """On bearings that differ in x and y a reading is no single resonance."""
-    write_csv(tmp_path / "p2.csv", [["length_mm", "diameter_mm"], [500, 40], [500, 40]])
-    write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [2, 100, 30]])
-    (tmp_path / "an.toml").write_text(
-        f'shaft="p2.csv"\n{INERTIA}[[disc]]\nnode=2\n{DISC}[[bearing]]\nnode=1\n{SIDE}[[bearing]]\nnode=3\n{SIDE}'
-    )
-    command = ("response", tmp_path / "an.toml", "--unbalance", tmp_path / "u.csv")
-    rotor = read_rotor(tmp_path / "an.toml")
-    mounted = {2: 1e-4 * np.exp(1j * np.pi / 6)}
-    for step in ("0.5", "7"):
-        found = cli(*command, "--speeds", f"50:600:{step}", "--sensors", "2,2:90", "--json").json
-        peaks = [peak for peak in found["peaks"] if peak["sensor"] == "2 at 90°"]
-        assert peaks[0]["speed_rad_s"] == pytest.approx(281.530, abs=1e-3)
-        assert peaks[0]["amplitude"] == pytest.approx(141.93e-6, rel=1e-4)
-        for peak in peaks:
-            beside = peak["speed_rad_s"] * (1 + np.array([-1e-6, 0.0, 1e-6]))
-            truth = np.abs(fem.unbalance_response(rotor, mounted, beside).at((2, 90)))
-            assert truth.argmax() == 1
-            assert peak["amplitude"] == pytest.approx(truth[1], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from cases import each_of
 
-from rotorid.commands.trial_weight import trial_weight
 from rotorid.samples import sample_data
 
 FORCE = ("--load", "500kg", "--speed", "3000rpm", "--radius", "200mm")
 ANGLE = ("--reading-phase", "120", "--lag", "below")
-TURBO = sample_data() / "turbo_job" / "job.toml"
 BK = sample_data() / "bk_two_plane" / "job.toml"
 
 
@@ -36,56 +33,6 @@ def test_radius_of_the_job(weights, tmp_path):
     assert moved["mass"] == pytest.approx(0.8 * plain["mass"])
     assert moved["expected"] == plain["expected"]
     assert moved["force_N"] == pytest.approx(plain["force_N"])
-
-
-def test_files(cli, tmp_path):
-    picture = tmp_path / "t.png"
-    outcome = cli("trial-weight", TURBO, "--plot", picture)
-    assert outcome.code == 0
-    assert "Trial weight in plane middle" in outcome.out
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    frame = trial_weight(TURBO).to_frame()
-    assert len(frame) == 3 * 20
-    assert set(frame["plane"]) == {"left", "middle", "right"}
-
-
-@each_of(
-    ("args", "words"),
-    [
-        ((), "without a job, give --load, --speed and --radius"),
-        (
-            ("--load", "500kg", "--speed", "3000rpm", "--radius", "0mm"),
-            "--radius '0mm': expected a value above 0, such as 200mm",
-        ),
-        (
-            ("--load", "500", "--speed", "3000rpm", "--radius", "1mm"),
-            "--load '500': expected one of the units",
-        ),
-        ((*FORCE, "--share", "0"), "fraction of the load must be"),
-        ((*FORCE, "--reading-phase", "120"), "needs both the phase"),
-        (
-            (*FORCE, "--reading-phase", "500", "--lag", "at"),
-            "--reading-phase: '500.0' is no angle from -360 to 360",
-        ),
-        ((*FORCE, "--reading-phase", "1", "--lag", "high"), "--lag 'high': below, at or above, or degrees"),
-        ((*FORCE, "--plane", "left"), "--plane needs a job"),
-        ((*FORCE, "--plot", "x.png"), "no angle to draw"),
-        ((*FORCE, "--phase", "late"), "one of lead, lag"),
-        ((TURBO, "--speed", "3000rpm"), "--speed is for a trial weight without a job"),
-        ((TURBO, "--plane", "top"), "no plane 'top'; the planes are 'left', 'middle', 'right'"),
-        ((TURBO, "--share", "0"), "share of the largest reading must be"),
-        ((BK, "--radius", "0mm"), "--radius '0mm': expected a value above 0"),
-        ((TURBO, "--radius", "200mm"), "--radius is for weights as masses"),
-        ((TURBO, "--load", "0kg"), "--load '0kg': expected a value above 0"),
-    ],
-)
-def test_bad_input_is_one_message(cli, args, words):
-    outcome = cli("trial-weight", *args)
-    assert outcome.code == 2
-    assert words in outcome.err
-    assert "Traceback" not in outcome.err
-    assert len(outcome.err.strip().splitlines()) == 1
-    assert outcome.out == ""
 
 
 def test_amount_from_the_load(weights):

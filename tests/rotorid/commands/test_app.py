@@ -33,31 +33,6 @@ def test_reduce_takes_stations_and_one_speed(cli, files):
     assert at["rotor_frequencies_rad_s"][0] > by_name["rotor_frequencies_rad_s"][0]
 
 
-OK_SPEEDS = ("--speeds", "100:200:50")
-BAD = [
-    (("campbell", "R", "--speeds", "100:3000:100"), "'rear' at node 7: its table holds 50 to 2000 rad/s"),
-    (("campbell", "R", *OK_SPEEDS, "-n", "0"), "-n"),
-    (("campbell", "R", *OK_SPEEDS, "--operating", "9:5"), "--operating '9:5' is not a range"),
-    (("reduce", "R", "--nodes", "2,4", "--speed", "20"), "'rear' at node 7: its table holds 50 to 2000"),
-    (("response", "R", "--unbalance", "U", "--speeds", "100:2500:100"), "'rear' at node 7"),
-    (("response", "R", "--unbalance", "none.csv", *OK_SPEEDS), "none.csv"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "prope"), "no station is called 'prope'"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "probe:400"), "-360 to 360"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "1,,2"), "with commas"),
-    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--view", "3d"), "--view"),
-    (("influence", "R", "--planes", "wheel", "--sensors", "99:45", *OK_SPEEDS), "node 99 does not exist"),
-]
-
-
-@pytest.mark.parametrize(("args", "message"), BAD)
-def test_bad_input_ends_with_status_2_and_one_message(cli, files, args, message):
-    outcome = cli(*({"R": files[0], "U": files[1]}.get(arg, arg) for arg in args))
-    assert outcome.code == 2
-    assert message in outcome.err
-    assert "Traceback" not in outcome.err
-    assert outcome.out == ""
-
-
 def test_nodes_sensors_and_ranges_of_the_command_line():
     assert nodes("7, impeller 3,12", "--planes") == [7, "impeller 3", 12]
     assert sensors("2:45,probe DE:-30.5,22") == [(2, 45.0), ("probe DE", -30.5), 22]

@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import application
 from rotorid.commands.balance import BalanceOptions, balance
 
 HEAD = "run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg\n"
@@ -69,22 +66,6 @@ def test_the_proposed_pieces_are_what_was_mounted(tmp_path: Path) -> None:
     assert sum(covered) >= 10
 
 
-@pytest.mark.parametrize("options", [[], ["--split"], ["--refine"], ["--refine", "--split"]])
-def test_the_first_line_says_what_is_mounted_and_what_is_left(tmp_path: Path, options: list[str]) -> None:
-    machine = Machine(tmp_path, 3)
-    pieces = balance(machine.job(), BalanceOptions(split=True)).mounted
-    assert pieces is not None
-    job = machine.checked(1e3 * pieces.weights)
-    said = CliRunner().invoke(application(), ["balance", str(job), *options])
-    assert said.exit_code == 0
-    assert not any(line.startswith("Mount") for line in said.output.splitlines())
-    outcome = balance(job, BalanceOptions(split="--split" in options, refine="--refine" in options))
-    first = outcome.answer.judgement.splitlines()[0]
-    assert pieces.in_holes() in first
-    assert "check_weights" in first
-    assert ("Done" in first) == (outcome.left is not None and outcome.left.word == "done")
-
-
 def test_the_job_says_otherwise(tmp_path: Path) -> None:
     machine = Machine(tmp_path, 5)
     weights = balance(machine.job()).result.weights
@@ -114,14 +95,3 @@ def test_worse_than_the_bare_rotor_is_taken_off(tmp_path: Path) -> None:
     assert found.left.word == "take off what is mounted"
     assert not found.left.trim.any()
     assert "Take off what is mounted" in found.answer.judgement.splitlines()[0]
-
-
-def test_the_sheet_has_what_is_mounted_and_no_set_to_mount(tmp_path: Path) -> None:
-    machine = Machine(tmp_path, 3)
-    pieces = balance(machine.job(), BalanceOptions(split=True)).mounted
-    assert pieces is not None
-    sheet = balance(machine.checked(1e3 * pieces.weights), BalanceOptions(split=True)).sheet().decode()
-    weights = sheet.partition('<section id="weights">')[2].partition("</section>")[0]
-    assert "Leave everything that was mounted" in weights
-    assert "Remove every trial weight" not in sheet
-    assert 'class="holes' not in weights

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from tables_data import write_csv
 
@@ -11,43 +10,6 @@ import fem
 from fem.parameters import spread
 from rotorid import read_rotor, write_rotor
 from rotorid.commands.critical import CriticalOptions, critical
-
-
-def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
-    document = cli("critical", files[0], "-n", 1, "--map", "--json").json["map"]
-    stiffness = document["stiffness_N_per_m"]
-    assert (stiffness[0], stiffness[-1]) == pytest.approx((2e7 / 100, 5e7 * 100))
-    np.testing.assert_allclose(np.diff(np.log(stiffness)), np.log(250 * 100) / (len(stiffness) - 1))
-
-
-def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):
-    document = cli("critical", files[0], "-n", 2, "--mesh-check", "--map", "--json").json
-    assert len(document["direction"]) == 2
-    assert np.abs(document["mesh_check"]["relative_error"]).max() < 1e-3
-    curves = np.array(document["map"]["critical_speeds_rad_s"])
-    assert curves.shape == (2, len(document["map"]["stiffness_N_per_m"]))
-    assert (np.diff(curves[0]) > 0).all()
-    outcome = cli(
-        "critical", files[0], "-n", 2, "--map", "--plot", tmp_path / "m.png", "--output", tmp_path / "m.csv"
-    )
-    assert outcome.code == 0, outcome.err
-    assert len(pd.read_csv(tmp_path / "m.csv")) == curves.shape[1]
-
-
-def test_criticals_in_the_operating_range_are_listed(cli, files):
-    first, second = cli("critical", files[0], "-n", 2, "--json").json["critical_speeds_rad_s"]
-    band = f"{0.9 * first}:{first + 0.5 * (second - first)}"
-    command = ("critical", files[0], "-n", 2, "--operating", band)
-    operating = cli(*command, "--json").json["operating"]
-    assert operating["range_rad_s"] == pytest.approx([0.9 * first, (first + second) / 2])
-    inside, outside = operating["critical_speeds"]
-    assert (inside["inside"], inside["separation_percent"]) == (True, 0.0)
-    assert outside["inside"] is False
-    assert outside["separation_percent"] == pytest.approx(100 * (second / ((first + second) / 2) - 1))
-    command = ("campbell", files[0], "--speeds", "50:800:50", "--operating", "50:800")
-    document = cli(*command, "--json").json
-    assert len(document["operating"]["critical_speeds"]) == len(document["damped_critical_speeds"]) > 0
-    assert all(item["inside"] for item in document["operating"]["critical_speeds"])
 
 
 def test_the_map_says_what_it_leaves_out(cli, tmp_path):

@@ -12,15 +12,9 @@ from rotorid.cli import _JOBS, _work_of
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.commands.campbell import CampbellOptions, campbell
 from rotorid.commands.critical import CriticalOptions, critical
-from rotorid.commands.fit import FitOptions, fit
-from rotorid.commands.identify import identify
 from rotorid.commands.influence import InfluenceOptions, influence
 from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.commands.response import ResponseOptions, response
-from rotorid.commands.split import SplitOptions, split
-from rotorid.commands.tolerance import ToleranceOptions, tolerance
-from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
-from rotorid.commands.unbalance import UnbalanceOptions, unbalance
 from rotorid.files import read_job
 from rotorid.files.disk import each_file_once
 from rotorid.report.options import changed, checked, plain
@@ -96,7 +90,6 @@ def same(one, other):
 @pytest.mark.parametrize(
     ("work", "text", "values"),
     [
-        (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": ["1=35"]}, {"limit": "1=35"}),
         (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": "1=35"}, {"limit": {"1": "35"}}),
         (
             lambda o: balance(JOB, BalanceOptions(**o)),
@@ -129,49 +122,10 @@ def same(one, other):
             {"modes": 2, "errors": "compliance=2"},
             {"modes": np.int64(2), "errors": ["compliance=2"]},
         ),
-        (lambda o: split("35g@120", SplitOptions(holes=12, taken=o)), "3:10g", {3: 0.01}),
-        (
-            lambda o: tolerance(ToleranceOptions(5, 100.0, 2.5, centre=0.3, planes=o)),
-            "a=100mm,b=600mm",
-            {"a": "100mm", "b": 0.6},
-        ),
-        (lambda o: fit(MODEL, o), [RECORD], str(RECORD)),
     ],
 )
 def test_texts_and_what_they_stand_for_are_the_same(work, text, values):
     same(work(text), work(values))
-
-
-@pytest.mark.parametrize(
-    ("work", "words"),
-    [
-        (lambda: balance(None), "a job or its path is needed, not None"),
-        (lambda: balance(JOB, {"split": True}), r"options are BalanceOptions\(...\)"),
-        (lambda: balance(JOB, CriticalOptions()), r"options are BalanceOptions\(...\)"),
-        (lambda: balance(JOB, BalanceOptions(limit=[20])), "--limit .* texts are needed"),
-        (lambda: balance(JOB, BalanceOptions(planes=[])), "names .* are needed"),
-        (lambda: balance(JOB, BalanceOptions(max_mass=0)), "--max-mass '0': expected a value above 0"),
-        (lambda: balance(JOB, BalanceOptions(limit={"1": 0.0})), "--limit '0.0': expected a value above 0"),
-        (lambda: critical(5), "a rotor or its path"),
-        (lambda: critical(ROTOR, CriticalOptions(operating=(681, 555))), "--operating .* is not a range"),
-        (lambda: critical(ROTOR, CriticalOptions(operating=(555,))), "--operating .* is not a range"),
-        (lambda: campbell(ROTOR, None), r"options are CampbellOptions\(...\)"),
-        (lambda: response(ROTOR, None, ResponseOptions([100.0])), "unbalance"),
-        (lambda: response(ROTOR, {7: 1e-5}, ResponseOptions([100.0], sensors=[])), "--sensors"),
-        (lambda: unbalance(SAMPLES / "model_job" / "job.toml", UnbalanceOptions([])), "--stations"),
-        (lambda: reduce(ROTOR, ReduceOptions(place="mac", masses=0)), "the number of masses is 0"),
-        (lambda: trial_weight(5), "a job or its path"),
-        (lambda: trial_weight(JOB, TrialWeightOptions(plane=[])), "names .* are needed"),
-        (lambda: split(None, SplitOptions(holes=12)), "VECTOR"),
-        (lambda: identify(5, RECORD), "a model or its path"),
-        (lambda: fit(None, [RECORD]), "a model or its path"),
-        (lambda: fit(MODEL, None), "records or its path"),
-        (lambda: fit(MODEL, [RECORD], FitOptions(start={"d_x7": -1.0})), "outside its bounds"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_words(work, words):
-    with pytest.raises(ValueError, match=words):
-        work()
 
 
 def test_a_job_that_was_read_is_taken_as_it_is():

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.io import wavfile
 
@@ -67,33 +66,6 @@ def test_phase_is_written_as_asked(tmp_path, word):
     assert row["phase_deg"] == pytest.approx(expected, abs=0.5)
     assert row["amplitude_um"] == pytest.approx(0.2, rel=1e-3)
     assert row["speed_rpm"] == pytest.approx(17.3 * 60, rel=1e-4)
-
-
-def test_command_line(cli, tmp_path):
-    result = cli("vectors", SAMPLE / "waveforms.toml", "--json", "--output", tmp_path / "runs.csv")
-    assert result.code == 0, result.err
-    document = result.json
-    assert document["tacho"]["missing"] == document["tacho"]["double"] == 0
-    assert document["tacho"]["pulses"] == 390
-    assert document["warnings"] == []
-    table = pd.read_csv(tmp_path / "runs.csv")
-    assert table["amplitude_um_pp"].tolist() == [row["amplitude_um_pp"] for row in document["rows"]]
-    assert {entry["run"] for entry in document["runs"]} == {"as_found", "trial_left", "trial_right"}
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--unit", "um"), "a tacho channel, without which there is no phase: --tacho NAME"),
-        (("--tacho", "9"), "a channel of this name"),
-        (("--tacho", "1", "--orders", "0"), "--orders takes whole numbers from 1 to 20"),
-        (("--tacho", "1", "--speeds", "9000rpm"), "there is no speed of 9000 rpm"),
-    ],
-)
-def test_what_cannot_be_is_told_in_one_message(cli, words, message):
-    result = cli("vectors", SAMPLE / "run_up.wav", *words)
-    assert result.code == 2
-    assert message in result.err.replace("\n", " ")
 
 
 def test_pulses_that_are_alike_do_not_compare_records(tmp_path):

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from balancing import ReadingErrors, Trials, UndeterminedError, estimate_influence
-from rotorid.fleet import MachineRecord, fit_type
+from balancing import Labels, ReadingErrors, Trials, UndeterminedError, estimate_influence
+from rotorid.fleet.machine_type import MachineRecord, fit_type
 
 GRID = np.array([100.0]), ("x", "y"), ("L", "R")
 NOISE = 0.005
@@ -39,8 +39,8 @@ def changed(what, trials, record):
     W, std = record.W, record.std
     if what == "lag":
         W = estimate_influence(replace(trials, readings=np.conj(trials.readings))).W
-    if what == "planes":
-        W, std = W[..., ::-1], std[..., ::-1]
+    if what == "sensors":
+        W, std = W[:, ::-1], std[:, ::-1]
     if not isinstance(what, str):
         W = W * np.exp(1j * np.radians(what))
     return record._replace(W=W, std=std)
@@ -50,7 +50,7 @@ def changed(what, trials, record):
     ("what", "words"),
     [
         ("lag", "its phases were of the other sense (lag for lead)"),
-        ("planes", "its planes L and R were exchanged"),
+        ("sensors", "its sensors x and y were exchanged"),
         (84, "its phases lagged {}° more (another keyphasor mark)"),
         (-120, "its phases led {}° more (another keyphasor mark)"),
     ],
@@ -73,4 +73,9 @@ def test_few_machines_are_refused_and_widen_the_answer():
     with pytest.raises(UndeterminedError, match=r"2 machines with these speeds.*3 or more"):
         fit_type(every[:2], *GRID)
     assert "nothing tells an odd one" in fit_type(every[:4], *GRID).notes[0]
-    assert fit_type(every, *GRID).widening == pytest.approx(2 * 4.7374 / 5.9915, rel=1e-3)  # F(2, 7)
+    kind = fit_type(every, *GRID)
+    effects, prior = kind.effects, kind.influence(Labels(), "m3").channels()[0, 0, 2:, 2:]
+    assert np.trace(prior[:2, :2]) == pytest.approx(
+        2 * 4.7374 / 5.9915 * np.trace((effects.known(3)[1] + effects.within)[:2, :2]),
+        rel=1e-3,  # F(2, 7)
+    )

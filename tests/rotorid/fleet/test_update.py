@@ -7,7 +7,7 @@ import pytest
 from balancing_data import complex_normal, stored
 
 from balancing import ReadingErrors, Trials, with_parameters
-from rotorid.fleet import update
+from rotorid.fleet.machine_type import update
 
 TWO = np.array([100.0, 200.0])
 

@@ -1,46 +1,23 @@
-"""Pictures of identifications hold what the result holds, in the units of its table."""
+"""Pictures hold what the results hold, in the units of their tables."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from documents import check_hygiene
+from matplotlib.figure import Figure
 
 from rotorid import read_harmonic_model, read_measurements
+from rotorid.commands.modes import ModesOptions, modes
 from rotorid.identify import identify
+from rotorid.identify.fit_records import fit
+from rotorid.identify.ode import ode_model
 from rotorid.identify.plots import figure_identification
+from rotorid.identify.plots_records import draw_parameters, draw_residuals, draw_signal, figure_fit
+from rotorid.identify.records import Record
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "identify"
-UNITLESS = ("", "output")
-"""Parameters and outputs, which have names of their own."""
-
-
-def result_of(task, **options):
-    file = read_harmonic_model(FOLDER / task / "model.toml")
-    return identify(file.model, read_measurements(FOLDER / task / "data.csv", file), **options)
-
-
-@pytest.fixture(scope="module")
-def two_units(tmp_path_factory):
-    """A test in Hz whose outputs are read in mm and µm pp, with stated errors."""
-    folder = tmp_path_factory.mktemp("units")
-    (folder / "model.toml").write_text(
-        'equations = ["(10*p**2 + alpha*p + c)*X = F", "(20*p**2 + c2)*V = F"]\n'
-        'estimate = ["c", "alpha", "c2"]\n[errors]\namplitude_percent = 5\nphase_deg = 3\n',
-        encoding="utf-8",
-    )
-    rows = ["frequency_Hz,F_re,X_amplitude_mm,X_phase_deg,V_amplitude_um_pp,V_phase_deg"]
-    for f in (0.8, 1.2, 1.7, 2.2):
-        s = 2j * np.pi * f
-        X, V = 10.2 / (10 * s**2 + 60 * s + 1000), 10 / (20 * s**2 + 12500)
-        rows.append(f"{f},10,{1e3 * abs(X)},{np.degrees(np.angle(X))},{2e6 * abs(V)},0")
-    (folder / "data.csv").write_text("\n".join(rows), encoding="utf-8")
-    file = read_harmonic_model(folder / "model.toml")
-    return identify(file.model, read_measurements(folder / "data.csv", file))
-
-
-def first(result):
-    """The axes at the top of its figure."""
-    return figure_identification(result).axes[0]
 
 
 def named(figure, start):
@@ -51,62 +28,149 @@ def named(figure, start):
 def points(ax):
     """Measured points of axes, with the ends of their error bars."""
     bars = [container for container in ax.containers if container.has_yerr]
-    return [
-        (bar[0].get_xydata(), np.array([ends[:, 1] for ends in bar[2][0].get_segments()])) for bar in bars
-    ]
+    return [(bar[0].get_xydata(), np.array([e[:, 1] for e in bar[2][0].get_segments()])) for bar in bars]
 
 
-def test_measured_points_and_fitted_line_agree_with_the_result():
-    result = result_of("task_5_1")
-    axes = first(result)
-    points, crosses, line = axes.get_lines()
-    np.testing.assert_allclose(crosses.get_ydata(), np.abs(result.predicted["X"]))
-    np.testing.assert_allclose(points.get_ydata(), np.abs(result.experiments.signals["X"]))
-    x, y = line.get_data()
-    np.testing.assert_allclose(np.interp([10.0, 20.0, 30.0], x, y), np.abs(result.predicted["X"]), rtol=1e-12)
-
-
-def test_amplitudes_stand_over_frequency_in_the_units_of_the_table(two_units):
-    figure = figure_identification(two_units)
+def test_amplitudes_and_phases_in_the_units_of_the_table(tmp_path):
+    """A test in Hz whose outputs are read in mm and µm pp, with stated errors."""
+    (tmp_path / "model.toml").write_text(
+        'equations = ["(10*p**2 + alpha*p + c)*X = F", "(20*p**2 + c2)*V = F"]\n'
+        'estimate = ["c", "alpha", "c2"]\n[errors]\namplitude_percent = 5\nphase_deg = 3\n'
+    )
+    f = np.array([0.8, 1.2, 1.7, 2.2])
+    s = 2j * np.pi * f
+    X, V = 10.2 / (10 * s**2 + 60 * s + 1000), np.abs(10 / (20 * s**2 + 12500))
+    rows = np.stack([f, 10 + 0 * f, 1e3 * abs(X), np.degrees(np.angle(X)), 2e6 * V, 0 * f], 1)
+    head = "frequency_Hz,F_re,X_amplitude_mm,X_phase_deg,V_amplitude_um_pp,V_phase_deg"
+    np.savetxt(tmp_path / "data.csv", rows, "%.17g", ",", header=head, comments="")
+    file = read_harmonic_model(tmp_path / "model.toml")
+    result = identify(file.model, read_measurements(tmp_path / "data.csv", file))
+    part = result.experiments.take([0, 2])
+    assert (part.axis.word, part.units["V"].word) == ("frequency, Hz", "µm pp")
+    figure = figure_identification(result)
     mm, um = named(figure, "amplitude")
     assert [ax.get_ylabel() for ax in (mm, um)] == ["amplitude, mm peak", "amplitude, µm pp"]
-    for ax, name, scale in ((mm, "X", 1e3), (um, "V", 2e6)):
-        size = scale * np.abs(two_units.experiments.signals[name])
+    for ax, name, scale, size in ((mm, "X", 1e3, 1e3 * abs(X)), (um, "V", 2e6, 2e6 * V)):
         ((measured, ends),) = points(ax)
-        np.testing.assert_allclose(measured, np.stack(([0.8, 1.2, 1.7, 2.2], size), 1))
+        np.testing.assert_allclose(measured, np.stack((f, size), 1))
         np.testing.assert_allclose(ends, np.stack((0.9 * size, 1.1 * size), 1))
         x, y = ax.get_lines()[-1].get_data()
         assert (x[0], x[-1]) == (pytest.approx(0.8), pytest.approx(2.2))
-        np.testing.assert_allclose(
-            np.interp(measured[:, 0], x, y), scale * np.abs(two_units.predicted[name]), rtol=1e-9
-        )
-    assert named(figure, "phase")[0].get_xlabel() == "frequency, Hz"
+        predicted = scale * np.abs(result.predicted[name])
+        np.testing.assert_allclose(np.interp(f, x, y), predicted, rtol=1e-9)
+        np.testing.assert_allclose(ax.get_lines()[-2].get_ydata(), predicted)  # crosses
     (phases, ends), _ = points(named(figure, "phase")[0])
-    np.testing.assert_allclose(phases[:, 1], np.degrees(np.angle(two_units.experiments.signals["X"])))
+    np.testing.assert_allclose(phases[:, 1], np.degrees(np.angle(X)))
     np.testing.assert_allclose(ends - phases[:, 1:], np.tile([-6.0, 6.0], (4, 1)))
+    check_hygiene(figure, unitless=("", "output"))
 
 
 def test_free_vibrations_are_points_and_crosses_at_their_frequencies():
-    result = result_of("task_7_1")
-    lines = first(result).get_lines()
-    for name, points, crosses in zip(("X1", "X2", "X3"), lines[::2], lines[1::2], strict=True):
-        np.testing.assert_allclose(points.get_xdata(), result.experiments.frequencies)
-        np.testing.assert_allclose(points.get_ydata(), np.abs(result.experiments.signals[name]))
+    file = read_harmonic_model(FOLDER / "task_7_1" / "model.toml")
+    result = identify(file.model, read_measurements(FOLDER / "task_7_1" / "data.csv", file))
+    lines = figure_identification(result).axes[0].get_lines()
+    for name, read, crosses in zip(("X1", "X2", "X3"), lines[::2], lines[1::2], strict=True):
+        np.testing.assert_allclose(read.get_xdata(), result.experiments.frequencies)
+        np.testing.assert_allclose(read.get_ydata(), np.abs(result.experiments.signals[name]))
         np.testing.assert_allclose(crosses.get_ydata(), np.abs(result.predicted[name]))
 
 
-def test_units_are_kept_by_a_choice_of_experiments(tmp_path, two_units):
-    part = two_units.experiments.take([0, 2])
-    assert (part.axis.word, part.units["V"].word) == ("frequency, Hz", "µm pp")
-    lines = (FOLDER / "task_5_1" / "data.csv").read_text(encoding="utf-8").splitlines()
-    head = (
-        lines[0].replace("X_re", "X_re_mm").replace("X_im", "X_im_mm").replace("frequency_rad_s", "speed_rpm")
-    )
-    (tmp_path / "data.csv").write_text("\n".join([head, *lines[1:]]), encoding="utf-8")
-    found = read_measurements(tmp_path / "data.csv", read_harmonic_model(FOLDER / "task_5_1" / "model.toml"))
-    assert (len(found), found.axis.word, found.units["X"].word) == (3, "speed, rpm", "mm peak")
-    assert found.axis.scale * found.frequencies == pytest.approx([10, 20, 30])
+# Modes
 
 
-def test_the_picture_in_two_units_is_readable(two_units):
-    check_hygiene(figure_identification(two_units), unitless=UNITLESS)
+def curves(ax):
+    return [line.get_xydata() for line in ax.lines if len(line.get_xydata()) > 500]
+
+
+@pytest.mark.parametrize(
+    ("excitation", "share", "tolerance"), [("force", 2e-3, 1e-3), ("unbalance", 0.05, 1e-6)]
+)
+def test_circles_and_peaks_are_the_closed_form(tmp_path, excitation, share, tolerance):
+    """A mass on a spring, and half of it at another point; an unbalance grows as the square of the speed."""
+
+    def moved(w):
+        load = w**2 if excitation == "unbalance" else 144.0
+        return 1e6 * np.outer(load / (144 - w**2 + 24j * share * w), [1.0, 0.5])
+
+    omega = 12.0 * (1 + share * np.linspace(-4, 5, 15))
+    Z = moved(omega)
+    head = "frequency_Hz,X1_re_um,X1_im_um,X2_re_um,X2_im_um"
+    rows = np.column_stack((omega / 2 / np.pi, Z[:, 0].real, Z[:, 0].imag, Z[:, 1].real, Z[:, 1].imag))
+    np.savetxt(tmp_path / "a.csv", rows, "%.17g", ",", header=head, comments="")
+    options = ModesOptions(excitation=excitation, bands=[(8.0, 20.0)])
+    figure = modes(tmp_path / "a.csv", options).figure()
+    check_hygiene(figure)
+    circle, peak = figure.axes
+    assert circle.get_aspect() == 1.0
+    assert (circle.get_xlabel(), circle.get_ylabel()) == ("real part, µm peak", "imaginary part, µm peak")
+    assert (peak.get_xlabel(), peak.get_ylabel()) == ("frequency, Hz", "amplitude, µm peak")
+    marks = [[line.get_xydata() for line in ax.lines if line.get_marker() != "None"] for ax in (circle, peak)]
+    for p, (read, sizes, loop, top) in enumerate(zip(*marks, curves(circle), curves(peak), strict=True)):
+        np.testing.assert_allclose(read @ (1, 1j), Z[:, p], rtol=1e-9)
+        np.testing.assert_allclose(sizes, np.stack((omega / 2 / np.pi, abs(Z[:, p])), 1), rtol=1e-9)
+        between = moved(2 * np.pi * top[:, 0])[:, p]
+        np.testing.assert_allclose(loop @ (1, 1j), between, atol=tolerance * np.abs(between).max())
+        np.testing.assert_allclose(top[:, 1], np.abs(between), atol=tolerance * np.abs(between).max())
+
+
+# Records
+
+
+T = np.linspace(0, 3, 31)
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Three records with an input."""
+    model = ode_model({"x": "-a*x + u"}, initial={"x": 0.0}, estimate={"a": 0.7}, inputs=["u"])
+    noise = 0.01 * np.random.default_rng(1).standard_normal((4, 31))
+    return fit(model, [
+        Record(T, {"x": k * (1 - np.exp(-T)) + noise[k]}, {"u": np.full(31, k)}, name=f"runs/run_{k}.csv")
+        for k in (1, 2, 3)
+    ])  # fmt: skip
+
+
+def test_several_records_differ_by_mark_line_and_colour_in_every_panel(result):
+    figure = figure_fit(result)
+    check_hygiene(figure, unitless=("",))
+    above, _ = figure.subfigs
+    (legend,) = above.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["run_1.csv", "run_2.csv", "run_3.csv"]
+    assert [ax.get_ylabel().split(",")[0] for ax in above.axes] == ["x", "residual", "input u"]
+    assert [ax.get_xlabel() for ax in above.axes] == ["", "", "time, s"]
+    signal, residual, entered = above.axes
+    for get in ("get_color", "get_marker"):
+        seen = [getattr(key, get)() for key in legend.legend_handles]
+        assert len(set(seen)) == 3
+        for ax in (signal, residual):
+            assert seen == [getattr(line, get)() for line in ax.lines[:3]]
+    assert len({line.get_linestyle() for line in signal.lines[3:]}) == 3
+    assert [line.get_color() for line in signal.lines[3:]] == [line.get_color() for line in signal.lines[:3]]
+    assert [line.get_ydata()[0] for line in entered.lines] == [1, 2, 3]
+
+
+def test_points_are_the_record_and_lines_pass_through_the_model(result):
+    axes = Figure().add_subplot()
+    draw_signal(result, "x", axes)
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), result.records[1].outputs["x"])
+    t, y = axes.lines[4].get_data()
+    assert len(t) > 600
+    np.testing.assert_allclose(np.interp(T, t, y), result.simulations[1].y[:, 0], atol=1e-5)
+
+
+def test_residuals_stand_in_a_band_of_two_standard_deviations(result):
+    gaps = [s.y[:, 0] - r.outputs["x"] for s, r in zip(result.simulations, result.records, strict=True)]
+    stated = replace(result, records=tuple(replace(r, sigma={"x": 0.03}) for r in result.records))
+    for one, height in ((result, 2 * np.sqrt(np.mean(np.square(gaps)))), (stated, 0.06)):
+        axes = Figure().add_subplot()
+        draw_residuals(one, "x", axes)
+        np.testing.assert_array_equal(axes.lines[1].get_ydata(), gaps[1])
+        assert axes.collections[0].get_paths()[0].vertices[:, 1].max() == pytest.approx(height)
+
+
+def test_parameters_have_their_intervals_in_percent_of_their_values(result):
+    axes = Figure().add_subplot()
+    draw_parameters(result, axes)
+    ends = [bar[:, 0] for bar in axes.containers[0][2][0].get_segments()]
+    values = result.values[:, None]
+    np.testing.assert_allclose(ends, 100 * (result.estimate.ci95 - values) / np.abs(values))

@@ -4,140 +4,104 @@ import importlib.util
 
 import numpy as np
 import pytest
+from moving_mass import one_mass
 from scipy.integrate import solve_ivp
 
 import fem
+import rotorid.base.compiled
 from fem import CubicSpring, JournalBearing, MuszynskaSeal, Stop
+from rotorid.motion import rosenbrock
 from rotorid.motion.run import MotionRun, run
 from rotorid.motion.steady import begin, steady_end, synchronous_part
-from rotorid.motion.system import system
+from rotorid.motion.system import rotor_system, system
 
 REST = np.zeros(2), np.zeros(2)
 
 
-def one_mass(m, c, k, speeds=(0.0, 1e4), **more):
-    """A mass with the same damping and stiffness in both directions."""
-    unit = np.eye(2)
-    return system(
-        lambda speed: fem.Motion(m * unit, c * unit, k * unit, ("x1", "y1"), speed), np.array(speeds), **more
-    )
-
-
 def jeffcott(zeta):
     """Of unit mass, stiffness and eccentricity."""
-    return one_mass(1.0, 2 * zeta, 1.0, (0.0, 10.0), unbalance={1: 1.0})
-
-
-def largest(motion):
-    """Largest |z| and the speed where it occurs, between the samples."""
-    size = np.abs(motion.z[:, 0])
-    k = int(size.argmax())
-    t = motion.time[k - 2 : k + 3]
-    curve = np.polynomial.Polynomial.fit(t, size[k - 2 : k + 3], 4)
-    top = next(r.real for r in curve.deriv().roots() if abs(r.imag) < 1e-12 and t[1] <= r.real <= t[3])
-    return curve(top), np.interp(top, motion.time, motion.speed)
+    return one_mass(1.0, 2 * zeta, 1.0, speeds=(0.0, 10.0), unbalance=1.0)
 
 
 @pytest.mark.parametrize(
-    ("zeta", "alpha", "size", "speed"),
+    ("zeta", "speeds", "alpha", "size", "speed"),
     [
-        (0.0, 0.001, 47.15624, 1.06821),
-        (0.0, 0.005, 21.51865, 1.15244),
-        (0.0, 0.02, 11.14339, 1.30404),
-        (0.02, 0.001, 20.28373, 1.04919),
-        (0.02, 0.005, 13.99974, 1.13142),
-        (0.02, 0.02, 8.93333, 1.28490),
+        (0.0, (0.0, 1.5), 0.001, 47.15624, 1.06821),
+        (0.0, (0.0, 1.5), 0.02, 11.14339, 1.30404),
+        (0.02, (0.0, 1.5), 0.005, 13.99974, 1.13142),
+        (0.02, (2.5, 0.5), 0.005, 12.73528, 0.87777),
+        (0.02, (2.5, 0.5), 0.02, 7.52752, 0.73625),
     ],
 )
-def test_run_up_of_a_jeffcott_rotor(zeta, alpha, size, speed):
-    # issue 21: computed independently
-    found = run(jeffcott(zeta), (0.0, 1.5), 1.5 / alpha, REST, tolerance=1e-8)
-    assert largest(found) == pytest.approx((size, speed), rel=1e-6, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("alpha", "size", "speed"),
-    [(0.001, 19.36986, 0.95432), (0.005, 12.73528, 0.87777), (0.02, 7.52752, 0.73625)],
-)
-def test_run_down_of_a_jeffcott_rotor_from_steady_motion(alpha, size, speed):
-    rotor = jeffcott(0.02)
-    q, v, _ = begin(rotor, 2.5, "steady")
-    found = run(rotor, (2.5, 0.5), 2.0 / alpha, (q, v), tolerance=1e-8)
-    assert largest(found) == pytest.approx((size, speed), rel=1e-6, abs=1e-5)
+def test_run_up_from_rest_and_run_down_from_steady_motion(zeta, speeds, alpha, size, speed):
+    """Largest |z| and the speed where it occurs, between the samples; computed independently in issue 21."""
+    made = jeffcott(zeta)
+    start = REST if speeds[0] == 0 else begin(made, speeds[0], "steady")[:2]
+    motion = run(made, speeds, abs(speeds[1] - speeds[0]) / alpha, start, tolerance=1e-8)
+    sizes = np.abs(motion.z[:, 0])
+    k = int(sizes.argmax())
+    t = motion.time[k - 2 : k + 3]
+    curve = np.polynomial.Polynomial.fit(t, sizes[k - 2 : k + 3], 4)
+    top = next(r.real for r in curve.deriv().roots() if abs(r.imag) < 1e-12 and t[1] <= r.real <= t[3])
+    largest = curve(top), np.interp(top, motion.time, motion.speed)
+    assert largest == pytest.approx((size, speed), rel=1e-6, abs=1e-5)
 
 
 def test_the_error_falls_with_the_fifth_root_of_the_work():
-    # order 5 of the method, 4 of its estimate: a tolerance 1e-5 times as large takes ten times as many steps
-    rotor = jeffcott(0.05)
-    exact = run(rotor, (0.0, 3.0), 30.0, REST, tolerance=1e-13, rate=20.0)
-    errors, steps = [], []
-    for tolerance in (1e-5, 1e-7, 1e-9):
-        found = run(rotor, (0.0, 3.0), 30.0, REST, tolerance=tolerance, rate=20.0)
-        errors.append(np.abs(found.z - exact.z).max())
-        steps.append(found.steps)
-    order = np.log(errors[0] / errors[2]) / np.log(steps[2] / steps[0])
-    assert 4.5 < order < 6.0
-    assert errors[2] < 1e-8
+    """Order 5 of the method, 4 of its estimate."""
+    exact = run(jeffcott(0.05), (0.0, 3.0), 30.0, REST, tolerance=1e-13, rate=20.0)
+    runs = [run(jeffcott(0.05), (0.0, 3.0), 30.0, REST, tolerance=e, rate=20.0) for e in (1e-5, 1e-9)]
+    errors, steps = [np.abs(one.z - exact.z).max() for one in runs], [one.steps for one in runs]
+    assert 4.5 < np.log(errors[0] / errors[1]) / np.log(steps[1] / steps[0]) < 6.0
+    assert errors[1] < 1e-8
 
 
 def test_energy_of_a_free_rotor_is_kept():
-    m, k = 3.0, 2e5
-    free = one_mass(m, 0.0, k, forces=[CubicSpring(1, "", 0.0, 5e10)])
-    q, v = np.array([1e-3, 2e-4]), np.array([0.1, -0.3])
+    m, k, cubic = 3.0, 2e5, 5e10
 
     def energy(q, v):
-        r2 = q @ q
-        return m / 2 * v @ v + k / 2 * r2 + 5e10 / 4 * r2**2
+        return m / 2 * v @ v + k / 2 * q @ q + cubic / 4 * (q @ q) ** 2
 
-    found = run(free, (0.0, 0.0), 1.0, (q, v), tolerance=1e-11)
-    assert energy(found.q, found.v) == pytest.approx(energy(q, v), rel=1e-8)
+    start = np.array([1e-3, 2e-4]), np.array([0.1, -0.3])
+    free = one_mass(m, 0.0, k, forces=[CubicSpring(1, "", 0.0, cubic)])
+    motion = run(free, (0.0, 0.0), 1.0, start, tolerance=1e-11)
+    assert energy(motion.q, motion.v) == pytest.approx(energy(*start), rel=1e-8)
 
 
-def rotor():
-    return fem.Rotor(
+def test_the_steady_end_on_linear_supports_is_the_response():
+    rotor = fem.Rotor(
         length=[0.25] * 4,
         outer_diameter=0.05,
         discs=[fem.Disc(3, 30.0, 0.5, 0.3)],
         supports=[fem.Support(1, ((2e6, 1e5), (-1e5, 4e6)), 2e3), fem.Support(5, 3e6, 1e3)],
         model=fem.Model(rotary_inertia=True, gyroscopic=True),
     )
-
-
-def test_the_steady_end_on_linear_supports_is_the_response():
-    from fem import unbalance_response
-    from rotorid.motion.system import rotor_system
-
     speed, unbalance = 200.0, {3: 1e-3 * np.exp(0.4j)}
-    made = rotor_system(rotor(), speed, 210.0, unbalance=unbalance, gravity=0.0)
-    turn = 2 * np.pi / speed
-    at_rest = np.zeros(made.size)
-    found = run(made, (speed, speed), 250 * turn, (at_rest, at_rest), tolerance=1e-9, nodes=[3, 5])
-    steady = unbalance_response(rotor(), unbalance, [speed])
-    x, y = ([part[0][node - 1] for node in (3, 5)] for part in (steady.x, steady.y))
-    last = np.exp(1j * found.turned[-64:, None])
+    made = rotor_system(rotor, speed, 210.0, unbalance=unbalance, gravity=0.0)
+    rest = np.zeros(made.size), np.zeros(made.size)
+    motion = run(made, (speed, speed), 500 * np.pi / speed, rest, tolerance=1e-9, nodes=[3, 5])
+    steady = fem.unbalance_response(rotor, unbalance, [speed])
+    x, y = (part[0][[2, 4]] for part in (steady.x, steady.y))
+    last = np.exp(1j * motion.turned[-64:, None])
     expected = (x * last).real + 1j * (y * last).real
-    np.testing.assert_allclose(found.z[-64:], expected, atol=1e-6 * np.abs(expected).max())
-    at, X = synchronous_part(found)
+    np.testing.assert_allclose(motion.z[-64:], expected, atol=1e-6 * np.abs(expected).max())
+    at, X = synchronous_part(motion)
     assert at == pytest.approx(speed)
     np.testing.assert_allclose(X[-1], x, atol=1e-5 * np.abs(x).max())
-    end = steady_end(found)
+    end = steady_end(motion)
     assert end.periodic
     assert end.period * speed == pytest.approx(2 * np.pi)
     assert end.frequency == pytest.approx(speed, rel=1e-4)
 
 
 def test_a_run_through_knots_of_a_bearing_table():
-    # C and K change their slope there: against scipy, which takes them as they are
-    unit = np.eye(2)
-    rows = {0.0: (3.0, 900.0), 20.0: (1.0, 1600.0), 35.0: (6.0, 1000.0), 60.0: (2.0, 2500.0)}
-    gyroscopic = 0.1 * np.array([[0, 1], [-1, 0]])
+    """C and K change their slope there: against scipy, which takes them as they are."""
+    knots, values = np.array([0.0, 20.0, 35.0, 60.0]), np.array([[3, 900], [1, 1600], [6, 1000], [2, 2500.0]])
+    unit, gyroscopic = np.eye(2), 0.1 * np.array([[0, 1], [-1, 0]])
 
     def at(speed):
-        c, k = rows[speed]
+        c, k = values[np.searchsorted(knots, speed)]
         return fem.Motion(unit, c * unit + speed * gyroscopic, k * unit, ("x1", "y1"), speed)
-
-    table = system(at, np.array(sorted(rows)), unbalance={1: 1e-3})
-    knots, values = np.array(sorted(rows)), np.array([rows[speed] for speed in sorted(rows)])
 
     def slope(t, s):
         z, dz = complex(*s[:2]), complex(*s[2:])
@@ -147,88 +111,78 @@ def test_a_run_through_knots_of_a_bearing_table():
         a = push - (c - 0.1j * speed) * dz - k * z
         return [dz.real, dz.imag, a.real, a.imag]
 
-    found = run(table, (5.0, 59.0), 2.0, REST, tolerance=1e-9, rate=50.0)
-    exact = solve_ivp(slope, (0, 2), np.zeros(4), "DOP853", found.time, rtol=1e-11, atol=1e-14, max_step=0.01)
+    table = system(at, knots, unbalance={1: 1e-3})
+    motion = run(table, (5.0, 59.0), 2.0, REST, tolerance=1e-9, rate=50.0)
+    exact = solve_ivp(
+        slope, (0, 2), np.zeros(4), "DOP853", motion.time, rtol=1e-11, atol=1e-14, max_step=0.01
+    )
     z = exact.y[0] + 1j * exact.y[1]
-    np.testing.assert_allclose(found.z[:, 0], z, atol=1e-7 * np.abs(z).max())
+    np.testing.assert_allclose(motion.z[:, 0], z, atol=1e-7 * np.abs(z).max())
 
 
 SPEED, CLEARANCE = 100.0, 1e-4
 
 
-def rigid(mass, film, **more):
-    """A rigid rotor in a short bearing at static eccentricity 0.2, mass = m c Ω² / W."""
+def rigid(mass, film="pressure", **more):
+    """A rigid rotor in a short bearing at static eccentricity 0.2, mass = m c Ω² / W; 7.18997 is critical."""
     L, D, eta, e = 0.03, 0.1, 0.1, 0.2
     W = eta * SPEED * D * L**3 / 8 / CLEARANCE**2 * e / (1 - e * e) ** 2
     W *= np.sqrt(16 * e * e + np.pi**2 * (1 - e * e))
     bearing = JournalBearing(1, "drive end", L, D, CLEARANCE, eta, film)
-    return one_mass(mass * W / CLEARANCE / SPEED**2, 0.0, 0.0, forces=[bearing], weight={"y1": -W}, **more)
+    return one_mass(mass * W / CLEARANCE / SPEED**2, forces=[bearing], weight=float(W), **more)
 
 
-def moved(mass, film, turns, tolerance=1e-6, by=5e-6, **more):
-    made = rigid(mass, film, **more)
-    q, v, _ = begin(made, SPEED, shift={1: by})
-    return run(made, (SPEED, SPEED), turns * 2 * np.pi / SPEED, (q, v), tolerance=tolerance)
+def end_of(mass, film, turns, tolerance=1e-6):
+    """How a motion ends that begins 5 µm beside the equilibrium."""
+    made = rigid(mass, film)
+    q, v, _ = begin(made, SPEED, shift={1: 5e-6})
+    return steady_end(run(made, (SPEED, SPEED), turns * 2 * np.pi / SPEED, (q, v), tolerance=tolerance))
 
 
-@pytest.mark.parametrize("film", ["pressure", "line of centres"])
-def test_below_its_critical_mass_a_rotor_returns_to_rest(film):
-    # 7.18997 is critical
-    end = steady_end(moved(7.0, film, 1500))
+def test_below_its_critical_mass_a_rotor_returns_to_rest():
+    end = end_of(7.0, "line of centres", 1500)
     assert end.at_rest
     assert end.eccentricity == pytest.approx(np.array([[0.2, 0.2]]))
+    soon = end_of(7.0, "pressure", 40)
+    assert (soon.steady, soon.trend, soon.periodic) == (False, "decays", False)
+    assert soon.change > 0.01
 
 
 def test_above_its_critical_mass_a_rotor_ends_on_a_limit_cycle():
-    # issue 21; a looser tolerance changes neither amplitude nor frequency by a thousandth
-    ends = [steady_end(moved(8.0, "pressure", 800, tolerance)) for tolerance in (1e-6, 1e-5)]
-    for end in ends:
-        assert end.periodic
-        assert end.period * SPEED / (2 * np.pi) == pytest.approx(1 / 0.4982, abs=1e-3)
-    assert ends[0].whirl_ratio == pytest.approx(0.4982, abs=5e-5)
-    assert ends[0].eccentricity == pytest.approx(np.array([[0.8287, 0.8411]]), abs=5e-5)
-    assert ends[1].amplitude == pytest.approx(ends[0].amplitude, rel=1e-3)
-    assert ends[1].frequency == pytest.approx(ends[0].frequency, rel=1e-3)
+    """Digits of issue 21; a looser tolerance changes neither amplitude nor frequency by a thousandth."""
+    end, loose = (end_of(8.0, "pressure", 800, tolerance) for tolerance in (1e-6, 1e-5))
+    assert end.periodic
+    assert end.period * SPEED / (2 * np.pi) == pytest.approx(1 / 0.4982, abs=1e-3)
+    assert end.whirl_ratio == pytest.approx(0.4982, abs=5e-5)
+    assert end.eccentricity == pytest.approx(np.array([[0.8287, 0.8411]]), abs=5e-5)
+    assert loose.amplitude == pytest.approx(end.amplitude, rel=1e-3)
+    assert loose.frequency == pytest.approx(end.frequency, rel=1e-3)
 
 
-def test_the_end_is_not_called_steady_while_it_changes():
-    end = steady_end(moved(7.0, "pressure", 40))
-    assert not end.steady
-    assert end.trend == "decays"
-    assert not end.periodic
-    assert end.change > 0.01
-
-
-@pytest.mark.parametrize(
-    ("speed", "load", "chaotic"), [(1.1, 1.2, True), (0.9, 0.5, True), (1.6, 0.0, False), (2.4, 0.0, False)]
-)
+@pytest.mark.parametrize(("speed", "load", "chaotic"), [(1.1, 1.2, True), (1.6, 0.0, False)])
 def test_a_chaotic_rub_is_not_called_steady(speed, load, chaotic):
-    """A disc in a stop with friction; the others beat, which is steady, and do not come again either."""
+    """A disc in a stop with friction; the other beats, which is steady, and does not come again either."""
     ring = Stop(1, "", gap=1.0, stiffness=20.0, damping=0.1, friction=0.1)
-    made = one_mass(1.0, 0.1, 1.0, forces=[ring], unbalance={1: 0.4}, weight={"y1": -load})
+    made = one_mass(1.0, 0.1, 1.0, forces=[ring], unbalance=0.4, weight=load)
     q, v, _ = begin(made, speed)
     end = steady_end(run(made, (speed, speed), 150 * 2 * np.pi / speed, (q, v)))
     assert np.isnan(end.period)
-    assert end.chaotic is chaotic
-    assert end.steady is not chaotic
-    assert not end.periodic
+    assert (end.chaotic, end.steady, end.periodic) == (chaotic, not chaotic, False)
 
 
 @pytest.mark.parametrize(("damping", "trend"), [(0.01, "decays"), (-0.01, "grows")])
 def test_what_dies_down_and_what_grows_are_told_apart(damping, trend):
-    made = one_mass(1.0, damping, 1.0)
-    end = steady_end(run(made, (2.0, 2.0), 100.0, (np.array([1e-3, 0.0]), np.zeros(2))))
-    assert not end.steady
-    assert end.trend == trend
+    start = np.array([1e-3, 0.0]), np.zeros(2)
+    end = steady_end(run(one_mass(1.0, damping, 1.0), (2.0, 2.0), 100.0, start))
+    assert (end.steady, end.trend) == (False, trend)
 
 
-def told(z, turns=100.0, speed=100.0, rate=64):
-    """A motion of one node that was not computed, z over the angle of rotation."""
+def end_of_curve(z, rate=64, turns=100.0, speed=100.0):
+    """The end of a motion of one node that was not computed, z over the angle of rotation."""
     angle = np.linspace(0, 2 * np.pi * turns, int(rate * turns) + 1)
-    made = one_mass(1.0, 0.0, 1.0, unbalance={1: 1.0})
     values = np.asarray(z(angle), dtype=complex)[:, None]
-    rest = np.zeros(2)
-    return MotionRun(made, (1,), angle / speed, (speed, speed), values, rest, rest, 0.0, 1, 1e-6, "")
+    made = one_mass(1.0, 0.0, 1.0, unbalance=1.0)
+    return steady_end(MotionRun(made, (1,), angle / speed, (speed, speed), values, *REST, 0.0, 1, 1e-6, ""))
 
 
 @pytest.mark.parametrize(
@@ -247,10 +201,9 @@ def told(z, turns=100.0, speed=100.0, rate=64):
 )
 @pytest.mark.parametrize("rate", [64, 9])
 def test_what_is_called_steady(z, steady, trend, turns, rate):
-    end = steady_end(told(z, rate=rate))
+    end = end_of_curve(z, rate)
     assert end.steady is steady
-    if trend is not None:
-        assert bool(end.trend) is trend
+    assert trend in (None, bool(end.trend))
     if turns is None:
         assert not end.periodic or end.at_rest
     elif rate > 9:
@@ -258,89 +211,80 @@ def test_what_is_called_steady(z, steady, trend, turns, rate):
         assert end.period * end.speed == pytest.approx(2 * np.pi * turns)
 
 
-@pytest.mark.parametrize("ratio", [1.0, 0.4982, -1.0, -0.31, 3.0, 0.27123])
+@pytest.mark.parametrize("ratio", [1.0, 0.4982, -0.31, 3.0])
 def test_the_frequency_of_a_whirl_with_other_lines_beside_it(ratio):
-    end = steady_end(
-        told(lambda a: np.exp(1j * ratio * a) + 0.4 * np.exp(-1j * ratio * a) + 0.2 * np.exp(0.75j * a))
+    end = end_of_curve(
+        lambda a: np.exp(1j * ratio * a) + 0.4 * np.exp(-1j * ratio * a) + 0.2 * np.exp(0.75j * a)
     )
     assert end.whirl_ratio == pytest.approx(ratio, abs=1e-4)
 
 
 @pytest.mark.full
 def test_three_masses_in_two_bearings_without_mass():
-    # against scipy, where the velocities of the journals follow from the balance of forces; the issue: 1e-4
+    """Against scipy, where the velocities of the journals follow from the balance of forces."""
     L, D, c, eta = 0.05, 0.11, 1.5e-4, 0.02
-    m, W, k, e = 40.0, 40.0 * 9.81, 2e7, 2e-5
+    m, k, e, damping = 40.0, 2e7, 2e-5, 30.0
     K = k * np.array(
         [[2, -2, 0, 0, 0], [-2, 3, -1, 0, 0], [0, -1, 2, -1, 0], [0, 0, -1, 3, -2], [0, 0, 0, -2, 2]]
     )
-    M = m * np.diag([0.0, 1.0, 1.0, 1.0, 0.0])
-    two = np.kron(np.eye(2), K), np.kron(np.eye(2), M)
+    M, C, K2 = (
+        np.kron(np.eye(2), A) for A in (np.diag([0, m, m, m, 0]), np.diag([0, 1, 1, 1, 0]) * damping, K)
+    )
     names = tuple(f"{axis}{node}" for axis in "xy" for node in range(1, 6))
     made = system(
-        lambda speed: fem.Motion(two[1], 30.0 * np.kron(np.eye(2), M / m), two[0], names, speed),
+        lambda speed: fem.Motion(M, C, K2, names, speed),
         np.array([50.0, 900.0]),
         forces=[JournalBearing(node, "", L, D, c, eta) for node in (1, 5)],
-        weight={f"y{node}": -W for node in (2, 3, 4)},
+        weight={f"y{node}": -m * 9.81 for node in (2, 3, 4)},
         unbalance={3: m * e},
     )
     first, last, time = 100.0, 300.0, 0.15
-    q, v, _ = begin(made, first)
-    found = run(made, (first, last), time, (q, v))
-    alpha = (last - first) / time
-
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-
-    def film(direction, z):
-        """Force of a film that a journal presses with unit velocity, by quadrature of its pressure."""
-        phi = nodes * np.pi / 2
-        h = c - (z * np.exp(-1j * (phi + direction))).real
-        pressure = eta * L**3 * np.cos(phi) / h**3
-        return -D / 2 * np.sum(weights * np.pi / 2 * pressure * np.exp(1j * (phi + direction)))
+    alpha, (points, weights) = (last - first) / time, np.polynomial.legendre.leggauss(64)
+    phi, weights = points * np.pi / 2, weights * np.pi / 2
 
     def velocity(z, speed, force):
         """Of a journal whose film must carry a force: it depends on z' − i Ω z / 2 alone, and in scale."""
         direction = np.angle(force)
-        for _ in range(200):
-            miss = np.angle(-film(direction, z) / force)
-            direction -= miss
+        for _ in range(200):  # of the motion whose pressure, by quadrature, pushes against the force
+            turned = np.exp(1j * (phi + direction))
+            pressure = eta * L**3 * np.cos(phi) / (c - (z / turned).real) ** 3
+            film = -D / 2 * np.sum(weights * pressure * turned)
+            miss = np.angle(-film / force)
             if abs(miss) < 1e-13:
                 break
-        return np.abs(force / film(direction, z)) * np.exp(1j * direction) + 0.5j * speed * z
+            direction -= miss
+        return np.abs(force / film) * np.exp(1j * direction) + 0.5j * speed * z
 
     def slope(t, s):
         z, dz = s[:5] + 1j * s[5:10], np.zeros(5, dtype=complex)
         dz[1:4] = s[10:13] + 1j * s[13:16]
-        speed, phi, elastic = first + alpha * t, first * t + alpha * t * t / 2, -K @ z
+        speed, turned, elastic = first + alpha * t, first * t + alpha * t * t / 2, -K @ z
         for j in (0, 4):
             dz[j] = velocity(z[j], speed, elastic[j])
-        a = elastic[1:4] / m - 30.0 * dz[1:4] / m - 9.81j
-        a[1] += e * (speed**2 - 1j * alpha) * np.exp(1j * phi)
+        a = elastic[1:4] / m - damping * dz[1:4] / m - 9.81j
+        a[1] += e * (speed**2 - 1j * alpha) * np.exp(1j * turned)
         return np.concatenate([dz.real, dz.imag, a.real, a.imag])
 
-    s0 = np.concatenate([q[:5], q[5:], v[1:4], v[6:9]])
-    exact = solve_ivp(slope, (0, time), s0, "LSODA", found.time[::50], rtol=1e-8, atol=1e-12)
+    q, v, _ = begin(made, first)
+    motion = run(made, (first, last), time, (q, v))
+    s0 = np.concatenate([q, v[1:4], v[6:9]])
+    exact = solve_ivp(slope, (0, time), s0, "LSODA", motion.time[::50], rtol=1e-8, atol=1e-12)
     z = (exact.y[:5] + 1j * exact.y[5:10]).T
-    assert np.abs(found.z[::50] - z).max() < 1e-5 * np.abs(z).max()
+    assert np.abs(motion.z[::50] - z).max() < 1e-5 * np.abs(z).max()
 
 
 def test_a_shaft_that_touches_its_wall_stops_the_motion():
-    # a seal that drives the whirl: K = 0, D e growing as the fluid turns faster than the natural frequency
+    """A seal that drives the whirl: K = 0, the fluid turns faster than the natural frequency."""
     seal = MuszynskaSeal(1, "labyrinth", 0.0, 20.0, 0.0, 0.5, 2e-4, 0.5, 0.0)
     made = one_mass(1.0, 0.0, 1e4, forces=[seal])
-    found = run(made, (400.0, 400.0), 5.0, (np.array([1e-5, 0.0]), np.zeros(2)))
-    assert "touches the wall of the annular seal 'labyrinth' at node 1 after" in found.stopped
-    assert "at 3819.72 rpm" in found.stopped
-    assert found.time[-1] < 1.0
-    assert np.isfinite(found.z).all()
-    assert np.abs(found.z).max() == pytest.approx(2e-4, rel=0.05)
-    touches = float(found.stopped.split(" after ")[1].split(" s")[0])
-    assert found.time[-1] <= touches <= found.time[-1] + found.time[1]
-
-
-def test_a_motion_that_begins_beyond_a_wall_ends_at_once():
-    found = run(rigid(7.0, "pressure"), (SPEED, SPEED), 1.0, (np.array([1.2e-4, 0.0]), np.zeros(2)))
-    assert "the journal bearing 'drive end' at node 1 after 0 s" in found.stopped
+    motion = run(made, (400.0, 400.0), 5.0, (np.array([1e-5, 0.0]), np.zeros(2)))
+    assert "touches the wall of the annular seal 'labyrinth' at node 1 after" in motion.stopped
+    assert "at 3819.72 rpm" in motion.stopped
+    assert np.abs(motion.z).max() == pytest.approx(2e-4, rel=0.05)
+    touches = float(motion.stopped.split(" after ")[1].split(" s")[0])
+    assert motion.time[-1] <= touches <= motion.time[-1] + motion.time[1] < 1.0
+    beyond = run(rigid(7.0), (SPEED, SPEED), 1.0, (np.array([1.2e-4, 0.0]), np.zeros(2)))
+    assert "the journal bearing 'drive end' at node 1 after 0 s" in beyond.stopped
 
 
 @pytest.mark.parametrize(
@@ -355,9 +299,9 @@ def test_a_motion_that_begins_beyond_a_wall_ends_at_once():
     ],
 )
 def test_what_is_impossible(change, message):
-    given = {"speeds": (50.0, 60.0), "time": 1.0} | change
+    options = {"speeds": (50.0, 60.0), "time": 1.0} | change
     with pytest.raises(ValueError, match=message):
-        run(rigid(7.0, "pressure"), given.pop("speeds"), given.pop("time"), REST, **given)
+        run(rigid(7.0), options.pop("speeds"), options.pop("time"), REST, **options)
 
 
 def test_what_has_neither_mass_nor_damping():
@@ -368,17 +312,14 @@ def test_what_has_neither_mass_nor_damping():
 
 
 def test_interpreted_and_compiled_agree(monkeypatch):
-    import rotorid.base.compiled
-    import rotorid.motion.rosenbrock as compiled
-
     monkeypatch.setattr(rotorid.base.compiled, "COMPILED", False)
-    spec = importlib.util.spec_from_file_location("plain_rosenbrock", compiled.__file__)
+    spec = importlib.util.spec_from_file_location("plain_rosenbrock", rosenbrock.__file__)
     plain = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(plain)
-    made = rigid(7.5, "pressure", unbalance={1: 1e-3})
+    made = rigid(7.5, unbalance=1e-3)
     q, v, _ = begin(made, SPEED)
-    found = [run(made, (SPEED, 2 * SPEED), 0.1, (q, v))]
+    compiled = run(made, (SPEED, 2 * SPEED), 0.1, (q, v))
     monkeypatch.setattr("rotorid.motion.run.advance", plain.advance)
-    found.append(run(made, (SPEED, 2 * SPEED), 0.1, (q, v)))
-    assert found[0].steps == found[1].steps
-    np.testing.assert_allclose(found[0].z, found[1].z, rtol=1e-9)
+    interpreted = run(made, (SPEED, 2 * SPEED), 0.1, (q, v))
+    assert compiled.steps == interpreted.steps
+    np.testing.assert_allclose(compiled.z, interpreted.z, rtol=1e-9)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from book.rotor import as_printed
 
 import fem
 from rotorid import InputError, read_rotor
@@ -21,21 +20,8 @@ def task(suffix=""):
 
 
 @pytest.fixture(scope="module")
-def printed():
-    return task("_printed")
-
-
-@pytest.fixture(scope="module")
 def exact():
     return task()
-
-
-def test_the_printed_inputs(printed):
-    alpha, omega, shapes = printed
-    inputs = as_printed()
-    np.testing.assert_array_equal(alpha, inputs.alpha)
-    np.testing.assert_allclose(omega, inputs.omega, rtol=1e-12)
-    np.testing.assert_array_equal(shapes, inputs.shapes)
 
 
 def test_the_exact_inputs_are_those_of_the_rotor(exact):

@@ -4,8 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from cases import each_of
-from fem_rotors import machines, rotor23, rotors, uniform
+from fem_rotors import machines, rotor23, rotors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
@@ -153,37 +152,6 @@ def test_a_massless_shaft_with_discs_at_the_masters_is_exact_for_every_method():
     assert row_of(result, "Guyan").masses is None
 
 
-def test_guyan_holds_the_static_deflection_and_the_regression_is_reduce(methods):
-    alpha = fem.compliance(rotor23(), MASTERS)
-    np.testing.assert_allclose(row_of(methods, "Guyan").K @ alpha, np.eye(3), atol=1e-10)
-    reduction = reduce(rotor23(), MASTERS, 2)
-    row = row_of(methods, "regression, 2 modes")
-    np.testing.assert_allclose(row.masses, reduction.masses.values, rtol=1e-12)
-    np.testing.assert_allclose(row.frequencies, reduction.frequencies, rtol=1e-12)
-    np.testing.assert_allclose(row.mac, reduction.mac, rtol=1e-12)
-    assert row.T is None
-
-
-def test_weights_reach_the_regression_and_wrong_ones_are_refused():
-    relative = row_of(compare_methods(rotor23(), MASTERS, rows="relative", normalise="length"), "regression")
-    equal = row_of(compare_methods(rotor23(), MASTERS), "regression")
-    assert np.abs(relative.masses / equal.masses - 1).max() > 1e-3
-    with pytest.raises(ValueError, match="normalise must be"):
-        compare_methods(rotor23(), MASTERS, normalise="middle")
-    with pytest.raises(ValueError, match="rows must be"):
-        compare_methods(rotor23(), MASTERS, rows="heavy")
-
-
-def test_400_elements_give_the_same_model():
-    fine = fem.refined(rotor23(), 17)
-    result = compare_methods(fine, [17 * (node - 1) + 1 for node in MASTERS])
-    coarse = compare_methods(rotor23(), MASTERS)
-    assert fine.n_elements == 391
-    for a, b in zip(result.rows, coarse.rows, strict=True):
-        # the mesh itself changes the third frequency by 8e-5
-        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=2e-4)
-
-
 def test_a_singular_mass_matrix_is_said():
     """One of two masses stands on a support that hardly moves: the second master moves no mass."""
     rotor = fem.Rotor(
@@ -204,49 +172,3 @@ def test_a_singular_mass_matrix_is_said():
     assert guess.relative_error[0] == pytest.approx(0.0, abs=1e-9)
     assert np.isnan(guess.frequencies[1])
     assert np.isnan(guess.mac[1])
-
-
-@each_of(
-    ("nodes", "options", "message"),
-    [
-        ((), {}, "different nodes"),
-        ((7, 7), {}, "different nodes"),
-        ((7, 30), {}, "node 30 does not exist"),
-        ((7.5, 12), {}, "whole number"),
-        ((7, 12), {"modes": 3}, "can use 1 … 2 modes"),
-        ((7, 12), {"modes": 1.5}, "whole number"),
-        ((7, 12), {"modes": float("nan")}, "whole number"),
-        ((7, 12), {"speed": float("nan")}, "must be finite"),
-    ],
-)
-def test_bad_choices_are_refused(nodes, options, message):
-    with pytest.raises(ValueError, match=message):
-        compare_methods(rotor23(), nodes, **options)
-
-
-def test_a_free_rotor_is_refused():
-    with pytest.raises(ValueError, match="supports at two nodes"):
-        compare_methods(uniform(8), (3, 5))
-
-
-def test_the_plane_x_at_rest_is_reduced():
-    rotor = uniform(
-        8,
-        supports=[fem.Support(1, ((1e8, 2e7), (0.0, 3e8))), fem.Support(9, 1e8)],
-        stations={"middle": 5},
-    )
-    plain = uniform(8, supports=[fem.Support(1, 1e8), fem.Support(9, 1e8)])
-    how = {"normalise": "largest"}
-    a, b = compare_methods(rotor, ["middle", 7], **how), compare_methods(plain, (5, 7), **how)
-    assert a.nodes == (5, 7)
-    np.testing.assert_allclose(row_of(a, "IRS").M, row_of(b, "IRS").M, rtol=1e-9)
-
-
-def test_document(methods):
-    document = json.loads(json.dumps(methods.to_dict(), allow_nan=False))
-    assert document["nodes"] == [7, 12, 18]
-    assert [row["method"] for row in document["methods"]] == [row.name for row in methods.rows]
-    assert [row["masses_kg"] is None for row in document["methods"]] == [True, True, False]
-    np.testing.assert_allclose(document["methods"][1]["mass_matrix_kg"], row_of(methods, "IRS").M)
-    third = document["methods"][1]
-    assert third["relative_error"][2] == pytest.approx(1176.319 / 1163.805 - 1, abs=2e-6)

@@ -1,7 +1,5 @@
 """Places of equivalent masses: all choices against the one-by-one reduction, closed forms and brute force."""
 
-import json
-from itertools import combinations
 from math import comb
 
 import numpy as np
@@ -38,44 +36,31 @@ def lumped():
     return fem.Rotor([0.2] * 6, 0.05, density=0.0, discs=discs, supports=ends, stations={"gear": 4})
 
 
-def test_all_triples_of_the_reference_rotor(triples):
+def test_all_triples_of_the_reference_rotor(rotor, triples, monkeypatch):
+    """The best frequencies are a trap: their shapes are others; batches of any size give the same."""
     assert triples.considered == comb(24, 3) == 2024
-    assert triples.ranked + triples.unphysical + triples.undetermined + triples.at_node == 2024
+    r = triples.ranked
+    assert r + triples.unphysical + triples.undetermined + triples.at_node == 2024
+    assert len({tuple(row) for row in triples.nodes.tolist()}) == 2024
     assert triples.nodes[:2].tolist() == [[3, 11, 14], [9, 14, 19]]
     np.testing.assert_allclose(triples.masses[0], [317.61, 145.62, 194.64], atol=0.005)
-    assert 100 * triples.error[0] == pytest.approx(0.2975, abs=5e-5)
-    assert 100 * triples.error[1] == pytest.approx(0.728, abs=5e-4)
-    assert len({tuple(row) for row in triples.nodes.tolist()}) == 2024
-    assert (np.diff(triples.nodes, axis=1) > 0).all()
-
-
-def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
+    np.testing.assert_allclose(100 * triples.error[:2], [0.2975, 0.728], atol=5e-4)
+    assert (np.diff(triples.error[:r]) >= -1e-9).all()
+    assert np.isnan(triples.error[r:]).all()
+    assert (triples.masses[r:].min(axis=1) <= 0).all()
     assert triples.mac[0] < 0.1
     assert triples.worst_mode[0] == 3
-    answer, text = triples.answer, triples.summary()
-    assert "frequencies alone are a trap" in text
-    named = {"best by MAC": triples.best_by_mac, "compromise": triples.compromise, "the book's": triples.book}
-    lines = [
-        (next(x for x in answer.numbers.splitlines() if x.startswith(f"  {w}")), i) for w, i in named.items()
-    ]
-    lines += [(line, i) for i, line in enumerate(answer.tables[0].splitlines()[2:])]
-    assert len(lines) == 13
-    for line, i in lines:
-        error, mac, mode, condition, *rest = line.replace(",", "").split()[-10:]
-        assert mode == f"({triples.worst_mode[i]})"
-        assert [int(node) for node in rest[:3]] == triples.nodes[i].tolist()
-        assert float(error) == pytest.approx(100 * triples.error[i], abs=5.1e-5)
-        assert float(mac) == pytest.approx(triples.mac[i], abs=5.1e-5)
-        assert float(condition) == pytest.approx(triples.condition[i], rel=5.1e-3)
-        assert [float(m) for m in rest[3:]] == pytest.approx(triples.masses[i], abs=0.051)
-    assert "first nodes 3, 11, 14 (MAC 0.06)" in " ".join(text.split())
     assert 0 in triples.traps()
-    good = triples.compromise
-    assert triples.error[good] < 0.02
-    assert triples.mac[good] > 0.99
+    assert "frequencies alone are a trap" in triples.summary()
+    assert triples.error[triples.compromise] < 0.02
+    assert triples.mac[triples.compromise] > 0.99
+    monkeypatch.setattr(placement, "CHUNK", 3000)
+    again = rank_nodes(rotor)
+    np.testing.assert_array_equal(again.nodes, triples.nodes)
+    np.testing.assert_allclose(again.masses, triples.masses, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("n", "modes"), [(1, 1), (2, 2), (3, 1), (3, 2), (3, 3), (4, 2), (5, 4)])
+@pytest.mark.parametrize(("n", "modes"), [(1, 1), (2, 2), (3, 1), (4, 2), (5, 4)])
 def test_every_choice_is_that_of_the_one_by_one_reduction(rotor, n, modes):
     candidates = (2, 4, 7, 9, 12, 15, 18, 20, 23)
     result = rank_nodes(rotor, n, modes, candidates=candidates)
@@ -115,15 +100,6 @@ def test_scales_and_weights_reach_the_regression(rotor, normalise, rows):
             assert worst == pytest.approx(np.diag(mac(shapes, U)).min(), rel=1e-6)
 
 
-def test_the_order_is_that_of_the_error_and_nothing_is_ranked_by_nan(triples):
-    r = triples.ranked
-    assert np.isfinite(triples.error[:r]).all()
-    assert (np.diff(triples.error[:r]) >= -1e-9).all()
-    assert (triples.masses[:r] > 0).all()
-    assert np.isnan(triples.error[r:]).all()
-    assert (triples.masses[r:].min(axis=1) <= 0).all()
-
-
 def test_no_choice_beats_the_compromise(triples):
     error, mac_ = triples.error[: triples.ranked], triples.mac[: triples.ranked]
     for i in (triples.compromise, triples.best_by_frequency, triples.best_by_mac):
@@ -132,15 +108,9 @@ def test_no_choice_beats_the_compromise(triples):
     assert triples.best_by_mac == int(np.argmax(mac_))
 
 
-def test_small_batches_give_the_same(rotor, triples, monkeypatch):
-    monkeypatch.setattr(placement, "CHUNK", 3000)
-    again = rank_nodes(rotor)
-    np.testing.assert_array_equal(again.nodes, triples.nodes)
-    np.testing.assert_allclose(again.masses, triples.masses, rtol=1e-9)
-
-
 def test_a_rotor_that_is_three_masses_gets_them_at_its_discs(lumped):
-    for choices in ({}, {"modes": 3}, {"rows": "relative", "normalise": "length"}):
+    stations = {"modes": 2, "candidates": [5, "gear", 2, 6]}
+    for choices in ({}, {"modes": 3}, {"rows": "relative", "normalise": "length"}, stations):
         result = rank_nodes(lumped, **choices)
         assert result.nodes[0].tolist() == [2, 4, 5]
         np.testing.assert_allclose(result.masses[0], [20.0, 35.0, 10.0], rtol=1e-7)
@@ -163,25 +133,10 @@ def test_a_first_mass_at_a_node_of_a_mode_is_counted_and_not_ranked(beam):
     assert np.isfinite(other.condition).all()
 
 
-def test_modes_that_determine_no_masses_are_counted_and_not_ranked(beam, monkeypatch):
-    """Here every fit counts as one of deficient rank."""
-    monkeypatch.setattr("rotorid.reduction.masses.RCOND", 1.0)
-    result = rank_nodes(beam, 2, 1)
-    assert (result.undetermined, result.ranked) == (300 - result.at_node, 0)
-    assert np.isnan(result.masses).all()
-    assert result.best_by_frequency is result.best_by_mac is result.compromise is None
-    assert "no choice gives a physical model" in result.summary()
-    document = result.to_dict()
-    assert document["choices"] == []
-    json.dumps(document, allow_nan=False)
-
-
-def test_badly_conditioned_fits_are_said(rotor):
-    poor, fair = rank_nodes(rotor, 3, 1), rank_nodes(rotor, 3, 2)
-    assert (poor.condition[:10] > 60).any()
-    assert any("badly conditioned" in text for text in poor.warnings)
-    assert (fair.condition[:10] < 30).all()
-    assert not any("badly conditioned" in text for text in fair.warnings)
+def test_badly_conditioned_fits_are_said(rotor, triples):
+    for result, poor in ((rank_nodes(rotor, 3, 1), True), (triples, False)):
+        assert (result.condition[:10] > 60).any() == poor
+        assert any("badly conditioned" in text for text in result.warnings) == poor
 
 
 @pytest.mark.parametrize(
@@ -190,7 +145,6 @@ def test_badly_conditioned_fits_are_said(rotor):
         (1, [1 / 2]),
         (2, [1 / 4, 3 / 4]),
         (3, [1 / 4, 1 / 2, 3 / 4]),
-        (4, [1 / 8, 3 / 8, 5 / 8, 7 / 8]),
         (5, [1 / 6, 1 / 4, 1 / 2, 3 / 4, 5 / 6]),
         (6, [1 / 12, 3 / 12, 5 / 12, 7 / 12, 9 / 12, 11 / 12]),
     ],
@@ -223,69 +177,19 @@ def test_the_books_rule_needs_enough_antinodes(rotor, beam):
     assert rank_nodes(coarse, 5, 2).book is None
 
 
-def test_every_number_of_masses_up_to_every_node():
-    small = fem.Rotor([0.2] * 6, 0.05, supports=[fem.Support(1, 1e7), fem.Support(7, 2e7)])
-    for n in range(1, 8):
-        result = rank_nodes(small, n, n)
-        assert result.considered == comb(7, n)
-        assert {tuple(row) for row in result.nodes.tolist()} == set(combinations(range(1, 8), n))
-        assert result.ranked > 0
-        assert result.summary()
-    assert "One mass has no shape" in rank_nodes(small, 1, 1).summary()
-
-
-def test_stations_are_candidates_too(lumped):
-    result = rank_nodes(lumped, 3, 2, candidates=[5, "gear", 2, 6])
-    assert result.candidates == (2, 4, 5, 6)
-    assert result.nodes[0].tolist() == [2, 4, 5]
-
-
-def test_what_the_plane_at_rest_leaves_out_is_said(lumped):
-    ends = [fem.Support(1, ((1e7, 0.0), (0.0, 3e7))), fem.Support(7, 2e7)]
-    turning = fem.Rotor(lumped.length, 0.05, density=0.0, discs=lumped.discs, supports=ends)
-    result = rank_nodes(turning)
-    assert "plane x of the rotor at rest" in result.warnings[0]
-    np.testing.assert_allclose(result.masses[0], rank_nodes(lumped).masses[0], rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"n": 0}, "number of masses"),
         ({"n": 25}, "24 candidates hold 1 … 24"),
         ({"n": 2, "modes": 3}, "2 masses can use 1 … 2"),
-        ({"modes": 0}, "number of modes"),
         ({"n": 12}, "ways, more than 2000000: give fewer nodes as candidates"),
         ({"candidates": [4, 4, 7]}, "candidates must be different nodes"),
-        ({"candidates": []}, "candidates must be different nodes"),
         ({"candidates": [4, 7, 99]}, "node 99 does not exist"),
         ({"candidates": [4, 7]}, "2 candidates hold 1 … 2"),
-        ({"normalise": "second"}, "normalise"),
-        ({"rows": "heavy"}, "rows"),
         ({"speed": -1.0}, "speed must be"),
     ],
 )
 def test_bad_questions_are_refused(rotor, arguments, message):
     with pytest.raises(ValueError, match=message):
         rank_nodes(rotor, **arguments)
-
-
-def test_a_rotor_that_is_free_or_has_too_few_modes_is_refused(rotor, lumped):
-    with pytest.raises(ValueError, match="support"):
-        rank_nodes(fem.Rotor(rotor.length, rotor.outer_diameter))
-    with pytest.raises(ValueError, match="4 critical speeds cannot be found"):
-        rank_nodes(lumped, 4)
-
-
-def test_document_frame_and_text(triples):
-    document = triples.to_dict(top=5)
-    json.dumps(document, allow_nan=False)
-    assert [choice["rank"] for choice in document["choices"]] == [1, 2, 3, 4, 5]
-    assert document["best_by_frequency"]["nodes"] == [3, 11, 14]
-    assert document["book_rule"]["nodes"] == [7, 12, 18]
-    assert document["considered"] == 2024
-    frame = triples.to_frame()
-    assert len(frame) == 2024
-    assert frame["rank"].notna().sum() == triples.ranked
-    np.testing.assert_array_equal(frame[["node_1", "node_2", "node_3"]], triples.nodes)
-    np.testing.assert_array_equal(frame["largest_error"], triples.error)

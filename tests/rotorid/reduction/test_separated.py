@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import fem
 from rotorid.files import read_rotor
-from rotorid.reduction import Separated, reduce, separate
+from rotorid.reduction import Separated, separate
 from rotorid.samples import sample_data
 
 
@@ -24,21 +24,6 @@ def test_both_parts_together_are_the_compliance_of_the_rotor(rotor, nodes):
     np.testing.assert_allclose(found.compliance(c), expected, rtol=1e-9, atol=1e-9 * expected.max())
     assert found.supports == (2, 22)
     np.testing.assert_allclose(found.fractions.sum(axis=1), 1.0, rtol=1e-14)
-
-
-def test_overhung_masses_lift_the_other_support(rotor):
-    found = separate(rotor, (1, 24))
-    assert found.positions[0] < 0
-    assert found.positions[1] > found.span
-    assert found.fractions[0, 1] < 0
-    assert found.fractions[1, 0] < 0
-    assert (np.diag(found.delta) > 0).all()
-
-
-def test_a_mass_at_a_support_feels_that_support_alone(rotor):
-    found = separate(rotor, (2, 12, 22))
-    np.testing.assert_array_equal(found.delta[[0, 2]], 0.0)
-    np.testing.assert_allclose(found.fractions[[0, 2]], np.eye(2), atol=1e-15)
 
 
 @settings(max_examples=25, deadline=None)
@@ -80,15 +65,6 @@ def test_the_formula_as_printed():
             assert found[i, j] == pytest.approx(printed, rel=1e-13)
 
 
-def test_text_and_document_of_a_reduction(rotor):
-    found = reduce(rotor, (7, 12, 18), supports_apart=True)
-    document = found.to_dict()["separated"]
-    assert document["supports"] == [2, 22]
-    np.testing.assert_allclose(document["delta_m_per_N"], separate(rotor, (7, 12, 18)).delta)
-    _, first, *_ = found.answer.tables[-1].splitlines()
-    assert first.split()[:3] == ["7", "76.27", "23.73"]
-
-
 @pytest.mark.parametrize(
     ("supports", "message"),
     [
@@ -104,17 +80,3 @@ def test_text_and_document_of_a_reduction(rotor):
 def test_supports_that_equilibrium_cannot_share_are_refused(supports, message):
     with pytest.raises(ValueError, match=message):
         separate(fem.Rotor([0.25] * 4, 0.05, supports=supports), (2, 3))
-
-
-def test_two_bearings_at_one_node_are_one_support():
-    supports = [fem.Support(1, 1e8), fem.Support(1, 2e8), fem.Support(5, 1e8)]
-    beam = fem.Rotor([0.25] * 4, 0.05, supports=supports)
-    found = separate(beam, (2, 3))
-    np.testing.assert_allclose(found.compliance([3e8, 1e8]), fem.compliance(beam, (2, 3)), rtol=1e-9)
-
-
-def test_impossible_inputs_are_refused(rotor):
-    with pytest.raises(ValueError, match="different nodes"):
-        separate(rotor, (7, 7))
-    with pytest.raises(ValueError, match="node 25 does not exist"):
-        separate(rotor, (7, 25))

@@ -1,6 +1,5 @@
 """The balancing sheet: its numbers are those of the document, and it can be used without the program."""
 
-import json
 import re
 
 import numpy as np
@@ -40,14 +39,6 @@ def test_every_number_shown_is_that_of_the_document(made):
     assert disagreements(sheet.shown, sheet.document) == []
 
 
-def test_the_document_inside_is_that_of_the_command(made):
-    _, sheet, report, _ = made
-    inside = dict(sheet.document)
-    assert inside.pop("provenance")["program"] == "rotorid"
-    assert inside.pop("schema_version") == 1
-    assert inside == json.loads(json.dumps(report.to_dict()))
-
-
 def test_nothing_of_the_result_is_left_out(made):
     _, sheet, report, _ = made
     keys, document = sheet.keys, sheet.document
@@ -76,13 +67,6 @@ def test_it_says_nothing_that_no_answer_says(made):
         re.findall(FORBIDDEN, " ".join(re.sub("<script.*</script>|<[^>]*>", " ", text, flags=re.S).split()))
         == []
     )
-
-
-def test_it_refers_to_nothing_outside_and_ids_are_unique(made):
-    text, sheet, _, _ = made
-    assert text.count("http") == text.count('xmlns="http://www.w3.org/2000/svg"') >= 3
-    assert len(sheet.ids) == len(set(sheet.ids))
-    assert set(sheet.references) - {"data:,"} <= {f"#{name}" for name in sheet.ids}
 
 
 def cells(text, first):
@@ -132,10 +116,6 @@ def test_the_head_is_that_of_the_job(tmp_path):
             report.result.labels.weight(report.result.weights[0])[1] * report.result.labels.angles_on_paper
         )
         assert (np.degrees(np.angle(place)) - angle - turned) % 360 == pytest.approx(0, abs=1e-6)
-        names = {text.get_text(): complex(*text.get_position()) for text in ax.texts}
-        assert np.degrees(np.angle(names["90°"])) % 360 == pytest.approx(
-            (90 * report.result.labels.angles_on_paper + turned) % 360
-        )
 
 
 def test_removal_slow_roll_radii_and_limits(tmp_path):
@@ -155,14 +135,9 @@ def test_removal_slow_roll_radii_and_limits(tmp_path):
     first = cells(text, ("rpm", "sensor", "baseline"))[1]
     assert float(first[2]) == pytest.approx(abs(left), rel=1e-3)
     assert float(first[3].rstrip("°")) == pytest.approx(np.degrees(np.angle(left)), abs=0.06)
-    assert "Slow-roll vectors are subtracted" in text
-    assert "<dt>Radii</dt><dd>left 120 mm; middle 100 mm</dd>" in text
     limits = [line[7] for line in cells(text, ("rpm", "sensor", "before"))[1:5]]
     assert limits == ["0.8000", "–", "60.00", "–"]
     assert document["verdict"]["verdict"] != "pass"
-    assert "seen from the drive end, where the rotor turns clockwise" in text
-    assert "phase read" in text
-    assert "phases as lag" in text
     assert job.key_phasor == -40.0
     assert "stands at 40° from x" in text
     assert report.result.remove == ("middle",)
@@ -222,13 +197,3 @@ def test_pieces_are_drawn_in_their_holes():
         rows = [row for row in report.mounted.to_dict()["holes"] if row["plane"] == plane]
         angles = sorted(np.degrees(np.angle(complex(*p.center))) % 360 for p in full)
         assert angles == pytest.approx(sorted(row["angle_deg"] for row in rows), abs=1e-6)
-
-
-def test_after_a_check_run_nothing_is_mounted_twice():
-    text, _, _, _ = sheet_of(DATA / "turbo_job" / "checked.toml")
-    words = re.sub(r"\s+", " ", text)
-    assert "Check run: before, predicted and achieved" in words
-    assert words.count("trim, g·mm") == words.count("mounted, g·mm") == 4  # heading, and label of each row
-    assert "Remove every trial weight and every weight of the runs" not in words
-    before, _, _, _ = sheet_of(DATA / "turbo_job" / "job.toml")
-    assert "Remove every trial weight and every weight of the runs" in re.sub(r"\s+", " ", before)

@@ -74,21 +74,3 @@ def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
     boxes = re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", pdf)
     assert 1 <= len(re.findall(rb"/Type\s*/Page\b", pdf)) <= MOST_PAGES
     assert {(round(float(w)), round(float(h))) for w, h in boxes} == {A4}
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", ["balance two planes", "balance holes"])
-def test_three_pages_hold_a_balance_and_the_first_all_to_mount_by(browser, address, name):
-    path = address(name)
-    browser.resize(SCREEN)
-    browser.open(path)
-    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) <= 3
-    for section in ("main", "footer"):
-        browser.driver.execute_script(
-            "document.querySelectorAll(arguments[0]).forEach(e => e.remove())", section
-        )
-    first = browser.text("body")
-    for word in ("Mount these", "weights mounted", "signature"):
-        assert word in first
-    assert len(browser.tops(".discs svg")) == len(make(name).document["corrections"])
-    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) == 1

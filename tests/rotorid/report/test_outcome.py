@@ -4,7 +4,7 @@ import pytest
 from sheets import COMMANDS, disagreements, make, read_sheet
 
 from rotorid.commands.critical import CriticalOptions, critical
-from rotorid.commands.identify import IdentifyOptions, identify
+from rotorid.commands.identify import identify
 from rotorid.samples import sample_data
 
 MINE = [name for name in COMMANDS if not name.startswith("balance")]
@@ -49,10 +49,3 @@ def test_a_result_that_prints_its_own_tables_shows_these():
     page = outcome.sheet().decode()
     for block in (*outcome.tables, *outcome.more):
         assert block.splitlines()[0] in page
-
-
-def test_without_data_there_is_no_page_no_picture_and_no_table():
-    outcome = identify(sample_data() / "identify" / "task_5_1" / "model.toml", None, IdentifyOptions())
-    for work in (outcome.sheet, outcome.figure, outcome.to_frame):
-        with pytest.raises(ValueError, match="give a table"):
-            work()

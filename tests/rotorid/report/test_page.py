@@ -9,7 +9,7 @@ import jinja2
 import pytest
 from matplotlib.figure import Figure
 
-from rotorid.report.page import inline_svg, json_inside, render_report
+from rotorid.report.page import inline_svg, render_report
 
 PROVENANCE = {
     "program": "rotorid",
@@ -70,21 +70,6 @@ def test_text_is_escaped_and_the_document_cannot_end_its_element():
     assert scripts.tags.count("script") == 1
     assert "b" not in scripts.tags
     assert json.loads(scripts.found[0]) == {**document, "schema_version": 1, "provenance": PROVENANCE}
-
-
-def test_numbers_that_are_not_finite_are_refused():
-    with pytest.raises(ValueError, match="JSON compliant"):
-        json_inside({"a": float("nan")})
-
-
-def test_the_page_needs_nothing_else():
-    made = page()
-    assert made.startswith("<!doctype html>\n<html lang=")
-    for wanted in ('<meta charset="utf-8">', 'name="viewport"', '<link rel="icon" href="data:,">', "@page"):
-        assert wanted in made
-    assert "http" not in made
-    assert not re.search(r"\b(src|srcset|action|onload)=|@import|url\(", made)
-    assert made.count("<style>") == 1
 
 
 def test_a_figure_refers_to_nothing_outside_and_parses():

@@ -1,6 +1,5 @@
 """Studies: probabilities against closed forms, balancing by runs, starts of calibrations, files, pictures."""
 
-import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -14,8 +13,8 @@ from studies.drawn import SCATTER, STUDY, write
 import fem
 from rotorid import read_rotor
 from rotorid.files.problems import InputError
-from rotorid.study import UNDETERMINED, StudyOptions, study
-from rotorid.study.samples import UNSTABLE
+from rotorid.study import StudyOptions, study
+from rotorid.study.samples import UNDETERMINED, UNSTABLE
 from rotorid.study.study_file import read_study
 
 pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
@@ -24,7 +23,7 @@ TWO = STUDY.replace(
     "[planes.middle]\nnode = 3\n", "corrections = 3\n[planes.left]\nnode = 2\n[planes.right]\nnode = 4\n"
 ).replace(
     "[unbalance.3]",
-    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nmedian_g_mm = 300\n[unbalance.4]",
+    "[sensors.other]\nnode = 2\nlimit_mm_s_rms = 1.2\n[unbalance.2]\nrms_g_mm = 360\n[unbalance.4]",
 )
 
 
@@ -51,12 +50,11 @@ def test_the_probability_is_that_of_rayleigh(tmp_path):
     assert outcome.result["ratio_0"].median() == pytest.approx(median, rel=0.05)
 
 
-def test_the_median_of_rayleigh_and_a_velocity_are_as_their_units_say(tmp_path):
-    job = read_study(write(tmp_path, TWO))
-    assert job.unbalance[2] * np.sqrt(2 * np.log(2)) == pytest.approx(300e-6)
-    assert job.unbalance[4] * np.sqrt(2) == pytest.approx(500e-6)
-    turned = read_study(write(tmp_path, STUDY.replace("limit_um_pp", "angle_deg = 90\nlimit_um_pp")))
-    assert turned.sensors["probe"] == fem.Sensor(3, 90.0)
+def test_places_sizes_and_limits_are_as_their_units_say(tmp_path):
+    job = read_study(write(tmp_path, TWO.replace("limit_um_pp", "angle_deg = 90\nlimit_um_pp")))
+    assert job.nodes == (2, 4)
+    assert job.unbalance * np.sqrt(2) == pytest.approx([360e-6, 500e-6])
+    assert job.sensors["probe"] == fem.Sensor(3, 90.0)
     omega = 3000 * np.pi / 30
     assert job.gains[0] == pytest.approx([1 / 10e-6, 1j * omega / (1.2e-3 * np.sqrt(2))])
 
@@ -150,11 +148,9 @@ def test_the_command(cli, tmp_path):
     )
     assert outcome.code == 0, outcome.err
     assert {"probability", "interval", "samples"} < set(outcome.json)
-    assert json.loads(pq.read_schema(tmp_path / "kept.parquet").metadata[b"study"])["seed"] == 1
+    assert b'"seed": 1' in pq.read_schema(tmp_path / "kept.parquet").metadata[b"study"]
     assert (tmp_path / "a.png").stat().st_size > 10_000
     assert cli("study", file, "--samples", "0").code == 2
-    refused = cli("study", file, "--seed", "5", "--results", tmp_path / "kept.parquet")
-    assert (refused.code, refused.err.count("\n")) == (2, 1)
 
 
 def test_without_pyarrow_one_sentence_says_how_to_get_it(cli, tmp_path, monkeypatch):

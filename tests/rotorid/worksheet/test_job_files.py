@@ -50,7 +50,7 @@ def rows(job, table="runs"):
 def cell(job, place=0, column="phase_deg", new="90", table="runs"):
     row = rows(job, table)[place]
     old = row["cells"][job.now.tables[table].header.index(column)]
-    return {"table": table, "row": row["id"], "column": column, "old": old, "new": new}
+    return {"cell": f"{table}|{row['id']}|{column}", "old": old, "new": new}
 
 
 def plain_job(folder, text, encoding="utf-8"):
@@ -86,7 +86,7 @@ def test_an_edit_changes_its_row_alone(tmp_path, parts, typed, column):
     assert not job.now.tables["runs"].read_only
     job.apply([cell(job, 0, HEADER[column], typed)])
     held[0][column] = rows(job)[0]["cells"][column]
-    if typed[-1].isdigit() and typed[0] not in "#=" and column in (1, 3, 4):
+    if typed[-1].isdigit() and typed[0] not in "#=":
         assert float(held[0][column].replace(",", ".")) == float(typed.replace(",", "."))
     else:
         assert held[0][column].strip() == typed
@@ -110,62 +110,45 @@ def test_numbers_that_may_have_thousands_stay_as_typed_and_are_refused(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("text", "key", "new"),
+    ("text", "cell", "new", "value"),
     [
-        ("", ["planes", "a b", "holes"], 12),
-        ("runs = 'r'\r\n[errors]\r\nfloor = 1\r\n", ["phase"], "lag"),
-        ("# head\n\n[errors] # stated\n# none\n", ["errors", "floor"], 2),
-        ("planes = { a = { holes = 3 } }\n", ["planes", "a", "stock"], [1, 1, 1, 1]),
-        ("errors.floor = 1 # a remark\n", ["errors", "phase_deg"], 2),
-        ("[planes.a]\nholes = 3\n# of b\n[planes.b]\nholes = 4", ["planes", "c", "holes"], 5),
-        ("[planes.a]\nholes = 3\n[errors]\nfloor = 1\n[planes.b]\nx = 4\n", ["planes", "c", "holes"], 5),
-        ("a = 1\n# of errors\n[errors]\nfloor = 1\n", ["view"], "driven end"),
-        ("# of it\na = 1\n[errors]\nfloor = 1\n", ["errors", "floor"], None),
-        ("a = 1\n", ["planes", "left", "taken"], {"3": 10}),
+        ("", "planes|a b|holes", "12", 12),
+        ("runs = 'r'\r\n[errors]\r\nfloor = 1\r\n", "phase", "lag", "lag"),
+        ("# head\n\n[errors] # stated\n# none\n", "errors|floor", "2", 2),
+        ("planes = { a = { holes = 3 } }\n", "planes|a|stock", "1; 1; 1; 1", [1, 1, 1, 1]),
+        ("errors.floor = 1 # a remark\n", "errors|phase_deg", "2", 2),
+        ("[planes.a]\nholes = 3\n# of b\n[planes.b]\nholes = 4", "planes|c|holes", "5", 5),
+        ("# of it\na = 1\n[errors]\nfloor = 1\n", "errors|floor", "", None),
+        ("a = 1\n", "planes|left|taken", "3: 10; 7: 2,5", {"3": 10, "7": 2.5}),
+        ("a = 1\n", "planes|left|stock", "1", [1]),
     ],
 )
-def test_a_setting_is_changed_in_files_of_all_forms(tmp_path, text, key, new):
-    path = tmp_path / "job.toml"
+def test_a_setting_is_changed_in_files_of_all_forms(tmp_path, text, cell, new, value):
+    path, key = tmp_path / "job.toml", cell.split("|")
     path.write_bytes(text.encode())
     job, old = JobFiles(path), tomllib.loads(text.replace("\r\n", "\n"))
-    before = old
-    for part in key:
-        before = before.get(part) if isinstance(before, dict) else None
-    job.apply([{"key": key, "old": before, "new": new}])
+    job.apply([{"cell": cell, "new": new}])
     written = path.read_bytes().decode()
     assert [part for part in text.splitlines() if "#" in part and part not in written.splitlines()] == []
-    if key == ["view"]:
-        assert "# of errors\n[errors]" in written
     inner = found = tomllib.loads(written.replace("\r\n", "\n"))
     for part in key[:-1]:
         inner = inner.get(part, {})
-    assert inner.pop(key[-1], None) == new
-    assert job.now.settings != old
+    assert inner.pop(key[-1], None) == value
     for name in set(old) - {key[0]}:
         assert found[name] == old[name]
     job.undo()
     assert path.read_bytes() == text.encode()
 
 
-@pytest.mark.parametrize(
-    ("key", "typed", "saved"),
-    [
-        ("stock", "1; 1; 1; 1", [1, 1, 1, 1]),
-        ("stock", "1", [1]),
-        ("max_mass_g", "12,5", 12.5),
-        ("taken", "3: 10; 7: 20", {"3": 10, "7": 20}),
-    ],
-)
-def test_a_setting_is_typed_as_text(turbo, key, typed, saved):
-    job = JobFiles(turbo)
-    edit = {"key": ["planes", "left", key], "typed": True, "old": "", "new": typed}
-    job.apply([edit])
-    assert job.now.settings["planes"]["left"] == {key: saved}
-    job.apply([{**edit, "old": typed.replace(",", "."), "new": ""}])
-    assert "planes" not in job.now.settings
+def test_a_setting_that_cannot_be_added_is_refused(tmp_path):
+    text = "[planes.a]\nholes = 3\n[errors]\nfloor = 1\n[planes.b]\nx = 4\n"
+    (tmp_path / "job.toml").write_text(text)
+    with pytest.raises(ValueError, match="change it in the job file itself"):
+        JobFiles(tmp_path / "job.toml").apply([{"cell": "planes|c|holes", "new": "5"}])
+    assert (tmp_path / "job.toml").read_text() == text
 
 
-def test_steps_over_several_files_go_back_and_forth_to_the_same_bytes(turbo):
+def test_steps_over_several_files_go_back_to_the_same_bytes(turbo):
     job = JobFiles(turbo)
     versions, states = [contents(turbo)], [tables_of(job)]
     for k in range(3):
@@ -174,8 +157,8 @@ def test_steps_over_several_files_go_back_and_forth_to_the_same_bytes(turbo):
             [
                 cell(job, k, new=f"{k + 1}.5"),
                 {"table": "weights", "cells": {"run": f"w{k}", "plane": "left"}},
-                {"table": "runs", "delete": last["id"], "old": last["cells"]},
-                {"key": ["planes", "left", "radius_mm"], "old": 99 + k if k else None, "new": 100 + k},
+                {"delete": f"runs|{last['id']}"},
+                {"cell": "planes|left|radius_mm", "old": str(99 + k if k else ""), "new": f"{100 + k}"},
             ]
         )
         versions.append(contents(turbo))
@@ -185,11 +168,6 @@ def test_steps_over_several_files_go_back_and_forth_to_the_same_bytes(turbo):
         assert (contents(turbo), tables_of(job)) == (versions[k], states[k])
     with pytest.raises(ValueError, match="nothing to undo"):
         job.undo()
-    for k in (1, 2, 3):
-        job.redo()
-        assert (contents(turbo), tables_of(job)) == (versions[k], states[k])
-    with pytest.raises(ValueError, match="nothing to redo"):
-        job.redo()
     assert job.look() == []
 
 
@@ -213,7 +191,7 @@ def test_rows_are_called_by_what_they_hold_and_new_ones_stand_below_their_run(tu
     job.apply([{"table": "runs", "cells": new}])
     made = "baseline|7|probe 1|1"
     assert [row["cells"][0] for row in rows(job)][19:22] == ["baseline", "baseline", "trial 1"]
-    job.apply([{"table": "runs", "delete": fifth["id"], "old": fifth["cells"]}])
+    job.apply([{"delete": f"runs|{fifth['id']}"}])
     after = {row["id"]: row["cells"] for row in rows(job)}
     assert (set(before) - set(after), set(after) - set(before)) == ({fifth["id"]}, {made})
     assert tables_of(JobFiles(turbo)) == tables_of(job)
@@ -228,7 +206,7 @@ def test_two_programs_see_each_other_and_conflict_only_in_one_cell(turbo):
     assert [row["cells"][-1] for row in rows(two)][:2] == ["90", "90"]
     before = contents(turbo)
     with pytest.raises(Conflict, match=r"phase_deg .* '90' is there now"):
-        two.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, same])
+        two.apply([{"cell": "phase", "old": "lead", "new": "lag"}, same])
     assert contents(turbo) == before
     two.apply([{**same, "new": "90"}])
 
@@ -279,28 +257,6 @@ def test_files_outside_the_folder_are_neither_read_nor_written(turbo, tmp_path_f
     assert outside.read_bytes() == (turbo / "runs.csv").read_bytes()
 
 
-def test_a_job_file_that_is_broken_meanwhile_is_named_and_its_rows_keep_their_ids(turbo):
-    job = JobFiles(turbo)
-    ids, good = [row["id"] for row in rows(job)], (turbo / "checked.toml").read_bytes()
-    (turbo / "checked.toml").write_bytes(good + b"phase = \n")
-    assert job.look() == ["checked.toml"]
-    assert "checked.toml cannot be read" in job.now.read_only
-    with pytest.raises(ValueError, match="cannot be read"):
-        job.apply([{"key": ["view"], "old": None, "new": "driven end"}])
-    (turbo / "checked.toml").write_bytes(good)
-    assert job.look() == ["checked.toml"]
-    assert [row["id"] for row in rows(job)] == ids
-
-
-def test_rows_come_and_go_at_the_end_of_a_file(tmp_path):
-    text = "run;speed_rpm;sensor;amplitude;phase_deg\r\na;1200;s;1,5;3\r\n# end"
-    job = plain_job(tmp_path, text)
-    job.apply([{"table": "runs", "cells": {"run": "b", "amplitude": "2.25"}}])
-    assert (tmp_path / "runs.csv").read_bytes().decode() == text.replace("# end", "b;;;2,25;\r\n# end")
-    job.apply([{"table": "runs", "delete": "b|||1"}])
-    assert (tmp_path / "runs.csv").read_bytes().decode() == text
-
-
 def test_a_change_that_leaves_time_and_size_is_seen(turbo):
     job, path = JobFiles(turbo), turbo / "runs.csv"
     assert job.look() == []
@@ -326,9 +282,9 @@ def test_a_step_that_fails_names_the_file_and_leaves_nothing_behind(tmp_path, mo
 
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", replace)
-        with pytest.raises(ValueError, match="is open in Excel") as caught:
+        with pytest.raises(ValueError, match="nothing was changed") as caught:
             job.apply([{"create": "check", "header": HEADER}])
-    assert str(caught.value).startswith(tried[failing - 1])
+    assert f"{tried[failing - 1]}: expected a file that can be written" in str(caught.value)
     assert contents(tmp_path) == before
     assert job.look() == []
     job.apply([{"create": "check", "header": HEADER}])
@@ -341,7 +297,7 @@ def test_a_file_that_is_open_elsewhere_stays(turbo, name):
     (turbo / name).write_text("", encoding="utf-8")
     before = contents(turbo)
     with pytest.raises(ValueError, match=r"runs\.csv is open in .*close it there"):
-        job.apply([{"key": ["phase"], "old": "lead", "new": "lag"}, cell(job)])
+        job.apply([{"cell": "phase", "old": "lead", "new": "lag"}, cell(job)])
     assert contents(turbo) == before
     (turbo / name).unlink()
     job.apply([cell(job)])
@@ -368,19 +324,7 @@ def test_a_workbook_is_shown_and_not_edited(tmp_path):
     path = as_workbook(TURBO / "checked.toml", tmp_path / "job.xlsx")
     before = path.read_bytes()
     job = JobFiles(path)
-    assert {key: len(rows(job, key)) for key in job.now.tables} == {
-        "runs": 80,
-        "weights": 3,
-        "check": 20,
-        "check_weights": 3,
-    }
-    assert job.now.settings["phase"] == "lead"
-    assert rows(job)[0] == {
-        "id": "baseline|1220|probe 1|1",
-        "cells": ["baseline", "1220", "probe 1", "3.36", "89"],
-    }
     assert job.place("job.xlsx (sheet 'runs')", 3) == ("runs", rows(job)[1]["id"])
-    for edit in (cell(job), {"key": ["phase"], "old": "lead", "new": "lag"}):
-        with pytest.raises(ValueError, match=r"edit job\.xlsx in Excel"):
-            job.apply([edit])
+    with pytest.raises(ValueError, match=r"edit job\.xlsx in Excel"):
+        job.apply([cell(job)])
     assert path.read_bytes() == before

@@ -50,17 +50,14 @@ def test_every_number_is_that_of_the_command(shared, name, options, path, count)
     numbers = state["numbers"]
     agree(numbers, command(served.job, *options))
     if path == "corrections":  # it prints ± 32 g·mm, ± 5.8°
-        assert "left 423.0 168.9° 32 5.8" in state["words"]
+        assert "left add 423.0 168.9° 32 5.8" in state["words"]
     assert len([key for key in numbers if key.startswith(path)]) == count
 
 
-def test_an_edit_changes_one_line_and_every_number_follows(shared):
+def test_every_number_follows_an_edit(shared):
     served = shared()
-    before, numbers = (served.job.parent / "runs.csv").read_text(), served.settled()["numbers"]
+    numbers = served.settled()["numbers"]
     assert served.type(CELL, "95")[0] == 200
-    after = (served.job.parent / "runs.csv").read_text()
-    pairs = enumerate(zip(before.splitlines(), after.splitlines(), strict=True))
-    assert [k for k, (a, b) in pairs if a != b] == [1]
     now = served.settled()["numbers"]
     agree(now, command(served.job))
     assert now != numbers
@@ -89,17 +86,16 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
 @pytest.mark.parametrize(
     ("path", "body"),
     [
-        ("/edit", {"edits": [{"table": "runs", "row": "no such", "column": "run", "old": "", "new": "x"}]}),
+        ("/edit", {"edits": [{"cell": "runs|no such|run", "old": "", "new": "x"}]}),
         ("/edit", {"edits": [{"table": "nothing", "cells": {}}]}),
         ("/edit", {}),
         ("/do", {"do": "no such"}),
         ("/do", {"do": "check_run", "of": "another answer"}),
-        ("/convention?phase=up&angles=down", None),
         ("/trial", {"no_such": "1"}),
         ("/edit", "[" * 100_000),
         ("/edit", '{"edits": null}'),
         ("/edit", "{"),
-        ("/edit", '{"edits":[{"key":[],"new":1}]}'),
+        ("/edit", '{"edits":[{"cell":[],"new":1}]}'),
     ],
 )
 def test_what_a_page_should_not_ask_for_is_one_sentence(shared, path, body, monkeypatch):
@@ -129,45 +125,27 @@ def test_kill_loses_no_finished_cell(tmp_path, serve):
 
 
 @pytest.mark.full
-def test_long_work_runs_aside_and_is_given_up_when_the_input_changes(tmp_path, serve):
+def test_long_work_is_given_up_when_the_input_changes(tmp_path, serve):
     job = copy(tmp_path) / "holes.toml"
     text = job.read_text().replace("available_g_mm = [150]", "available_g_mm = [5, 7, 11, 13, 17, 19, 23]")
-    job.write_text(text.replace("stock = [5]\n", "").replace("holes = 12", "holes = 24"))
+    job.write_text(text.replace("stock = [5]\n", "").replace("holes = 12", "holes = 48"))
     served = serve(job)
-
-    def choosing():
-        state = served.state()
-        while "pieces" not in state["busy"]:
-            state = served.state(state["version"])
-        return state
-
-    assert not [key for key in choosing()["numbers"] if key.startswith("mounting")]
-    begun = time.perf_counter()
-    assert served.type(CELL, "97")[0] == 200
-    state = choosing()
-    assert time.perf_counter() - begun < 3
-    agree(state["numbers"], command(job))
-
-
-def test_what_there_is_to_look_at_and_to_print(shared):
-    served = shared("holes.toml")
-    served.settled()
-    for path in ("/picture", "/runs?speed=1220&sensor=probe%201"):
-        status, text = served.ask(path)
-        assert (status, text[:4]) == (200, "<svg"), path
-    for phase, side in itertools.product(("lead", "lag"), ("with", "against")):
-        status, text = served.ask(f"/convention?phase={phase}&angles={side}%20rotation")
-        assert (status, text.count("<svg")) == (200, 2)
-    assert "2 × 150" in served.ask("/sheet")[1]
+    time.sleep(3)
+    assert served.state()["busy"] == "computing"
+    job.write_text((sample_data() / "turbo_job" / "holes.toml").read_text())
+    state = served.noticed(0)
+    agree(state["numbers"], command(job, "--split"))
 
 
 def test_a_trial_weight_with_and_without_the_coefficients(shared):
     served = shared()
     # 10 % of the static load: 0.1 · 25.5 kg · 9.81 m/s² / (ω² · 0.1 m), ω = 2π · 50 Hz: 2.534 g
-    status, text = served.ask("/trial", {"load": "25,5", "speed": "3000", "radius": "100", "lag": ""})
+    status, text = served.ask(
+        "/trial", {"load kg": "25,5", "speed rpm": "3000", "radius mm": "100", "lag": ""}
+    )
     assert (status, "2.534 g" in text) == (200, True)
     status, text = served.ask("/trial", {"with_job": "on"})
-    assert (status, "<svg" in text) == (200, True)
+    assert (status, text[:3]) == (200, "<p>")
 
 
 def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
@@ -175,11 +153,11 @@ def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
     served.settled()
     assert served.type(CELL, "915")[0] == 200
     state = served.settled()
-    assert "phase of baseline: '915' stands here; expected" in state["words"]
+    assert "1 × phase of baseline: '915' stands here; expected" in state["words"]
     assert (f'data-go="{CELL}"' in state["html"], state["numbers"]) == (True, {})
     assert served.ask("/picture")[0] == 400
     assert served.type(CELL, "")[0] == 200
-    assert "Still missing: 1 × phase of baseline" in served.settled()["words"]
+    assert "1 × phase of baseline: still missing" in served.settled()["words"]
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
@@ -201,8 +179,9 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
     now = served.settled()
     assert now["numbers"] == before["numbers"] != {}
     assert "Warning: the check run is not finished" in now["words"]
-    assert "Still missing: 1 × amplitude of check" in now["words"]
-    assert [served.ask(path)[0] for path in ("/picture", "/sheet")] == [200, 200]
+    assert "1 × amplitude of check: still missing" in now["words"]
+    assert served.ask("/picture")[1].startswith("<svg")
+    assert ("2 × 150" in served.ask("/sheet")[1]) == (name == "holes.toml")
 
 
 def test_the_address_survives_a_restart(tmp_path, serve, monkeypatch):
@@ -223,8 +202,8 @@ def test_a_workbook_is_answered_and_not_edited(tmp_path, serve):
     state = served.settled()
     assert state["numbers"]
     assert "edit job.xlsx in Excel: what is saved there appears here" in state["words"]
-    assert state["html"].count(" disabled") > len(state["cells"])
-    status, answer = served.edit({"key": ["phase"], "old": "lead", "new": "lag"})
+    assert state["html"].count(" disabled") == len(state["cells"])
+    status, answer = served.edit({"cell": "phase", "old": "lead", "new": "lag"})
     assert (status, "edit job.xlsx in Excel" in answer["error"]) == (400, True)
 
 
@@ -254,7 +233,7 @@ def test_a_table_that_cannot_be_read_any_more_leaves_no_old_answer(tmp_path, sha
     else:
         runs.symlink_to(runs if kind == "loop" else tmp_path / "outside.csv")
     now = served.noticed(state["version"])
-    assert (now["numbers"], "trial 1: good" in now["words"]) == ({}, False)
+    assert now["numbers"] == {}
     assert "runs.csv" in now["words"]
     (runs.rmdir if kind == "folder" else runs.unlink)()
     runs.write_text(text)

@@ -1,0 +1,337 @@
+"""The small model beside the full rotor: response and stability."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from cases import each_of
+from fem_rotors import ROOT, rotor23
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from repetitions import FULL
+from small_models import compare_response, compare_stability, small_rotor, stability_threshold, whirl_of
+from whirl_rotors import whirling_rotors
+
+import fem
+import rotorid
+from rotorid.reduction import reduce
+
+NODES = (7, 12, 18)
+
+
+def book():
+    rotor = rotor23()
+    return small_rotor(rotor, NODES, reduce(rotor, NODES, 2).masses.solution)
+
+
+def compressor(nodes, modes):
+    rotor = rotorid.read_rotor(ROOT / "sample_data" / "compressor" / "rotor.toml")
+    return small_rotor(rotor, nodes, reduce(rotor, nodes, modes).masses.solution)
+
+
+def lumped(supports, *, material=0.0):
+    """A massless shaft with masses at nodes 2, 4 and 5: the small model of it is the rotor itself."""
+    masses = {2: 40.0, 4: 90.0, 5: 25.0}
+    rotor = fem.Rotor(
+        [0.2, 0.3, 0.25, 0.15, 0.3],
+        [0.05, 0.06, 0.06, 0.05, 0.05],
+        density=0.0,
+        discs=[fem.Disc(n, m) for n, m in masses.items()],
+        supports=supports,
+        material_damping=material,
+    )
+    return small_rotor(rotor, tuple(masses), [*masses.values()])
+
+
+STAND = fem.Pedestal(60.0, (8e6, 5e6), 2e3)
+BEARINGS = {
+    "springs": [fem.Support(1, 2e6), fem.Support(6, 3e6)],
+    "damped": [fem.Support(1, 2e6, 800.0), fem.Support(6, 3e6, 500.0)],
+    "whirling": [
+        fem.Support(1, ((2e6, 3e5), (-2e5, 3e6)), ((900.0, 50.0), (20.0, 700.0))),
+        fem.Support(6, 3e6, 500.0, pedestal=STAND),
+    ],
+    "tables": [
+        fem.Support(1, [2e6, 1e6, 4e6], [900.0, 700.0, 800.0], speeds=(0.0, 100.0, 900.0)),
+        fem.Support(
+            6, [((2e6, 1e5), (-1e5, 2e6)), ((3e6, 4e5), (-4e5, 3e6))], [500.0, 300.0], speeds=(0, 800)
+        ),
+    ],
+}
+
+
+# Response
+
+
+def test_reference_rotor_is_followed_as_in_the_compliance_form_of_the_book():
+    """Within 8 % of the largest entry, median below 1 %, up to 1.1 times the second critical speed."""
+    small = book()
+    cost = compare_response(small)
+    second = fem.critical_speeds(rotor23(), 2).frequencies[1]
+    assert cost.speeds[-1] == pytest.approx(1.1 * second, rel=1e-12)
+    assert cost.sizes["largest"] < 0.08
+    assert cost.sizes["median"] < 0.01
+    assert cost.warnings == ()
+    alpha, m = fem.compliance(rotor23(), NODES), np.diag(small.small.masses[small.small.masses > 0])
+    w2 = cost.speeds[:, None, None] ** 2
+    W = np.linalg.solve(np.linalg.inv(alpha) - w2 * m, w2 * np.eye(3))
+    difference = np.abs(W - cost.full) / np.abs(cost.full).max(axis=(1, 2))[:, None, None]
+    used = difference[~cost.excluded].max(axis=(1, 2))
+    assert cost.sizes["largest"] == pytest.approx(used.max(), rel=1e-8)
+    assert cost.sizes["median"] == pytest.approx(np.median(used), rel=1e-8)
+    speed, sensor, plane = cost.where
+    k = int(np.flatnonzero(cost.speeds == speed)[0])
+    at = cost.relative_difference[k, cost.sensors.index(sensor), cost.nodes.index(plane)]
+    assert at == cost.sizes["largest"] == cost.worst[~cost.excluded].max()
+
+
+def test_bands_about_critical_speeds_are_left_out():
+    cost = compare_response(book(), np.linspace(0.0, 600.0, 601), bands=0.1)
+    criticals = fem.critical_speeds(rotor23(), 2).frequencies
+    assert cost.criticals == pytest.approx(criticals)
+    near = np.any([np.abs(cost.speeds / w - 1) < 0.1 for w in criticals], axis=0)
+    np.testing.assert_array_equal(cost.excluded, near | (cost.speeds == 0))
+    assert cost.left_out[0] == pytest.approx((0.9 * criticals[0], 1.1 * criticals[0]))
+    assert np.isnan(cost.relative_difference[0]).all()
+    assert json.loads(json.dumps(cost.to_dict(), allow_nan=False))["relative_difference"][0] is None
+    narrow = compare_response(book(), cost.speeds, bands=0.02)
+    assert narrow.sizes["largest"] > cost.sizes["largest"]
+
+
+@pytest.mark.parametrize("kind", BEARINGS)
+def test_masses_that_are_lumped(kind):
+    """A massless shaft with discs: nothing is lost by the reduction, in x and in y, with phases."""
+    small = lumped(BEARINGS[kind], material=1e-5 if kind == "whirling" else 0.0)
+    cost = compare_response(small, np.linspace(3.0, 700.0, 60), bands=0.05)
+    assert cost.sizes["largest"] < 1e-8
+    size = np.abs(cost.full).max(axis=(1, 2))[:, None, None]
+    assert np.nanmax(np.abs(cost.small - cost.full) / size) < 1e-6  # in the bands, too
+    assert cost.full.shape[1] == (3 if small.rotor.symmetric else 6)
+
+
+def test_gyroscopic_rotor_with_tables():
+    """The compressor with three masses: speeds inside its tables by default, both planes."""
+    small = compressor((8, 14, 20), 1)
+    cost = compare_response(small)
+    assert cost.speeds[0] == pytest.approx(1000 * np.pi / 30)
+    assert cost.sizes["median"] < 0.03
+    assert cost.worst[cost.speeds < 0.9 * cost.criticals[0]].max() < 0.04
+    whole = fem.influence(small.rotor, (8, 14, 20), [(8, 90.0)], cost.speeds[:1]).W[0, 0]
+    assert len(cost.sensors) == 6
+    assert cost.full[0, 3] == pytest.approx(whole)
+
+
+def test_what_no_steady_response_follows_is_said():
+    q = 1e6
+    small = lumped([*BEARINGS["damped"], fem.Support(4, ((0, q), (-q, 0)), kind="seal")])
+    assert "the steady response does not exist" in " ".join(compare_response(small, [50.0, 100.0]).warnings)
+    plain = lumped(
+        [fem.Support(n, [2e6, 2e6], [500.0, 500.0], speeds=(0.0, 20.0), name="plain") for n in (1, 6)]
+    )
+    cost = compare_response(plain, [5.0, 10.0, 20.0])
+    assert not cost.criticals.size
+    assert not cost.excluded.any()
+    assert any("no band is left out" in text for text in cost.warnings)
+    with pytest.raises(ValueError, match="plain"):
+        compare_response(plain, [5.0, 30.0])
+
+
+@each_of(
+    ("speeds", "options", "message"),
+    [
+        ([10.0, 5.0], {}, "ascend"),
+        ([-1.0, 5.0], {}, "not negative"),
+        ([np.nan], {}, "finite"),
+        (["a"], {}, "numbers"),
+        ([], {}, "at least one"),
+        ([10.0], {"bands": 1.0}, "part of the critical speed"),
+        ([10.0], {"bands": np.nan}, "part of the critical speed"),
+        ([0.0, 135.0], {}, "other speeds, or narrower bands"),
+    ],
+)
+def test_bad_speeds_and_bands_are_refused(speeds, options, message):
+    with pytest.raises(ValueError, match=message):
+        compare_response(book(), speeds, **options)
+
+
+def test_modal_damping_is_left_out_of_the_comparison():
+    """The full rotor has none: what it takes away from a peak is no error of the reduction."""
+    plain = book()
+    masses = plain.small.masses[plain.small.masses > 0]
+    damped = small_rotor(plain.rotor, plain.small.massive, masses, modal_damping=(0.05, 0.05))
+    one, other = (compare_response(pair, [120.0, 135.0], bands=0.0) for pair in (plain, damped))
+    np.testing.assert_allclose(other.small, one.small, rtol=1e-12)
+    assert other.warnings[0].startswith("the modal damping of the small model is left out")
+
+
+# Stability
+
+
+MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
+STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3  # of a simply supported shaft
+CRITICAL = math.sqrt(STIFFNESS / MASS)
+
+
+def jeffcott(*supports, bearing=1e13, material=0.0, modal=()):
+    """A disc in the middle of a massless shaft, as a small rotor of one mass.
+
+    Bearings of 1e13 N/m take 2e-8 of the shaft's stiffness away: far less than the 1e-6 asked for.
+    """
+    rotor = fem.Rotor(
+        [SHAFT / 2, SHAFT / 2],
+        DIAMETER,
+        density=0.0,
+        discs=[fem.Disc(2, MASS)],
+        supports=[fem.Support(1, bearing), fem.Support(3, bearing), *supports],
+        material_damping=material,
+    )
+    return small_rotor(rotor, (2,), [MASS], modal_damping=modal)
+
+
+def growth(pair, speed):
+    """Largest Re λ / |λ| of the state space's eigenvalues: another way than the search's."""
+    values = pair.eigenvalues(speed)
+    return float((values.real / np.abs(values)).max())
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1.0])
+def test_internal_damping(ratio):
+    """c_i = β k: with c_e outside, (c_e + c_i) ω = c_i Ω at the threshold, and ω = ω0, in both models."""
+    material, expected = 1e-4, CRITICAL * (1 + ratio)
+    outside = fem.Support(2, 0.0, ratio * material * STIFFNESS)
+    cost = compare_stability(jeffcott(outside, material=material), 2.3 * expected)
+    for model in (cost.full, cost.small):
+        assert model.threshold == pytest.approx(expected, rel=1e-6)
+        assert model.frequency == pytest.approx(CRITICAL, rel=1e-6)
+        assert model.whirl_ratio == pytest.approx(1 / (1 + ratio), rel=1e-6)
+        assert (model.mode, model.direction) == (2, 1)  # backward whirl comes first
+
+
+def test_modal_damping_is_external():
+    """2 ζ ω0 m of the surroundings: stable up to ω0 (1 + 2 ζ / (β ω0))."""
+    material, ratio = 1e-4, 0.004
+    result = stability_threshold(jeffcott(material=material, modal=(ratio,)), 1000.0)
+    expected = CRITICAL * (1 + 2 * ratio / (material * CRITICAL))
+    assert result.threshold == pytest.approx(expected, rel=1e-6)
+
+
+def test_thresholds_and_decrements_of_a_lumped_rotor_are_the_rotor_s():
+    """Discs on a massless shaft with whirling tables and a pedestal."""
+    tables = [
+        [((2e6, 1e5), (-1e5, 2.4e6)), ((2e6, 2.5e6), (-2.5e6, 2.6e6))],
+        [((900.0, 0.0), (0.0, 700.0)), ((500.0, 0.0), (0.0, 600.0))],
+    ]
+    supports = [fem.Support(1, *tables, speeds=(0.0, 900.0)), fem.Support(6, 3e6, 500.0, pedestal=STAND)]
+    cost = compare_stability(lumped(supports, material=2e-6), 900.0)
+    assert cost.small.threshold == pytest.approx(cost.full.threshold, rel=1e-8)
+    assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=1e-8)
+    assert (cost.small.mode, cost.small.direction) == (cost.full.mode, cost.full.direction)
+    assert cost.small_decrement == pytest.approx(cost.full_decrement, rel=1e-6, abs=1e-9)
+    assert cost.warnings == ()
+
+
+def test_compressor():
+    """Speed-dependent bearings and a swirling seal: the small model loses stability within 3 %."""
+    pair = compressor((4, 13, 18, 22), 3)
+    cost = compare_stability(pair, 1600.0, lowest=110.0, steps=20)
+    assert cost.full.threshold == pytest.approx(1144.84, rel=1e-5)
+    assert abs(cost.relative_difference) < 0.03
+    assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=0.01)
+    at = cost.small.threshold
+    assert abs(growth(pair, at)) < 1e-9
+    assert growth(pair, 0.999 * at) < 0 < growth(pair, 1.001 * at)
+    assert np.sign(cost.small_decrement).tolist() == np.where(cost.speeds < at, 1.0, -1.0).tolist()
+    for k in (0, 10, 20):
+        values = pair.eigenvalues(cost.speeds[k])
+        values = values[values.imag > 0.1 * np.abs(values)]
+        decrements = -2 * np.pi * values.real / values.imag
+        assert cost.small_decrement[k] == pytest.approx(decrements[np.argmin(decrements)], rel=1e-7)
+        full = fem.campbell(pair.rotor, cost.speeds[k : k + 1], 8).log_decrements
+        assert cost.full_decrement[k] == pytest.approx(np.nanmin(full), rel=1e-6)
+
+
+def test_running_away_and_never_growing():
+    """A seal whose negative stiffness grows with speed pushes the disc aside where it equals the shaft's."""
+    top, series = 1000.0, STIFFNESS * 2e13 / (STIFFNESS + 2e13)  # with the bearings
+    seal = fem.Support(2, [0.0, -series / 612.0 * top], [300.0, 300.0], speeds=(0.0, top), kind="seal")
+    cost = compare_stability(jeffcott(seal), top)
+    assert cost.small.threshold == pytest.approx(612.0, rel=1e-10)
+    assert cost.small.frequency is None
+    assert np.isneginf(cost.small_decrement[cost.speeds > 612.0]).all()
+    assert json.loads(json.dumps(cost.to_dict(), allow_nan=False))["small_log_decrement"][-1] is None
+    cost = compare_stability(book(), 1000.0)
+    assert cost.full.status == cost.small.status == "stable"
+    assert cost.small.threshold is cost.relative_difference is None
+    assert np.abs([cost.full_decrement, cost.small_decrement]).max() < 1e-8
+
+
+def test_disagreement_and_another_mode_are_said():
+    q = 1e6
+    first = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), 10.0, kind="seal")), 500.0)
+    assert first.full.status == first.small.status == "unstable"
+    assert first.summary().count(": unstable already at 0 rad/s") == 2
+    calm = stability_threshold(jeffcott(modal=(0.3,)), 500.0)
+    second = dataclasses.replace(first, small=calm)
+    assert second.summary().startswith("The models DISAGREE. Full rotor: unstable already at 0 rad/s")
+    rotor = jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4).rotor
+    other = compare_stability(small_rotor(rotor, (2,), [2 * MASS]), 900.0)
+    assert "not the same mode" in " ".join(other.warnings)
+
+
+@settings(max_examples=60 if FULL else 25, deadline=None)
+@given(rotor=whirling_rotors(elements=(4, 12)), seed=st.integers(0, 2**32 - 1))
+def test_thresholds_of_random_rotors(rotor, seed):
+    """Gyroscopic, cross-coupled, tabulated, on pedestals: the state space's eigenvalues say the same."""
+    rng = np.random.default_rng(seed)
+    nodes = rng.choice(np.arange(1, rotor.n_nodes + 1), 3, replace=False)
+    pair = small_rotor(rotor, nodes.tolist(), rng.uniform(5.0, 200.0, 3))
+    result = stability_threshold(pair, 1000.0)
+    grid = np.linspace(0.0, 1000.0, 41)
+    if result.status == "stable":
+        assert max(growth(pair, speed) for speed in grid) < 1e-7
+    elif result.status == "unstable":
+        assert growth(pair, 0.0) > 0
+    else:
+        at, before = result.threshold, result.threshold * (1 - 1e-6)
+        assert max(growth(pair, speed) for speed in [*grid[grid < before], before]) < 1e-7
+        assert growth(pair, at * (1 + 1e-6)) > 0
+        if result.frequency is not None:
+            away = np.abs(pair.eigenvalues(at) - 1j * result.frequency)
+            assert away.min() < 1e-6 * result.frequency
+
+
+def test_no_motion_is_left_out():
+    """Gyroscopic moments make a support without mass oscillate, too: seven modes of three masses."""
+    rotor = fem.Rotor(
+        [0.3] * 4,
+        0.0756,
+        discs=[fem.Disc(5, 10.0, 5.0, 0.5)],
+        supports=[fem.Support(1, 1e7, 1e3), fem.Support(5, ((8e7, 7.5e7), (-7.5e7, 8e7)), 270.0)],
+        model=fem.Model(rotary_inertia=True, gyroscopic=True),
+    )
+    pair = small_rotor(rotor, (2, 3, 4), [20.0] * 3)
+    values = pair.eigenvalues(500.0)
+    expected = values[values.imag > 0.1 * np.abs(values)]
+    whirl = whirl_of(pair, np.array([500.0])).values[0]
+    whirl = whirl[np.isfinite(whirl)]
+    assert expected.size == whirl.size == 7
+    both_ways = np.where(whirl.imag > 0, whirl, whirl.conj())
+    distance = np.abs(both_ways[:, None] - expected) / np.abs(expected)
+    assert distance.min(axis=0) == pytest.approx(0.0, abs=1e-9)
+
+
+@each_of(
+    ("highest", "options", "message"),
+    [
+        (10.0, {"lowest": 20.0}, "range of speeds is empty"),
+        (10.0, {"lowest": -5.0}, "not negative"),
+        (np.nan, {}, "finite"),
+        (10.0, {"steps": 0}, "at least one step"),
+        (10.0, {"steps": 2.5}, "at least one step"),
+    ],
+)
+def test_bad_ranges_are_refused(highest, options, message):
+    with pytest.raises(ValueError, match=message):
+        compare_stability(jeffcott(), highest, **options)
