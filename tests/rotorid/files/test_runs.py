@@ -96,7 +96,7 @@ WRONG = [
         ("amplitude_um_pp", "7.2 um", "a number in um_pp, as the heading says"),
         ("amplitude_um_pp", "1e300", "between 1e-30 and 1e+30 in size"),
         ("amplitude_um_pp", -1, "an amplitude of 0 or more"),
-        ("phase_deg", 361, "a phase from -360 to 360 degrees"),
+        ("phase_deg", 361, "from -360 to 360 degrees"),
         ("speed_rpm", 0, "a speed above 0"),
         ("sensor", "", "a name"),
         ("run", "", "a name"),
