@@ -5,17 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import bruel_kjaer, limits_by_name, synthetic
-from documents import check_hygiene
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from balancing import Labels, ReadingErrors, correct, estimate_influence, trial_from_force
+from balancing import Labels, ReadingErrors, correct, estimate_influence
 from balancing.holes import equal_holes, from_list, mounting
 from balancing.plots import (
     correction_figure,
     draw_disc,
-    draw_readings,
-    trial_figure,
 )
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
@@ -81,17 +78,3 @@ def test_limits_arcs_and_many_readings():
     assert {"dashed circles: largest weights", "thick arcs: nothing can be mounted"} < names
     [arc] = [line for line in figure.axes[0].lines if line.get_linewidth() == 5 and len(line.get_xdata())]
     assert np.ptp(arc.get_xdata()) == pytest.approx(1.0)
-
-
-def test_readings_of_the_runs_and_trial_weights():
-    trials = bruel_kjaer()
-    one = replace(trials, readings=trials.readings[..., :1], sensors=trials.sensors[:1])
-    covariance = np.broadcast_to(1e-16 * np.eye(2), (len(one.runs), 1, 1, 2, 2))
-    ax = draw_readings(one, covariance, one.runs[0])
-    changes = [line for line in ax.lines if line.get_linestyle() == ":" and len(line.get_xdata())]
-    assert len(changes) == len(one.runs)
-    weight = trial_from_force("A", 300.0, 0.2, 1e4, labels=GRAMS)
-    figure = trial_figure([replace(weight, angle=angle, angle_reach=0.5) for angle in (0.3, 2.0)])
-    check_hygiene(figure)
-    tips = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
-    assert [line.get_xdata()[-1] for line in tips] == pytest.approx([0.3, 2.0])
