@@ -25,7 +25,7 @@ from balancing import Gaussian, Influence, Labels, UndeterminedError, with_param
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted, listing
-from rotorid.files.conventions import DEFAULT_TOLERANCE
+from rotorid.files.layout import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight
 from rotorid.regression import covariance_root, unstretch
 from rotorid.regression.random_effects import RandomEffects, oddness, random_effects

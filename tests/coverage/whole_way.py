@@ -26,7 +26,7 @@ from balancing import Holes, Limits, Mounted, ReadingErrors, Trials, Undetermine
 from balancing.influence import Whitening
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import Job
-from rotorid.files.conventions import Conventions
+from rotorid.files.layout import Conventions
 
 ComplexArray = NDArray[np.complex128]
 

@@ -116,9 +116,9 @@ def test_problem_in_words():
 def test_problems_are_raised_together_in_order_of_files_and_rows():
     problems = Problems()
     problems.stop()
-    problems.add("b", 5, None, None, "x")
-    problems.add("a", 9, None, None, "x")
-    problems.add("b", 2, None, None, "x")
+    problems.add("x", "b", 5)
+    problems.add("x", "a", 9)
+    problems.add("x", "b", 2)
     with pytest.raises(InputError) as caught:
         problems.stop()
     assert [(p.file, p.row) for p in caught.value.problems] == [("b", 2), ("b", 5), ("a", 9)]

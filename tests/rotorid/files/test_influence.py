@@ -279,7 +279,7 @@ def put(key, value):
 @each_of(
     ("change", "words"),
     [
-        (without("W"), "'W' is missing"),
+        (without("W"), "missing or wrong: 'W'"),
         (lambda document: document.update(schema_version=99), "needs a newer rotorid"),
         (put("W", [[[[1.0]]], [[["x"]]]]), "could not convert"),
         (put("covariance", [[[[-1.0] * 6] * 6]]), "covariance"),

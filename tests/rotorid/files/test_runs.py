@@ -138,7 +138,7 @@ WRONG += [
     ([*RUNS, ["trial 2", 1000, "B", 12.5, 290]], 8, "sensor", "B", "(row 7 has the same); repeated readings"),
     ([*TWICE, TWICE[-1]], 8, "repeat", "1", "another repeat than in row 7"),
     (RUNS[:4] + RUNS[5:], None, "sensor", None, "a reading of sensor 'B' in run 'trial 1' at 1000 rpm, as"),
-    (at_speeds(4), None, "speed_rpm", None, "1000 rpm, 1004 rpm, 1008 rpm form a chain"),
+    (at_speeds(4), None, "speed_rpm", None, "3 speeds from 1000 rpm to 1008 rpm form a chain"),
     (RUNS[1:], 1, None, None, "a header row with the names of columns, separated by , or ; or tabs: run"),
 ]
 
