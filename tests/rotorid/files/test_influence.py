@@ -198,7 +198,6 @@ def put(key, value):
 @each_of(
     ("change", "words"),
     [
-        (without("W"), "missing or wrong: 'W'"),
         (lambda document: document.update(schema_version=99), "needs a newer rotorid"),
         (put("covariance", [[[[-1.0] * 6] * 6]]), "covariance"),
         (put("run_errors", {"sizes": [], "probability": [], "level": 0, "evenly": 0}), "probabilities"),
