@@ -154,16 +154,6 @@ def test_the_books_rule_on_a_uniform_beam(beam, n, nodes):
     assert book_nodes(beam, n) == tuple(round(24 * x) + 1 for x in nodes)
 
 
-def test_the_books_rule_on_the_books_rotor(rotor, triples):
-    assert book_nodes(rotor) == (7, 12, 18)
-    assert (book_nodes(rotor, 1), book_nodes(rotor, 2)) == ((12,), (7, 18))
-    assert triples.nodes[triples.book].tolist() == [7, 12, 18]
-    np.testing.assert_allclose(triples.masses[triples.book], [134.203, 196.617, 157.083], atol=1e-3)
-    without = rank_nodes(rotor, candidates=[6, 7, 12, 14, 20])
-    assert without.book is None
-    assert "7, 12, 18 are not all among the candidates" in without.answer.brief(24)
-
-
 def test_the_books_rule_needs_enough_antinodes(rotor, beam):
     # the fourth antinode of mode 4 is on the overhang
     with pytest.raises(ValueError, match="mode 4 has 3 antinodes between the outermost supports"):

@@ -10,7 +10,7 @@ from fem_rotors import rotor23
 
 from rotorid.base.text import RPM
 from rotorid.reduction import compare_methods, reduce
-from rotorid.reduction.plots import plot_methods, plot_placement, plot_reduction, plot_running, plot_stability
+from rotorid.reduction.plots import plot_methods, plot_reduction, plot_running
 
 mpl.use("Agg")
 
@@ -63,22 +63,6 @@ def test_bars_of_the_methods_hold_errors_and_mac():
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
 
 
-def test_the_map_holds_every_physical_choice_and_its_names():
-    """Four choices, the last without a physical model."""
-    ax = plot_placement(SimpleNamespace(
-        nodes=np.array([[3, 11], [4, 10], [7, 12], [1, 2]]),
-        error=np.array([0.003, 0.011, 0.08, np.nan]),
-        mac=np.array([0.06, 0.99, 0.97, np.nan]),
-        condition=np.array([24.0, 17.0, 18.0, 900.0]),
-        considered=4, check=2, rotor=rotor23(),
-        named={"best_by_frequency": 0, "best_by_mac": 1, "compromise": 1, "book_rule": 2},
-    ))  # fmt: skip
-    points = ax.collections[0]
-    np.testing.assert_allclose(points.get_offsets(), [(0.03, 8.0), (0.01, 1.1), (0.94, 0.3)])
-    np.testing.assert_allclose(points.get_array(), [18.0, 17.0, 24.0])
-    check_hygiene(ax.figure, unitless=["condition number of the regression"])
-
-
 def test_both_responses_and_their_difference_over_speed():
     speeds = np.linspace(0.0, 300.0, 61)
     full = speeds**2 / np.abs(100.0**2 - speeds**2 + 200j * 10)
@@ -102,19 +86,3 @@ def test_both_responses_and_their_difference_over_speed():
         band = panel.patches[0].get_path().get_extents(panel.patches[0].get_patch_transform())
         assert (band.x0, band.x1) == pytest.approx((90.0 * RPM, 110.0 * RPM))
     check_hygiene(ax.figure)
-
-
-def test_decrements_and_thresholds_of_both_models():
-    speeds = np.linspace(0.0, 400.0, 41)
-    full, small = (0.01 * (1 - speeds / w) for w in (200.0, 210.0))
-    ax = plot_stability(SimpleNamespace(
-        speeds=speeds, full_decrement=full, small_decrement=small, nodes=(7, 12, 18),
-        full=SimpleNamespace(threshold=200.0), small=SimpleNamespace(threshold=210.0),
-    ))  # fmt: skip
-    labels = ["full rotor, unstable from 1910 rpm", "3-mass model, unstable from 2005 rpm"]
-    assert legend_of(ax) == labels
-    lines = {line.get_label(): line.get_ydata() for line in ax.get_lines()}
-    np.testing.assert_array_equal([lines[label] for label in labels], [full, small])
-    marks = [line.get_xdata()[0] for line in ax.get_lines() if list(line.get_ydata()) == [0.0]]
-    assert marks == pytest.approx([200.0 * RPM, 210.0 * RPM])
-    check_hygiene(ax.figure, unitless=["smallest logarithmic decrement\n(below 0 a motion grows)"])
