@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import bruel_kjaer, limits_by_name, synthetic
+from documents import check_hygiene
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from balancing import Labels, ReadingErrors, correct, estimate_influence
+from balancing import Labels, ReadingErrors, correct, estimate_influence, trial_from_force
 from balancing.holes import equal_holes, from_list, mounting
 from balancing.plots import (
     correction_figure,
     draw_disc,
+    trial_figure,
 )
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
@@ -78,3 +80,11 @@ def test_limits_arcs_and_many_readings():
     assert {"dashed circles: largest weights", "thick arcs: nothing can be mounted"} < names
     [arc] = [line for line in figure.axes[0].lines if line.get_linewidth() == 5 and len(line.get_xdata())]
     assert np.ptp(arc.get_xdata()) == pytest.approx(1.0)
+
+
+def test_trial_weights():
+    weight = trial_from_force("A", 300.0, 0.2, 1e4, labels=GRAMS)
+    figure = trial_figure([replace(weight, angle=angle, angle_reach=0.5) for angle in (0.3, 2.0)])
+    check_hygiene(figure)
+    tips = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
+    assert [line.get_xdata()[-1] for line in tips] == pytest.approx([0.3, 2.0])
