@@ -69,21 +69,6 @@ def decay_record(n=41, error=0.01, seed=0, **options):
     return Record(t, {"x": 2.0 * np.exp(-0.8 * t) + noise}, **options)
 
 
-def fitzhugh_nagumo():
-    return ode_model(
-        {"V": "c*(V - V**3/3 + R)", "R": "-(V - a + b*R)/c"},
-        initial={"V": -1.0, "R": 1.0},
-        estimate={"a": 0.5, "b": 0.5, "c": 5.0},
-    )
-
-
-def fitzhugh_nagumo_record():
-    t, rng = np.linspace(0.0, 20.0, 201), np.random.default_rng(1)
-    y = simulate(fitzhugh_nagumo(), [0.2, 0.2, 3.0], t, sensitivities=False).y
-    y = y + 0.05 * rng.standard_normal(y.shape)
-    return Record(t, {"V": y[:, 0], "R": y[:, 1]})
-
-
 def motion_in(path, values=()):
     """M, C and K of a model file, its parameters at their starting values or at these."""
     said = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -9,8 +9,6 @@ from repetitions import FULL
 from timedomain_cases import (
     CHAIN_ERRORS,
     CHAIN_OPTIMUM,
-    book_model,
-    book_record,
     chain,
     chain_record,
     decay,
@@ -225,10 +223,9 @@ def test_epsilon_ends_at_the_first_step_or_integral_below_it(method, tolerance):
     np.testing.assert_array_equal(result.history[:, 0], every.history[: first + 1, 0])
 
 
-@pytest.mark.parametrize("method", ["gauss-newton", "quasilinearization"])
-def test_the_integral_has_its_step(method):
+def test_the_integral_has_its_step():
     """I(β) of [F]: the sum of squares times Δt = 0.1, the exact first sample apart."""
-    result = decaying(0.2, method)
+    result = decaying(0.2)
     r = result.simulations[0].x[:, 0] - result.records[0].outputs["x"]
     assert result.integrals[-1] == pytest.approx(0.1 * float(r[1:] @ r[1:]), rel=1e-12)
     assert len(result.integrals) == len(result.history) == result.iterations + 1
@@ -240,15 +237,6 @@ def test_a_stop_far_from_the_minimum_is_no_estimate():
     assert "the next step still matters; lower --tolerance" in coarse.message
     assert fine.converged
     assert abs(fine.values[0] - decaying(0.01).values[0]) < 0.1 * fine.std[0]
-
-
-def test_quasilinearization_of_q():
-    """With error control the truth; the tables of the print are in tests/book."""
-    result = fit(book_model(), book_record(), method="quasilinearization")
-    assert result.iterations <= 7
-    assert result.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
-    assert result.warnings == ()
-    np.testing.assert_allclose(result.trajectories[-1][0], result.simulations[0].x, atol=1e-6)
 
 
 def test_quasilinearization_of_several_records_with_gaps_and_uneven_times():
