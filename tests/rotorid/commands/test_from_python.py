@@ -166,16 +166,3 @@ def test_names_of_methods_are_checked(option):
 def test_options_that_cannot_be(options):
     with pytest.raises(ValueError, match="--"):
         balance(TURBO, BalanceOptions(**options))
-
-
-def test_check_runs_refine_combined_coefficients_too(tmp_path):
-    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
-        (tmp_path / name).write_bytes(TURBO.with_name(name).read_bytes())
-    (tmp_path / "rotor.csv").write_bytes(MODEL_JOB.with_name("rotor.csv").read_bytes())
-    tables = 'weights = "weights.csv"\ncheck = "check.csv"\ncheck_weights = "check_weights.csv"\n'
-    (tmp_path / "job.toml").write_text(tables + MODEL_JOB.read_text())
-    checked = balance(tmp_path / "job.toml", BalanceOptions(coefficients="combined"))
-    refined = balance(tmp_path / "job.toml", BalanceOptions(coefficients="combined", refine=True))
-    assert checked.left.word == "trim"
-    assert checked.left.trim == pytest.approx(refined.result.to_add, rel=1e-6)
-    assert abs(refined.result.weights - checked.result.weights).max() > 1e-6
