@@ -7,7 +7,7 @@ import pytest
 from documents import same
 
 from rotorid.commands.balance import BalanceOptions, balance
-from rotorid.commands.fit import FitOptions, choices, fit
+from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
@@ -154,12 +154,6 @@ def test_without_data_there_are_the_equations_alone(cli):
     shown = cli("identify", TASK[0], "--show", "equations").out.replace("\u00a0", " ")
     assert "Re eq. 1  Re X·c - ω·Im X·alpha = F + m·ω²·Re X" in shown
     assert "Im eq. 1  Im X·c + ω·Re X·alpha = m·ω²·Im X" in shown
-
-
-@pytest.mark.parametrize("option", choices())
-def test_names_of_methods_are_checked(option):
-    with pytest.raises(ValueError, match=f"--{option} 'none such' is not known: one of "):
-        fit(QUASI[0], QUASI[1:], FitOptions(**{option: "none such"}))
 
 
 @pytest.mark.parametrize("options", [{"ridge": -1.0}, {"ridge": math.inf}, {"split": True, "ridge": 0.1}])
