@@ -103,20 +103,6 @@ def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
             np.testing.assert_allclose(right, BEST, atol=0.1 * np.abs(BEST).max())
 
 
-def test_weights_in_line_cannot_tell(cli, tmp_path):
-    files = shop(tmp_path, [*ON_AXIS, {"left": (2, 180)}], noise=0.02)
-    document = cli("balance", *files, "--json").json
-    assert document["convention_test"]["verdict"] == "weights in line"
-    assert "stand on one line through the shaft" in document["assumptions"][1]
-    line = [*OFF_AXIS, {"left": (2, 220), "right": (3, 70)}]
-    document = cli("balance", *shop(tmp_path, line, noise=0.02), "--angles", "with rotation", "--json").json
-    assert document["convention_test"]["verdict"] == "weights in line"
-    for p, at in enumerate((40, 250)):  # mirrored about the line of the plane
-        one, two = document["corrections"][p], document["other_readings"][p]
-        turned = (one["angle_deg"] + two["angle_deg"] - 2 * at + 180) % 360
-        assert turned == pytest.approx(180, abs=1e-6)
-
-
 @pytest.mark.parametrize("assumed", [True, False])
 def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
     """Weights mounted as proposed, in the wrong place: the check run says why."""

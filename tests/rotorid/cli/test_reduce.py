@@ -126,15 +126,6 @@ def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equation
         assert found.json["parameters"][name]["value"] == pytest.approx(one["value"], rel=1e-4), name
 
 
-def test_kept_supports_take_no_masses(cli, tmp_path):
-    words = ("--place", "compromise", "--masses", 2, "--keep-supports", "--json")
-    ranked = cli("reduce", MOTION / "rotor.toml", *words).json
-    assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
-    path = tmp_path / "small.toml"
-    cli("reduce", ROTOR, "--nodes", "7,12,18", "--keep-supports", "--output", path)
-    assert read_small_model(path).supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
-
-
 def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):
     base = f'shaft = "{ROTOR}"\n[[seal]]\nnode = 12\nstiffness_N_per_m = 2e6\n'
     path = tmp_path / "sealed.toml"

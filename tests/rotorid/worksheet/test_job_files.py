@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from workbook_jobs import as_workbook
 
 from rotorid.files import disk
 from rotorid.files.columns import read_grid
@@ -314,13 +313,3 @@ def test_tables_of_other_forms_are_shown_but_not_edited(tmp_path):
     assert rows(job)[0]["cells"] == ["1200", "3,5", "20"]
     with pytest.raises(ValueError, match="other columns"):
         job.apply([cell(job, 0, "Ampl", "4")])
-
-
-def test_a_workbook_is_shown_and_not_edited(tmp_path):
-    path = as_workbook(TURBO / "checked.toml", tmp_path / "job.xlsx")
-    before = path.read_bytes()
-    job = JobFiles(path)
-    assert job.place("job.xlsx (sheet 'runs')", 3) == ("runs", rows(job)[1]["id"])
-    with pytest.raises(ValueError, match=r"edit job\.xlsx in Excel"):
-        job.apply([cell(job)])
-    assert path.read_bytes() == before
