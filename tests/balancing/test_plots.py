@@ -14,7 +14,6 @@ from balancing.holes import equal_holes, from_list, mounting
 from balancing.plots import (
     correction_figure,
     draw_disc,
-    draw_readings,
     trial_figure,
 )
 
@@ -83,13 +82,7 @@ def test_limits_arcs_and_many_readings():
     assert np.ptp(arc.get_xdata()) == pytest.approx(1.0)
 
 
-def test_readings_of_the_runs_and_trial_weights():
-    trials = bruel_kjaer()
-    one = replace(trials, readings=trials.readings[..., :1], sensors=trials.sensors[:1])
-    covariance = np.broadcast_to(1e-16 * np.eye(2), (len(one.runs), 1, 1, 2, 2))
-    ax = draw_readings(one, covariance, one.runs[0])
-    changes = [line for line in ax.lines if line.get_linestyle() == ":" and len(line.get_xdata())]
-    assert len(changes) == len(one.runs)
+def test_trial_weights():
     weight = trial_from_force("A", 300.0, 0.2, 1e4, labels=GRAMS)
     figure = trial_figure([replace(weight, angle=angle, angle_reach=0.5) for angle in (0.3, 2.0)])
     check_hygiene(figure)

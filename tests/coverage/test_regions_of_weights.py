@@ -54,15 +54,6 @@ def test_assumed_errors_that_are_not_too_small():
     assert np.mean(inside) >= lowest_share(len(inside), 0.93)
 
 
-def test_errors_in_common_taken_as_independent_are_noticed(monkeypatch):
-    """The bounds refuse the wrong model: every error between runs its own."""
-    monkeypatch.setattr("balancing.errors.OWN_SHARES", np.ones(1))
-    n = 500 if FULL else 180
-    found = [one for kind in example.KINDS[2:] for one in example.simulate(n // 3, "stated", kind)]
-    inside = silent(found)
-    assert np.mean(inside) < lowest_share(len(inside), 0.92)
-
-
 def test_the_tables_are_printed(capsys):
     example.main(8)
     assert sure.titles(capsys.readouterr().out) == sure.titles("".join(sure.blocks("balance")))

@@ -41,17 +41,6 @@ def bruel_kjaer(**options):
     return job(readings, [[0, 0], [2.5 * GRAM, 0], [0, 2.5 * GRAM]], **options)
 
 
-def feese_grazier(**options):
-    """Four probes, two planes; the first trial weight stays in."""
-    readings = [
-        [polar(0.68, 32), polar(0.56, 86), polar(1.94, 231), polar(2.07, 335)],
-        [polar(1.31, 1), polar(1.25, 75), polar(0.93, 251), polar(1.00, 342)],
-        [polar(0.54, 9), polar(0.52, 75), polar(0.81, 196), polar(0.90, 296)],
-    ]
-    first, second = polar(11.1, 35) * GRAM, polar(3.7, 135) * GRAM
-    return job(readings, [[0, 0], [first, 0], [first, second]], **options)
-
-
 def synthetic(rng, *, planes=2, sensors=4, speeds=3, weights=None, **options):
     """An exact linear rotor: trials, its W (S, C, P) and Y₀ (S, C)."""
     W = complex_normal(rng, (speeds, sensors, planes)) * 1e3

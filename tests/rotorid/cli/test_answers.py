@@ -96,9 +96,3 @@ def test_half_a_table_of_weights_is_never_shown():
     assert "plane" not in told
     assert "8 more lines: --table." in told
     assert len(told.splitlines()) <= 24
-
-
-def test_another_table_is_cut_by_rows():
-    told = Answer("Judged.", "\n".join(map(str, range(20)))).brief()
-    assert len(told.split()) - len(["10", "more", "lines:", "--table."]) == 11
-    assert told.endswith("9\n\n10 more lines: --table.")

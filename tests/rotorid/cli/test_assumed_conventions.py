@@ -7,13 +7,11 @@ without a word about either, or with the wrong one.
 from __future__ import annotations
 
 import numpy as np
-import openpyxl
 import pytest
 from tables_data import write_csv
 
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import write_influence
-from rotorid.samples import sample_data
 
 RNG = np.random.default_rng(15)
 SPEEDS, SENSORS, PLANES = (1200, 1800), ("A", "B"), ("left", "right")
@@ -80,22 +78,6 @@ def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
             assert (one["angle_deg"] + two["angle_deg"] + 180) % 360 == pytest.approx(180, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("given", "assumed"),
-    [(("lead", None), ["angles"]), ((None, "against"), ["phase"]), ((None, None), ["phase", "angles"])],
-)
-def test_each_word_that_is_missing_is_named(cli, tmp_path, given, assumed):
-    """The other reading is what the command prints with the other word."""
-    files = shop(tmp_path, OFF_AXIS)
-    document = cli("balance", *files, *said(*given), "--json").json
-    assert document["conventions"]["assumed"] == assumed
-    phase, angles = given
-    turned = ("lag", angles) if phase is None else (phase, "against")
-    expected = cli("balance", *files, *said(*turned), "--json").json["corrections"]
-    for row, other in zip(expected, document["other_readings"], strict=True):
-        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
-
-
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("errors", [(), ("--errors", "2,1.15")])
 def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
@@ -119,33 +101,6 @@ def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
         if given[0] is None:
             right = on_the_tape(outcome.json["other_readings"], "with")
             np.testing.assert_allclose(right, BEST, atol=0.1 * np.abs(BEST).max())
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(("phase", "given"), [("lead", (None, "with")), ("lag", ("lag", None))])
-def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
-    """No other angles, then; and nothing at all where everything is stated."""
-    files = shop(tmp_path, TELLING, phase, "with", noise=0.02, seed=seed)
-    document = cli("balance", *files, *said(*given), "--json").json
-    assert document["convention_test"]["verdict"] == "confirmed"
-    assert document["other_readings"] == []
-    name = "lead" if given[0] is None else "with rotation"
-    assert document["assumptions"][1].startswith(f"The runs themselves confirm '{name}': χ² ")
-    assert not any("contradict" in words for words in document["warnings"])
-
-
-def test_weights_in_line_cannot_tell(cli, tmp_path):
-    files = shop(tmp_path, [*ON_AXIS, {"left": (2, 180)}], noise=0.02)
-    document = cli("balance", *files, "--json").json
-    assert document["convention_test"]["verdict"] == "weights in line"
-    assert "stand on one line through the shaft" in document["assumptions"][1]
-    line = [*OFF_AXIS, {"left": (2, 220), "right": (3, 70)}]
-    document = cli("balance", *shop(tmp_path, line, noise=0.02), "--angles", "with rotation", "--json").json
-    assert document["convention_test"]["verdict"] == "weights in line"
-    for p, at in enumerate((40, 250)):  # mirrored about the line of the plane
-        one, two = document["corrections"][p], document["other_readings"][p]
-        turned = (one["angle_deg"] + two["angle_deg"] - 2 * at + 180) % 360
-        assert turned == pytest.approx(180, abs=1e-6)
 
 
 @pytest.mark.parametrize("assumed", [True, False])
@@ -184,32 +139,5 @@ def test_stored_coefficients(cli, tmp_path):
     assert document["conventions"]["phase"] == "lag"
     np.testing.assert_allclose(on_the_tape(document["corrections"], "with"), BEST, rtol=1e-6)
     expected = cli("balance", day, "--influence", stored, "--phase", "lead", "--json").json["corrections"]
-    for row, other in zip(expected, document["other_readings"], strict=True):
-        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
-
-
-def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
-    shop(tmp_path, ON_AXIS)
-    job, page, book = tmp_path / "job.toml", tmp_path / "sheet.html", tmp_path / "sheet.xlsx"
-    planes = "".join(f"[planes.{p}]\nholes = 8\navailable_g = [1, 2]\n" for p in PLANES)
-    job.write_text('runs = "runs.csv"\nweights = "weights.csv"\n' + planes, encoding="utf-8")
-    cli("balance", job, "--split", "--report", page, "--output", book)
-    assert "<strong>If lag or against:</strong>" in page.read_text(encoding="utf-8")
-    sheets = openpyxl.load_workbook(book)
-    assert sheets["results other readings"].max_row == 4
-
-
-def test_computed_coefficients(cli, tmp_path):
-    """They know where lead is: the other reading is no mirror image, and what the command says with lag."""
-    folder = sample_data() / "model_job"
-    for name in ("runs.csv", "rotor.csv"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    text = (folder / "job.toml").read_text(encoding="utf-8")
-    words = 'phase = "lead"\nangles = "with rotation"\n'
-    assert words in text
-    (tmp_path / "job.toml").write_text(text.replace(words, ""), encoding="utf-8")
-    document = cli("balance", tmp_path / "job.toml", "--json").json
-    assert document["conventions"]["assumed"] == ["phase"]
-    expected = cli("balance", tmp_path / "job.toml", "--phase", "lag", "--json").json["corrections"]
     for row, other in zip(expected, document["other_readings"], strict=True):
         assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))

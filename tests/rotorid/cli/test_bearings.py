@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import fem
-from fem import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
+from fem import CubicSpring, JournalBearing, SqueezeFilm, Stop
 from rotorid.commands.bearings import BearingsOptions, bearings
 from rotorid.files import read_rotor, write_rotor
 from rotorid.reduction import SmallModel
@@ -28,19 +28,6 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
     assert coarse["threshold_rpm"] == pytest.approx(6407.0, abs=0.1)
     assert coarse["whirl_ratio"] == pytest.approx(0.191, abs=5e-4)
     assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
-
-
-def test_other_forces_are_listed_and_explained():
-    forces = [
-        SqueezeFilm(1, "", **BEARING, centring_stiffness=1e7),
-        MuszynskaSeal(3, "seal", 1e6, 100.0, 2.0, 0.4, 1e-3),
-    ]
-    found = bearings(shaft(forces, [fem.Support(5, 1e8)]), BearingsOptions(speeds=[100.0, 200.0]))
-    assert found.result.labels == ["squeeze film at node 1", "seal"]
-    assert [row["sommerfeld"] for row in found.to_dict()["bearings"]] == [None] * 4
-    said = found.summary()
-    assert "Warning: the squeeze film at node 1: stiffness and damping are those at its centre" in said
-    found.figure()
 
 
 def test_a_shaft_without_weight_has_its_journals_in_the_middle():

@@ -56,14 +56,6 @@ def test_module_and_script_are_the_same_program():
     )
 
 
-def test_a_closed_pipe_is_no_error():
-    command = f"{sys.executable} -m rotorid critical {ROTOR} --json | true"
-    done = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False
-    )
-    assert "Traceback" not in done.stderr
-
-
 def test_a_recognised_encoding_is_named_on_standard_error_only(cli, tmp_path, monkeypatch):
     monkeypatch.setattr("warnings.filters", [])
     text = (BK / "runs.csv").read_text(encoding="utf-8").replace("initial", "начало")

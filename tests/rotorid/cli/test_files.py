@@ -144,11 +144,3 @@ def test_a_unit_at_each_speed(text, expected):
 def test_speeds_that_are_none(text, words):
     with pytest.raises(ValueError, match=words):
         speeds(text)
-
-
-def test_speeds_of_vectors_without_a_unit_are_rad_s_as_of_other_commands(cli):
-    settings = sample_data() / "waveforms" / "waveforms.toml"
-    found = [cli("vectors", settings, "--speeds", text, "--json").json for text in ("204.2", "204.2rad/s")]
-    assert found[0]["rows"] == found[1]["rows"] != []
-    refused = cli("vectors", settings, "--speeds", "2935")
-    assert (refused.code, refused.err.count("\n")) == (2, 1)

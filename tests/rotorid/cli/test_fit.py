@@ -42,14 +42,6 @@ def refused(outcome, *said):
         assert text in outcome.err
 
 
-def test_starting_values_and_iterations(cli):
-    found = cli("fit", *files("three_masses"), "--start", "m1=10, c1=0.2", "--json").json
-    assert found["history"][0]["parameters"] == {"c1": 0.2, "m1": 10.0, "m2": 23.0}
-    assert values(found)["m1"] == pytest.approx(11.99998962, rel=1e-7)
-    options = found["provenance"]["options"]
-    assert options == {"start": "m1=10, c1=0.2"}
-
-
 def test_a_start_outside_the_bounds(cli, tmp_path):
     model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
     refused(cli("fit", model, record, "--start", "a=7"), "--start: a = 7 is outside its bounds 0 to 5")
@@ -175,17 +167,6 @@ def test_samples_give_the_truth_within_their_intervals(cli, folder, truth):
         assert abs(entry["value"] - value) < 4 * entry["std"] + 1e-9, name
 
 
-def test_several_records_share_the_parameters(cli, tmp_path):
-    model = saved(tmp_path, "m.toml", ONE)
-    first = saved(tmp_path, "a.csv", decay(n=20))
-    second = saved(tmp_path, "b.csv", decay(n=30, step=0.05))
-    alone = cli("fit", model, first, "--json").json["parameters"]["a"]
-    both = cli("fit", model, first, second, "--json", "--plot", tmp_path / "p.svg").json
-    assert both["parameters"]["a"]["value"] == pytest.approx(1.3, rel=2e-3)
-    assert both["parameters"]["a"]["std"] < alone["std"]
-    assert len(both["provenance"]["inputs"]) == 3
-
-
 def test_missing_samples(cli, tmp_path):
     model = saved(tmp_path, "m.toml", ONE)
     lines = decay(n=30).splitlines()
@@ -206,24 +187,3 @@ def test_a_combination_is_named(cli, tmp_path):
     assert found["identifiable"] is False
     assert found["parameters"]["a"]["value"] is None
     assert found["unidentifiable"]
-
-
-def test_iterations_of_the_texts_are_written_as_tables(cli, tmp_path):
-    """Tables 2.2 and 2.3 of [Q]; beta and I(beta) by step of [F]; the default method writes parameters."""
-    import openpyxl
-
-    scheme = ("--method", "quasilinearization", "--integrator", "sequential-heun")
-    book, table = tmp_path / "q.xlsx", tmp_path / "f.csv"
-    found = cli("fit", *files("quasilinearization"), *scheme, "--json", "--output", book).json
-    sheets = openpyxl.load_workbook(book)
-    assert sheets.sheetnames == ["iterations", "x1 by iteration", "x2 by iteration"]
-    rows = [row[1:4] for row in sheets["iterations"].iter_rows(min_row=2, values_only=True)]
-    steps = [[*step["parameters"].values()] for step in found["history"]]
-    np.testing.assert_allclose(np.array(rows, dtype=float), steps, rtol=1e-14)
-    assert sheets["x2 by iteration"].max_row == 32
-    for method, head in (
-        (("--method", "gauss-newton"), "iteration,c1,m1,m2,I(β)"),
-        ((), "parameter,value,std"),
-    ):
-        cli("fit", *files("three_masses"), *method, "--output", table)
-        assert table.read_text(encoding="utf-8-sig").startswith(head)

@@ -23,12 +23,6 @@ def unbalance(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("acceleration", ["10", "10rad/s²"])
-def test_an_acceleration_in_rad_s_as_a_run_up(cli, acceleration):
-    found = cli("motion", ROTOR, "--run-up", "300:303", "--acceleration", acceleration, "--json").json
-    assert found["time_s"][-1] == pytest.approx(0.3)
-
-
 def test_a_start_in_steady_motion_has_no_transient(unbalance):
     options = {"speed": "4000rpm", "time": 0.4, "unbalance": unbalance, "start": "steady"}
     end = motion(ROTOR, MotionOptions(**options)).result.end

@@ -97,22 +97,6 @@ def test_bearings_over_speed_stand_beside_a_small_model_that_moves(cli, tmp_path
     assert cli("bearings", path, "--speeds", "3000rpm").code == 2  # no film
 
 
-def test_a_small_model_is_fitted_and_simulated(cli, tmp_path):
-    """The same file as `motion` reads: a damper at each mass is estimated."""
-    path = tmp_path / "small.toml"
-    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--output", path).code == 0
-    model = read_ode_model(path)
-    assert [*model.parameters] == ["d_x7", "d_x12", "d_x18"]
-    assert cli("motion", path, "--speed", "3000rpm", "--time", "0.1s", "--displaced", "12=5um").code == 0
-    given = ("--with", "d_x7=0,d_x12=1500,d_x18=0", "--times", "0:0.1:0.01", "--json")
-    assert cli("simulate", path, *given).code == 0
-    start = "[equations.initial]\nx12 = 1e-4\n"
-    path.write_text(path.read_text(encoding="utf-8") + start, encoding="utf-8")
-    moved = cli("simulate", path, *given, "--output", tmp_path / "s.csv")
-    assert moved.code == 0, moved.err
-    assert "0.0001" in (tmp_path / "s.csv").read_text()
-
-
 def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equations_gives(cli, tmp_path):
     """The sample's matrices are those of this reduction; there the mass in the middle is estimated, too."""
     path, sample = tmp_path / "small.toml", sample_data() / "fit" / "run_down"
@@ -140,15 +124,6 @@ def test_a_run_down_fitted_with_the_small_model_gives_what_its_model_of_equation
     assert {*found.json["parameters"]} == {*expected}
     for name, one in expected.items():
         assert found.json["parameters"][name]["value"] == pytest.approx(one["value"], rel=1e-4), name
-
-
-def test_kept_supports_take_no_masses(cli, tmp_path):
-    words = ("--place", "compromise", "--masses", 2, "--keep-supports", "--json")
-    ranked = cli("reduce", MOTION / "rotor.toml", *words).json
-    assert not {2, 22} & {node for choice in ranked["placement"]["choices"] for node in choice["nodes"]}
-    path = tmp_path / "small.toml"
-    cli("reduce", ROTOR, "--nodes", "7,12,18", "--keep-supports", "--output", path)
-    assert read_small_model(path).supports == [fem.Support(2, 1e8), fem.Support(22, 1e8)]
 
 
 def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):

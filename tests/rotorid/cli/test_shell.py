@@ -2,7 +2,6 @@
 
 import hashlib
 import io
-import itertools
 import os
 import signal
 import stat
@@ -34,27 +33,6 @@ def test_ctrl_c_while_loading_ends_quietly(tmp_path):
     process = start("critical", ROTOR, env={**os.environ, "PYTHONPATH": path})
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (130, b"", b"")
-
-
-def test_ctrl_c_while_it_reads_ends_quietly():
-    process = start("critical", "-", "--json")
-    process.stdin.write(b"length_m,")
-    process.stdin.flush()
-    while b"1" not in _pending(process):
-        pass
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out, err) == (130, b"", b"")
-
-
-def _pending(process):
-    """Whether the process has loaded everything: it waits for its standard input."""
-    wchan = f"/proc/{process.pid}/wchan"
-    try:
-        with open(wchan, encoding="ascii") as stream:
-            return b"1" if "pipe" in stream.read() else b""
-    except OSError:
-        return b"1"
 
 
 def test_a_closed_pipe_ends_quietly():
@@ -192,32 +170,6 @@ def test_extreme_options_are_answered_or_refused(cli):
                 assert not any(f" {bad} " in printed for bad in ("inf", "nan", "-inf")), what
                 assert "encountered in" not in printed, what
                 assert "Traceback" not in printed, what
-
-
-def test_speeds_are_bounded():
-    from rotorid.commands.quantities import FASTEST, band, speeds
-
-    for text, unit in itertools.product(("1e9", "9e9", "1e300"), ("rpm", "Hz", "")):
-        if float(text) * {"rpm": 0.105, "Hz": 6.28, "": 1.0}[unit] > FASTEST:
-            with pytest.raises(ValueError, match="speeds must be 0 or from 1e-09 to"):
-                speeds(text + unit)
-            with pytest.raises(ValueError, match="speeds must be 0"):
-                band(f"1:{text}{unit}")
-
-
-@pytest.mark.parametrize("way", [["-OO"], pytest.param([], marks=pytest.mark.full)])
-def test_without_docstrings_commands_work_and_their_help_is_the_same(way, tmp_path):
-    def output(way, *words, **environment):
-        command = [sys.executable, *way, "-m", "rotorid", *map(str, words)]
-        done = subprocess.run(
-            command, capture_output=True, env={**os.environ, **environment}, cwd=tmp_path, timeout=120
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    level = {} if way else {"PYTHONOPTIMIZE": "2"}
-    for words in (["balance", "--help"], [], ["critical", ROTOR, "-n", "2"]):
-        assert output(way, *words, **level) == output([], *words) != b""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="limits of a process")

@@ -50,14 +50,6 @@ def test_intervals_of_the_size_of_the_answer(cli, name):
     assert not [w for w in found["warnings"] if "rise" in w or "alike" in w or "optimistic" in w]
 
 
-def test_planes_that_act_alike_with_stated_errors_are_not_mounted_either(cli):
-    ran = balance(cli, "alike_planes", *STATED)
-    assert ran.code == 0
-    lines = ran.out.splitlines()
-    assert lines[0].startswith("Do not mount these weights: planes 'P1' and 'P2' act alike")
-    assert "Instead: plane 'P2' alone (--planes P2; 1.778 g) would leave rms 13.5 µm pp" in ran.out
-
-
 @each_of(
     "name, run",
     [
@@ -76,15 +68,3 @@ def test_runs_that_disagree_are_named_before_what_follows(cli, name, run):
         assert follows.startswith("the trial weight in plane 'P1'")
         assert follows.endswith("mend the table, or measure these runs again until they agree")
         assert not rest
-
-
-def test_with_stated_errors_the_size_of_a_larger_trial_weight_is_said(cli):
-    ran = balance(cli, "weak_trial", *STATED)
-    assert ran.code == 2
-    assert "repeat the run with a larger trial weight, at least 2" in ran.err
-
-
-def test_the_sheet_begins_with_the_judgement(cli, tmp_path):
-    assert balance(cli, "alike_planes", "--report", tmp_path / "sheet.html").code == 0
-    page = (tmp_path / "sheet.html").read_text()
-    assert 0 < page.index("Do not mount these weights") < page.index('id="warnings"')

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.commands.campbell import CampbellOptions, campbell
-from rotorid.commands.critical import critical
 from rotorid.commands.quantities import band, nodes, sensors
-from rotorid.commands.response import ResponseOptions, response
-from rotorid.samples import sample_data
 
 
 def test_speeds_in_any_order_and_more_than_once(cli, files):
@@ -40,13 +36,3 @@ def test_nodes_sensors_and_ranges_of_the_command_line():
         sensors("disc:abc")
     assert band("60:120rpm") == pytest.approx((2 * np.pi, 4 * np.pi))
     assert band(None) is None
-
-
-def test_without_a_calibration_nothing_is_there():
-    plain = sample_data() / "rotor23.csv"
-    found = critical(plain)
-    assert "critical_speeds_std_rad_s" not in found.document
-    assert "±" not in found.answer.numbers
-    assert "frequencies_std_rad_s" not in campbell(plain, CampbellOptions(speeds="50,100")).document
-    answer = response(plain, {12: 1e-3}, ResponseOptions(speeds="50,100"))
-    assert "amplitude_std_m" not in answer.document

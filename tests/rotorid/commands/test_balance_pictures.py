@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from documents import check_hygiene
 
-from rotorid.commands.balance import BalanceOptions, balance
+from rotorid.commands.balance import balance
 from rotorid.samples import sample_data
 
 TURBO = sample_data() / "turbo_job"
@@ -68,15 +68,3 @@ def test_a_checked_job_draws_what_was_mounted_and_achieved(checked):
         assert stars.get_ydata() == pytest.approx(np.abs(check.achieved).ravel() * 2e6)
         assert dots.get_ydata() == pytest.approx(np.abs(check.predicted).ravel() * 2e6)
         assert (stars.get_xdata() - dots.get_xdata()).min() > 0.3, "one does not hide the other"
-
-
-def test_an_undecided_residual_is_hollow():
-    options = BalanceOptions(planes="left,right", grade="G1", rotor_mass="20kg", service_speed="9000rpm")
-    found = balance(TURBO / "job.toml", options)
-    words = [row.verdict for row in found.verdict.rows if row.kind == "plane"]
-    assert "not decidable" in words
-    figure = found.figure()
-    check_hygiene(figure)
-    drawn = [line for line in figure.axes[1].lines if line.get_label() == "residual unbalance"]
-    for word, line in zip(words, drawn, strict=True):
-        assert (line.get_mfc() == "white") == (word == "not decidable")

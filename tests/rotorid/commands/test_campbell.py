@@ -48,9 +48,3 @@ def test_cross_coupling_is_borne_up_to_the_limit_of_stability(cli, files, model,
     assert document["smallest_log_decrement"][0] == pytest.approx(smallest(0.0), rel=1e-6)
     told = cli(*command, "--cross-coupling", f"0:1e7{place}").out
     assert f"It bears {limit:.4g} N/m of cross-coupling at node {node}" in told
-
-
-def test_one_speed_has_one_table(cli, files):
-    text = cli("campbell", files[0], "--speeds", "300", "--table").out
-    assert text.count("Whirl at") == 1
-    assert "-0.0000" not in text

@@ -8,23 +8,8 @@ from tables_data import write_csv
 
 import fem
 from fem.parameters import spread
-from rotorid import read_rotor, write_rotor
+from rotorid import read_rotor
 from rotorid.commands.critical import CriticalOptions, critical
-
-
-def test_the_map_says_what_it_leaves_out(cli, tmp_path):
-    rotor = fem.Rotor(
-        [0.1] * 8,
-        0.05,
-        supports=[
-            fem.Support(1, 5e7, name="front"),
-            fem.Support(9, 5e7, name="rear", pedestal=fem.Pedestal(50.0, 2e8)),
-            fem.Support(5, -1e4, kind="seal", name="labyrinth"),
-        ],
-    )
-    write_rotor(tmp_path / "r.toml", rotor)
-    said = " ".join(cli("critical", tmp_path / "r.toml", "-n", 1, "--map", "--json").json["warnings"])
-    assert "the map leaves out seals and pedestals" in said
 
 
 @pytest.mark.parametrize(("model", "named"), [("", 1), ("shear = true\nrotary_inertia = true", 0)])

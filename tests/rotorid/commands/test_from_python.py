@@ -7,7 +7,7 @@ import pytest
 from documents import same
 
 from rotorid.commands.balance import BalanceOptions, balance
-from rotorid.commands.fit import FitOptions, choices, fit
+from rotorid.commands.fit import FitOptions, fit
 from rotorid.commands.identify import IdentifyOptions, identify
 from rotorid.commands.split import SplitOptions, split
 from rotorid.commands.tolerance import ToleranceOptions, tolerance
@@ -156,26 +156,7 @@ def test_without_data_there_are_the_equations_alone(cli):
     assert "Im eq. 1  Im X·c + ω·Re X·alpha = m·ω²·Im X" in shown
 
 
-@pytest.mark.parametrize("option", choices())
-def test_names_of_methods_are_checked(option):
-    with pytest.raises(ValueError, match=f"--{option} 'none such' is not known: one of "):
-        fit(QUASI[0], QUASI[1:], FitOptions(**{option: "none such"}))
-
-
 @pytest.mark.parametrize("options", [{"ridge": -1.0}, {"ridge": math.inf}, {"split": True, "ridge": 0.1}])
 def test_options_that_cannot_be(options):
     with pytest.raises(ValueError, match="--"):
         balance(TURBO, BalanceOptions(**options))
-
-
-def test_check_runs_refine_combined_coefficients_too(tmp_path):
-    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
-        (tmp_path / name).write_bytes(TURBO.with_name(name).read_bytes())
-    (tmp_path / "rotor.csv").write_bytes(MODEL_JOB.with_name("rotor.csv").read_bytes())
-    tables = 'weights = "weights.csv"\ncheck = "check.csv"\ncheck_weights = "check_weights.csv"\n'
-    (tmp_path / "job.toml").write_text(tables + MODEL_JOB.read_text())
-    checked = balance(tmp_path / "job.toml", BalanceOptions(coefficients="combined"))
-    refined = balance(tmp_path / "job.toml", BalanceOptions(coefficients="combined", refine=True))
-    assert checked.left.word == "trim"
-    assert checked.left.trim == pytest.approx(refined.result.to_add, rel=1e-6)
-    assert abs(refined.result.weights - checked.result.weights).max() > 1e-6

@@ -10,12 +10,7 @@ import pytest
 
 from rotorid.cli import _JOBS, _work_of
 from rotorid.commands.balance import BalanceOptions, balance
-from rotorid.commands.campbell import CampbellOptions, campbell
-from rotorid.commands.critical import CriticalOptions, critical
-from rotorid.commands.influence import InfluenceOptions, influence
-from rotorid.commands.reduce import ReduceOptions, reduce
-from rotorid.commands.response import ResponseOptions, response
-from rotorid.files import read_job
+from rotorid.commands.critical import critical
 from rotorid.files.disk import each_file_once
 from rotorid.report.options import changed, checked, plain
 from rotorid.report.outcome import options_of
@@ -85,51 +80,6 @@ def same(one, other):
         assert all(type(value) is not str or "np." not in value for value in document["provenance"])
         document.pop("provenance")
     assert documents[0] == documents[1]
-
-
-@pytest.mark.parametrize(
-    ("work", "text", "values"),
-    [
-        (lambda o: balance(JOB, BalanceOptions(**o)), {"limit": "1=35"}, {"limit": {"1": "35"}}),
-        (
-            lambda o: balance(JOB, BalanceOptions(**o)),
-            {"max_mass": "9g"},
-            {"max_mass": {"1": "9g", "2": "9g"}},
-        ),
-        (
-            lambda o: critical(ROTOR, CriticalOptions(**o)),
-            {"number": 2, "operating": "500:600"},
-            {"number": np.int64(2), "operating": np.array([500.0, 600.0])},
-        ),
-        (
-            lambda o: critical(ROTOR, CriticalOptions(operating=o)),
-            "3000:6000rpm",
-            ("3000rpm", "6000rpm"),
-        ),
-        (
-            lambda o: campbell(ROTOR, CampbellOptions(o, number=2)),
-            "100,200",
-            ["100rad/s", 200],
-        ),
-        (
-            lambda o: response(ROTOR, {7: 1e-5}, ResponseOptions([100.0, 200.0, 300.0], sensors=o)),
-            "7,12",
-            np.array([7, 12]),
-        ),
-        (lambda o: influence(ROTOR, InfluenceOptions(o, [2], [100.0])), "7,12", np.array([7, 12])),
-        (
-            lambda o: reduce(ROTOR, ReduceOptions(nodes=[7, 12, 18], **o)),
-            {"modes": 2, "errors": "compliance=2"},
-            {"modes": np.int64(2), "errors": ["compliance=2"]},
-        ),
-    ],
-)
-def test_texts_and_what_they_stand_for_are_the_same(work, text, values):
-    same(work(text), work(values))
-
-
-def test_a_job_that_was_read_is_taken_as_it_is():
-    same(balance(read_job(JOB), BalanceOptions(planes="1")), balance(JOB, BalanceOptions(planes="1")))
 
 
 def test_a_file_is_read_anew_by_the_next_call_and_once_inside_another_one(tmp_path):

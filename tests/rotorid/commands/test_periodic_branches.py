@@ -6,8 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.commands.periodic import PeriodicOptions, periodic
-from rotorid.commands.response import ResponseOptions, response
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
@@ -54,23 +52,6 @@ def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
     told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv")
     assert told.code == 2
     assert "a period of its own" in told.err
-
-
-@pytest.mark.full
-def test_on_linear_supports_it_is_the_response():
-    """The compressor on its table of bearings; reduced, which costs 0.4 % beside a bearing, 0.06 % at 12."""
-    folder = sample_data() / "compressor"
-    given = PeriodicOptions(speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30")
-    found = periodic(folder / "rotor.toml", given)
-    (branch,) = found.result.branches
-    along = np.array(found.to_dict()["branches"][0]["amplitude_m"]).T
-    speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
-    options = ResponseOptions(speeds=speeds, sensors="2,12:30")
-    steady = response(folder / "rotor.toml", folder / "unbalance.csv", options)
-    size = abs(steady.result.response.readings(steady.result.sensors))
-    np.testing.assert_allclose(along[[0, -1]], size, rtol=5e-3)
-    np.testing.assert_allclose(along[[0, -1], 1], size[:, 1], rtol=1e-3)
-    assert branch.stable.all()
 
 
 def test_no_bifurcation_says_what_was_tried(cli, tmp_path):

@@ -54,20 +54,6 @@ def test_response_reads_at_angles_and_stations(cli, files, model, tmp_path):
         assert document["bearing_forces"]["largest_N"][k] == pytest.approx(at[0, k], rel=1e-6)
 
 
-def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_path):
-    plain = fem.Rotor([0.3] * 3, 0.05, supports=[fem.Support(1, 1e7, 1e3), fem.Support(4, 1e7, 1e3)])
-    write_rotor(tmp_path / "plain.toml", plain)
-    write_csv(tmp_path / "n.csv", [["plane", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
-    command = ("--speeds", "60:200:70", "--json")
-    by_stations = cli("response", files[0], "--unbalance", files[1], *command).json
-    assert by_stations["sensors"] == ["wheel", "probe"]
-    by_supports = cli("response", tmp_path / "plain.toml", "--unbalance", tmp_path / "n.csv", *command).json
-    assert by_supports["sensors"] == [1, 4]
-    expected = fem.unbalance_response(plain, {2: 1e-4}, [60.0])
-    assert by_supports["amplitude_m"][0][0] == pytest.approx(abs(expected.at(1)[0]), rel=1e-9)
-    assert {way for node in by_supports["orbits"]["direction"] for way in node} == {"forward"}
-
-
 def test_amplitudes_have_their_errors(calibrated):
     options = ResponseOptions(speeds="500:3000:50rpm", sensors="2:45,12")
     found = response(calibrated, {12: 1e-3}, options)

@@ -1,6 +1,5 @@
 """`rotorid runup`: what it prints and writes, what reads it, pictures, and options that cannot be."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from run_ups import drawn, table
 
 from rotorid.base.text import RPM
-from rotorid.commands.runup import RunUpOptions, runup
 from rotorid.files import read_modes, read_rotor
 from rotorid.samples import sample_data
 
@@ -90,25 +88,6 @@ def test_the_table_of_modes_is_read(rotor_and_sweep, tmp_path, cli):
     assert modes.nodes == (7, 18)
     reduced = cli("reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json")
     assert reduced.code == 0
-
-
-def test_a_bode_plot_has_lags_that_fall_and_units(rotor_and_sweep, tmp_path):
-    _, sweep = rotor_and_sweep
-    path = table(tmp_path / "v.csv", [sweep], lag=True)
-    found = runup(path, RunUpOptions(phase="lag"))
-    above, below = found.figure().axes
-    assert above.get_ylabel() == "amplitude, µm pp"
-    assert below.get_ylabel() == "phase (lag), degrees"
-    bottom, top = below.get_ylim()
-    assert bottom > top
-    assert np.nanmax(np.abs(np.diff(below.lines[0].get_ydata()))) < 180
-
-
-def test_vectors_of_python(rotor_and_sweep):
-    rotor, sweep = rotor_and_sweep
-    found = runup([sweep], RunUpOptions(bands=[(0.7 * rotor.omega[0], 1.3 * rotor.omega[0])]))
-    assert len(found.document["modes"]) == 1
-    assert json.dumps(found.document)
 
 
 def test_a_mode_that_is_passed_within_few_turns_is_said(tmp_path, cli):

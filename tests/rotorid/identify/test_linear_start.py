@@ -56,6 +56,17 @@ def test_rows_of_lesson_1_are_those_of_an_independent_derivation():
     np.testing.assert_allclose(Y, stack(np.array(right)), rtol=1e-13)
 
 
+def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
+    truth = np.array([4.0, 1.5, 2.5])
+    signals = simulate(lesson_1(), truth, np.array([8.0, 15.0, 20.0]), {"F": 5.0}).signals
+    signals["X2"][1] = np.nan
+    data = experiments(lesson_1(), [8.0, 15.0, 20.0], signals, names=["a", "b", "c"])
+    result = identify(lesson_1(), data)
+    np.testing.assert_allclose(result.values, truth, rtol=1e-11)
+    assert result.left_out == ("experiment b: X2 not measured",)
+    assert not result.linear.rows.used[1].any()
+
+
 @pytest.mark.parametrize(
     ("frequencies", "signals", "options", "message"),
     [

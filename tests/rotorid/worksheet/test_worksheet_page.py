@@ -11,7 +11,7 @@ import pytest
 from repetitions import FULL
 from worksheet.served import command
 from worksheet.typed_job import rows, type_job
-from worksheet.window import CONTROL, SPACE, Window
+from worksheet.window import SPACE, Window
 
 from rotorid.samples import sample_data
 
@@ -133,33 +133,6 @@ def test_fields_of_a_trial_weight_are_kept(shared, windows):
     window.leave()
     window.open(served.address)
     assert window.text('#trial [name="load kg"]') == "50"
-
-
-@pytest.mark.full
-def test_two_windows_and_one_cell(shared, windows):
-    served = shared()
-    for window in windows:
-        window.open(served.address)
-    windows[1].driver.execute_script("document.querySelector(arguments[0]).focus()", FIRST)
-    windows[1].hold(CONTROL, "a")
-    windows[1].press(*"77")
-    windows[0].type(FIRST, "66")
-    windows[0].leave()
-    windows[0].saved()
-    windows[1].leave()
-    windows[1].wait(lambda: windows[1].texts("[data-mine]"), "which of the two")
-    assert "wrote “66” here; you typed “77”" in windows[1].text("#conflicts")
-    windows[1].driver.execute_script("document.querySelector('[data-theirs]').focus()")
-    windows[1].push("[data-mine]")
-    windows[0].wait(lambda: windows[0].text(FIRST) == "77", "the other window shows it")
-
-
-@pytest.mark.full
-def test_an_address_without_its_key_shows_nothing(shared, windows):
-    window = windows[0]
-    window.browser.open(shared().address.split("#")[0])
-    window.wait(lambda: "address" in window.text("#message"), "what is wrong")
-    assert window.texts("input") == []
 
 
 @pytest.mark.full
