@@ -276,3 +276,16 @@ def test_probes_a_quarter_turn_apart_read_a_real_mode():
     assert result.notes[0].startswith("mode 1 whirls: X2 and X4 a quarter turn from X1")
     skew = fitted(omega, np.outer(g, [1.0, -1j * np.exp(0.5j)]), 0.01, 3, load=omega**2)
     assert skew.warnings[0].startswith("mode 1 is complex")
+
+
+def test_a_point_that_was_mostly_not_read_keeps_its_weights():
+    """Of amplitudes in µm: what lacks says nothing about how large the others are."""
+    omega = around(OMEGA, 25)
+    Z = 1e-6 * amplitudes(omega, AT_3)
+    Z = Z * noise(0.02, Z, 8)
+    whole = fitted(omega, Z, 0.02)
+    Z[np.arange(len(omega)) % 3 > 0, 0] = np.nan
+    some = fitted(omega, Z, 0.02)
+    assert some.warnings == ()
+    ratio = some.shape_std[:, 0] / whole.shape_std[:, 0]
+    assert ((ratio > 1.2) & (ratio < 2.5)).all()  # of a third of the readings

@@ -106,6 +106,22 @@ def test_intervals_hold_where_residuals_follow_each_other(rho):
         assert "Durbin–Watson" in text(result)
 
 
+def test_hum_beside_a_resonance_is_said_where_it_can_be_seen():
+    """The parameters take most of it: the periodogram gives back what they took."""
+    silent, model = 0, oscillator(position="x_0", x_0=0.8)
+
+    def hum(seed, size):
+        rng = np.random.default_rng(100 + seed)
+        return size * np.sin(2 * np.pi * 1.5915 * rng.uniform(0.75, 1.35) * T + rng.uniform(0, 6))
+
+    for seed in range(12):
+        result = fit(model, record(seed, error=0.02, extra=hum(seed, 0.04)))
+        silent += not result.warnings and result.ci95 is not None and not within(result)
+        assert "hum" not in text(fit(model, record(seed, error=0.02)))
+    assert silent <= 2
+    assert "hum with" in text(fit(model, record(0, error=0.02, extra=hum(0, 0.12))))
+
+
 def test_a_far_start_is_left_for_another_that_describes_the_record():
     far = oscillator(k=5000.0)
     assert not fit(far, record(0), starts=1).described
