@@ -50,24 +50,6 @@ def test_all_results_or_none(cli, job, option):
     assert sorted(job.iterdir()) == before
 
 
-def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, monkeypatch):
-    from pathlib import Path
-
-    opened = Path.open
-
-    def full(path, mode="r", *rest, **options):
-        if "x" in mode and ".i.html" in path.name:
-            raise OSError(28, "No space left on device", str(path))
-        return opened(path, mode, *rest, **options)
-
-    monkeypatch.setattr(Path, "open", full)
-    before = sorted(job.iterdir())
-    outcome = cli("balance", job / "job.toml", "--output", job / "o.csv", "--report", job / "i.html")
-    assert outcome.code == 2
-    assert outcome.err == f"rotorid: {job / 'i.html'}: expected a file that can be written (No space left on device)\n"  # fmt: skip  # noqa: E501
-    assert sorted(job.iterdir()) == before
-
-
 @pytest.mark.parametrize(
     ("redirection", "words"), [(">&-", "standard output is closed"), ("> /dev/full", "No space left")]
 )

@@ -15,7 +15,6 @@ from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"
-MOTION = sample_data() / "motion"
 COMPRESSOR = sample_data() / "compressor" / "rotor.toml"
 
 

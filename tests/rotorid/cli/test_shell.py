@@ -4,7 +4,6 @@ import hashlib
 import io
 import os
 import signal
-import stat
 import subprocess
 import sys
 
@@ -72,41 +71,6 @@ def test_a_table_from_standard_input(cli, monkeypatch):
     assert outcome.err.startswith("rotorid: standard input, row 2: expected a header row")
     monkeypatch.setattr(sys, "stdin", None)
     assert "standard input: expected a file that can be read (it is closed)" in cli("critical", "-").err
-
-
-def test_the_hash_is_that_of_what_was_read(cli, tmp_path, monkeypatch):
-    import fem
-
-    path = tmp_path / "rotor.csv"
-    path.write_bytes(ROTOR.read_bytes())
-    critical = fem.critical_speeds
-
-    def meanwhile(*words, **options):
-        path.write_bytes(b"another file")
-        return critical(*words, **options)
-
-    monkeypatch.setattr(fem, "critical_speeds", meanwhile)
-    outcome = cli("critical", path, "--json")
-    assert path.read_bytes() == b"another file"
-    expected = hashlib.sha256(ROTOR.read_bytes()).hexdigest()
-    assert outcome.json["provenance"]["inputs"][0]["sha256"] == expected
-
-
-def test_mode_and_link_of_a_file_stay(tmp_path):
-    (tmp_path / "sub").mkdir()
-    target, link = tmp_path / "sub" / "real.csv", tmp_path / "link.csv"
-    target.write_bytes(b"old")
-    target.chmod(0o640)
-    link.symlink_to(target)
-    dangling, new = tmp_path / "dangling.csv", tmp_path / "sub" / "new.csv"
-    dangling.symlink_to(new)
-    long = tmp_path / ("x" * 250 + ".csv")
-    write_files({link: b"1", dangling: b"2", long: b"3"})
-    assert link.is_symlink()
-    assert dangling.is_symlink()
-    assert [p.read_bytes() for p in (target, new, long)] == [b"1", b"2", b"3"]
-    assert stat.S_IMODE(target.stat().st_mode) == 0o640
-    assert len(list(tmp_path.rglob("*"))) == 6
 
 
 def test_what_is_written_is_on_the_disk_before_it_replaces(tmp_path, monkeypatch):

@@ -19,8 +19,6 @@ from rotorid.samples import sample_data
 SAMPLES = sample_data()
 ROTOR = SAMPLES / "rotor23.csv"
 JOB = SAMPLES / "bk_two_plane" / "job.toml"
-MODEL = SAMPLES / "fit" / "run_down" / "model.toml"
-RECORD = SAMPLES / "fit" / "run_down" / "record.csv"
 KINDS = [options_of(_work_of(name)) for names in _JOBS.values() for name in names.split()]
 NEEDED = {"speeds": (100.0,), "mass": 1.0, "speed": 1.0, "grade": 1.0, "stations": (6,), "planes": (7,)}
 

@@ -6,11 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from exact_solutions import exactly
-from tables_data import write_csv
 
 import fem
 from fem.parameters import spread
-from rotorid import read_rotor, write_rotor
+from rotorid import read_rotor
 from rotorid.commands.response import ResponseOptions, response
 from rotorid.files.small_model import small_model_files
 from rotorid.reduction import small_model
@@ -73,49 +72,6 @@ def test_amplitudes_have_their_errors(calibrated):
 
         assert row["amplitude_std_m"] == pytest.approx(spread(read_rotor(calibrated), highest)[k], rel=1e-4)
         assert found.tables[-1].columns[2].values[k] == pytest.approx(1e6 * row["amplitude_std_m"])
-
-
-def test_a_small_model_is_answered_as_a_rotor(cli, tmp_path):
-    """Two discs on a massless shaft are their own small model: all numbers but the nodes' are the rotor's."""
-    rotor = fem.Rotor(
-        [0.1] * 10,
-        0.06,
-        density=0.0,
-        discs=[fem.Disc(4, 30.0), fem.Disc(8, 20.0)],
-        supports=[
-            fem.Support(1, ((2e7, 3e6), (-2e6, 5e7)), ((2e3, 1e2), (50.0, 3e3)), name="A"),
-            fem.Support(11, 5e7, 3e3, name="B"),
-        ],
-    )
-    small, whole = tmp_path / "small.toml", tmp_path / "rotor.toml"
-    write_rotor(whole, rotor)
-    model = small_model(rotor, (4, 8), (30.0, 20.0))
-    small.write_bytes(small_model_files(small, model)[small])
-    table = write_csv(
-        tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], [4, 200, 30], [8, 50, 0]]
-    )
-    how = (
-        "--unbalance",
-        table,
-        "--speeds",
-        "100:6000:50rpm",
-        "--sensors",
-        "4,8:90,11",
-        "--operating",
-        "2500:3000rpm",
-    )
-    mine, theirs = (cli("response", file, *how, "--json").json for file in (small, whole))
-    assert set(mine) == set(theirs)
-    np.testing.assert_allclose(mine["amplitude_m"], theirs["amplitude_m"], rtol=1e-7)
-    turned = np.subtract(mine["phase_deg"], theirs["phase_deg"]) + 180.0
-    np.testing.assert_allclose(turned % 360.0, 180.0, atol=1e-5)
-    assert mine["vibration_limit"] == pytest.approx(theirs["vibration_limit"], rel=1e-6)
-    for force in ("force_x_N", "force_y_N", "largest_N"):
-        np.testing.assert_allclose(mine["bearing_forces"][force], theirs["bearing_forces"][force], rtol=1e-5)
-    for one, other in zip(mine["peaks"], theirs["peaks"], strict=True):
-        for key in ("speed_rad_s", "amplitude", "amplification_factor", "separation_margin_percent"):
-            assert one[key] == pytest.approx(other[key], rel=1e-6) if other[key] else one[key] is None, key
-    assert len(mine["peaks"]) >= 3
 
 
 def test_unbalance_of_a_small_model(cli, tmp_path):
