@@ -34,7 +34,7 @@ from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
-from balancing.planes import Subsets, best_subsets, compare_planes
+from balancing.planes import Subsets, best_subsets
 from balancing.regions import Region, real_parts, region_edge
 from balancing.trial_weight import (
     Lag,
@@ -87,7 +87,6 @@ __all__ = [
     "check_runs",
     "combine",
     "compare_check",
-    "compare_planes",
     "conditioning",
     "convention_test",
     "correct",

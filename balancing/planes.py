@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_stack
 from balancing.conventions import Labels
-from balancing.influence import Influence, match_speeds
+from balancing.influence import Influence
 from balancing.tables import rms, three_figures, weight_rows
-from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.choices import did_you_mean
@@ -234,39 +233,6 @@ def best_subsets(
         dependent=int(np.count_nonzero(~solid)),
         labels=labels or Labels(),
         weighted=bool(np.ptp(w) > 0),
-    )
-
-
-def compare_planes(
-    influence: Influence,
-    baseline: Trials | ArrayLike | None,
-    planes: Sequence[str],
-    k: int,
-    *,
-    speeds: ArrayLike | None = None,
-    row_weights: FloatArray | None = None,
-) -> Subsets:
-    """Compare all choices of k of these planes, without limits.
-
-    Parameters
-    ----------
-    influence, baseline, speeds, row_weights
-        As `balancing.correct` takes them.
-    planes, k
-        As `best_subsets` does.
-    """
-    today = influence if baseline is None else influence.rebased(baseline)
-    used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
-    part = today.part(used, None, plane_indices(today, planes))
-    N, P = part.baseline.size, len(part.planes)
-    return best_subsets(
-        part.W.reshape(N, P),
-        part.baseline.ravel(),
-        part.planes,
-        k,
-        row_weights=rows_of(row_weights, today.baseline.shape, used),
-        covariance=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if part.known_errors else None,
-        labels=today.labels,
     )
 
 
