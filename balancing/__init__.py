@@ -34,7 +34,6 @@ from balancing.methods import METHODS, Solution, solve
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
-from balancing.planes import Subsets, best_subsets, compare_planes
 from balancing.regions import Region, real_parts, region_edge
 from balancing.trial_weight import (
     Lag,
@@ -74,7 +73,6 @@ __all__ = [
     "RunErrors",
     "RunScatter",
     "Solution",
-    "Subsets",
     "Tolerance",
     "TrialWeight",
     "Trials",
@@ -82,12 +80,10 @@ __all__ = [
     "UndeterminedError",
     "Verdict",
     "after_check_run",
-    "best_subsets",
     "change_of_run",
     "check_runs",
     "combine",
     "compare_check",
-    "compare_planes",
     "conditioning",
     "convention_test",
     "correct",

@@ -18,9 +18,8 @@ from balancing.conditioning import UndeterminedError, check_planes, conditioning
 from balancing.cones import Bounds, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
-from balancing.influence import Influence, Whitening, match_speeds
+from balancing.influence import Influence, Whitening, match_speeds, plane_indices
 from balancing.methods import NoErrorsError, Solution, solve
-from balancing.planes import plane_indices, rows_of
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
@@ -103,7 +102,7 @@ def correct(  # noqa: PLR0913
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
-    rows = rows_of(row_weights, today.W.shape[:2], used)
+    rows = _rows_of(row_weights, today.W.shape[:2], used)
     counts = np.ones(len(Y), dtype=bool) if rows is None else rows > 0
     kept = None if limits is None else limits.pick(used, chosen)
     if kept is not None and not kept.any:
@@ -230,3 +229,24 @@ def _drawn(part: Influence, fitted: Solution, D: ComplexArray) -> tuple[ComplexA
     solved = np.concatenate(weights)
     bound = float(np.quantile(np.concatenate(sizes), LEVEL))
     return solved[np.isfinite(solved).all(axis=1)], squares / DRAWS, bound
+
+
+def _rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
+    """Weights of the readings at the speeds used, relative to the largest; None where all are alike.
+
+    Raises
+    ------
+    ValueError
+        Another shape than (speeds, sensors), weights below 0, and where nothing is left.
+    """
+    if given is None:
+        return None
+    weights = np.asarray(given, dtype=np.float64)
+    if weights.shape != shape or not (weights >= 0).all():
+        raise ValueError(
+            f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
+        )
+    chosen = weights[used].ravel()
+    if not chosen.any():
+        raise ValueError("all readings have the weight 0: nothing is left to be minimised")
+    return None if (chosen == chosen[0]).all() else chosen / chosen.max()

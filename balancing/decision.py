@@ -1,8 +1,8 @@
 """Decision whether to mount a correction at all, and what to do instead.
 
 With A = (Y₀ W) and z = (1, D) the mean square of N readings with the weights D mounted is zᴴ R z + zᴴ F z:
-the prediction, R = Aᴴ A / N, and what the errors of A add (`balancing.planes`), which grows with the weights:
-weights many times the trial weights, and weights that fight each other, leave more than they take away.
+the prediction, R = Aᴴ A / N, and what the errors of A add on average, F = E[dAᴴ dA] / N, which grows with the
+weights: those many times the trial weights, and those that fight each other, leave more than they take away.
 Weights are not worth mounting
 
 - where the errors add half or more of what is promised, zᴴ F z − F₀₀ ≥ (R₀₀ − zᴴ R z)/2;
@@ -25,7 +25,6 @@ import numpy as np
 
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
-from balancing.planes import error_form
 from balancing.tables import reading_names, rms
 from rotorid.base.text import capital, figures, listing
 from rotorid.regression import solution
@@ -53,6 +52,14 @@ COARSE = 0.1
 _ALL = 4
 _MORE = 1 + 1e-6
 """Above a limit by more than rounding."""
+
+
+def _error_form(covariance: FloatArray, row_weights: FloatArray) -> ComplexArray:
+    """F (P + 1, P + 1) from covariances (N, 2P + 2, 2P + 2) of (Re Y, Im Y, Re W₁, …), row weights (N,)."""
+    n = covariance.shape[-1]
+    total = np.einsum("n,nij->ij", row_weights**2, covariance).reshape(n // 2, 2, n // 2, 2)
+    real = total[:, 0, :, 0] + total[:, 1, :, 1]
+    return np.asarray(real + 1j * (total[:, 0, :, 1] - total[:, 1, :, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +96,7 @@ class Case:
         w = np.ones(N) if self.row_weights is None else self.row_weights
         w = w / np.linalg.norm(w)
         A = w[:, None] * np.column_stack((self.part.baseline.ravel(), self.W))
-        F = error_form(self.part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
+        F = _error_form(self.part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
         return np.asarray(A.conj().T @ A), F
 
     @property

@@ -34,6 +34,7 @@ from balancing.noise import Mounted as Mounted
 from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.choices import did_you_mean
 from rotorid.base.text import RPM, rpm_text
 from rotorid.regression import gain
 
@@ -373,6 +374,27 @@ def match_speeds(wanted: ArrayLike, available: FloatArray, what: str = "coeffici
     if len(set(out)) < len(out):
         raise ValueError("a speed is given twice")
     return out
+
+
+def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
+    """Indices of the chosen planes.
+
+    Raises
+    ------
+    ValueError
+        Unknown or repeated planes, or none.
+    """
+    if planes is None:
+        return list(range(len(influence.planes)))
+    for name in planes:
+        if name not in influence.planes:
+            raise ValueError(
+                f"there is no plane {name!r}{did_you_mean(str(name), influence.planes)}; "
+                f"the planes are {', '.join(map(repr, influence.planes))}"
+            )
+    if not planes or len(set(planes)) < len(planes):
+        raise ValueError("choose at least one plane, each once")
+    return [influence.planes.index(p) for p in planes]
 
 
 def estimate_influence(trials: Trials) -> Influence:

@@ -23,10 +23,9 @@ from balancing.conditioning import chance, check_planes
 from balancing.conventions import Labels
 from balancing.correct import fit_part
 from balancing.correction import Correction
-from balancing.influence import Influence, match_speeds
+from balancing.influence import Influence, match_speeds, plane_indices
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
-from balancing.planes import plane_indices
 from balancing.regions import NORMAL_RADIUS, Region, region_edge
 from balancing.tables import INVISIBLE
 from balancing.trials import Limits, Trials

@@ -67,7 +67,6 @@ from fem.rotor import (
     is_reading,
     label,
     refined,
-    too_short,
 )
 from fem.speed_map import SpeedMap, speed_map
 from fem.stability import (
@@ -198,7 +197,6 @@ __all__ = [
     "state_space",
     "static_deflection",
     "threshold_of",
-    "too_short",
     "unbalance_response",
     "unit_loads",
     "whirl_direction",

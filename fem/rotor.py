@@ -467,7 +467,7 @@ class Rotor:
             object.__setattr__(self, name, array)
             self._every((low < array) & (array < high), name, limit)
         least = f"1/{SHORTEST} of its longer neighbour's at least, for float64 (join the two)"
-        self._every(~too_short(self.length), "length", least)
+        self._every(~_too_short(self.length), "length", least)
         thinner = self.inner_diameter < self.outer_diameter
         self._every(thinner, "inner_diameter", "smaller than outer_diameter")
         for name, kind in (("discs", Disc), ("supports", Support), ("forces", NodeForce)):
@@ -617,7 +617,7 @@ _PER_ELEMENT = {
 """What is given for each element: between which values, and their words."""
 
 
-def too_short(length: FloatArray) -> BoolArray:
+def _too_short(length: FloatArray) -> BoolArray:
     """Which elements are too short beside their longer neighbour, from lengths of shape (n,).
 
     Parameters

@@ -89,7 +89,7 @@ class CalibratedRotor:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the numbers."""
-        return self.fit.names
+        return self.fit.estimate.names
 
     @property
     def values(self) -> FloatArray:

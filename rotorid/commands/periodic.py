@@ -168,7 +168,7 @@ def _bifurcations(branches: Sequence[Branch], labels: Sequence[str], directions:
             Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format),
             Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format),
             *(
-                Column(f"amplitude_{name}_m", values, _micrometres)
+                Column(f"amplitude_{name}_m", values, lambda metres: f"{1e6 * metres:.4g}")
                 for name, values in zip(labels, sizes.T, strict=True)
             ),
         ),
@@ -183,10 +183,6 @@ _HEADINGS = {
     "whirl_ratio": "whirl/speed",
 }
 """Of the bifurcations, in the answer."""
-
-
-def _micrometres(metres: float) -> str:
-    return f"{1e6 * metres:.4g}"
 
 
 def _whirl(orbit: Orbit) -> float:

@@ -209,8 +209,8 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
 
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     values, theta = _values(options.parameters, equations.parameters)
-    if _is_record(options.times):
-        plan = read_record(Path(str(options.times)), equations, measured=False)
+    if isinstance(options.times, Path | str) and Path(options.times).suffix.lower() in TABLES:
+        plan = read_record(Path(options.times), equations, measured=False)
     elif equations.inputs:
         raise ValueError(f"the model has the input {equations.inputs[0]}: give a record of it, --times FILE")
     else:
@@ -221,10 +221,6 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     about = f"record of {listing(equations.outputs, 'and')} at {counted(len(plan), 'time')}"
     late = equations.states and plan.t[0] != 0
     return values, record_columns(record), about, (begun,) if late else ()
-
-
-def _is_record(times: Times | Path | None) -> bool:
-    return isinstance(times, Path | str) and Path(times).suffix.lower() in TABLES
 
 
 def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float], FloatArray]:

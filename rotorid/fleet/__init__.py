@@ -25,15 +25,8 @@ _NO_REASON = "nothing that was tried makes it fit"
 
 @dataclass(frozen=True)
 class FleetFitOptions:
-    """Options of `fleet fit`.
+    """Options of `fleet fit`: where the result goes."""
 
-    Attributes
-    ----------
-    machine_type : --type NAME
-        The type that is wanted, and that of jobs which do not say it; default: that of most jobs.
-    """
-
-    machine_type: str | None = None
     to: ClassVar[Sequence[str]] = ("output", "table", "json")
     outputs: ClassVar[Sequence[str]] = (".parquet", ".csv", ".xlsx")
 
@@ -45,7 +38,7 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
     Example: rotorid fleet fit sample_data/fleet --output fans.parquet
 
     With `balance --type fans.parquet:fan-132` a machine of the type is balanced from its baseline.
-    .parquet has the coefficients of all jobs, .csv and .xlsx those of the type.
+    .parquet has the coefficients of all jobs, .csv and .xlsx those of the type that most jobs have.
 
     Parameters
     ----------
@@ -64,13 +57,13 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
     from rotorid.fleet.machine_type import type_of_fleet
 
     options = options or FleetFitOptions()
-    fleet, undetermined, damaged = read_tree(Path(tree), options.machine_type or "")
+    fleet, undetermined, damaged = read_tree(Path(tree))
     unreadable = [f"{path} cannot be read: {why}" for path, why in damaged.items()]
     types = fleet.drop_duplicates("job")["machine_type"].value_counts().drop("", errors="ignore")
     if types.empty:
-        words = f"{tree}: no balancing job in it has a type (machine_type, or --type) and coefficients"
+        words = f"{tree}: no balancing job in it has a type (machine_type) and coefficients"
         raise ValueError("\n".join([words, *unreadable]))
-    name = options.machine_type or str(types.index[0])
+    name = str(types.index[0])
     kind = type_of_fleet(fleet, name)
     machines, jobs, table = len(kind.machines), int(kind.effects.jobs.sum()), _table(kind)
     head = f"{name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. Coefficients differ between "
@@ -83,7 +76,7 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
     if undetermined:
         notes.append(f"the runs of {counted(len(undetermined), 'job')} do not determine coefficients")
     if len(types) > 1:
-        notes.append(f"{counted(len(types) - 1, 'other type')} in the tree (--type NAME)")
+        notes.append(f"{counted(len(types) - 1, 'other type')} in the tree: fit its folder alone")
     odd, warnings = list[dict[str, object]](), list[str]()
     for record, far in kind.odd:
         each = {"machine": record.machine, "path": record.job, "times_the_limit": far**0.5}

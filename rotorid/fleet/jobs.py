@@ -40,15 +40,14 @@ COLUMNS = (
 _DATE = re.compile(r"([\s_-]*\d{4}-\d\d-\d\d)*[\s_-]*")
 
 
-def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], dict[str, str]]:
+def read_tree(tree: Path) -> tuple[pd.DataFrame, list[str], dict[str, str]]:
     """The table of the jobs in a tree; jobs without coefficients; files that cannot be read, with reasons.
 
     Parameters
     ----------
     tree
-        A folder with jobs at any depth. Hidden files are left out.
-    machine_type
-        Of the jobs that neither say it nor lie at least two folders deep, in that of their type; "": none.
+        A folder with jobs at any depth; one that does not say its type and lies at least two folders deep is
+        of the type that the first of them names. Hidden files are left out.
 
     Raises
     ------
@@ -64,7 +63,7 @@ def read_tree(tree: Path, machine_type: str) -> tuple[pd.DataFrame, list[str], d
         if f"/{path}".count("/."):
             continue
         folders = path.split("/")
-        usual = folders[0] if len(folders) > 2 else machine_type
+        usual = folders[0] if len(folders) > 2 else ""
         try:
             # apart from what the command keeps of files that it reads: those of a whole tree are too many
             tables += Context().run(_read_job, file, path, usual)

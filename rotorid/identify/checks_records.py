@@ -132,20 +132,15 @@ def _correlated(problem: Problem, r: FloatArray, only: Sequence[slice] = ()) -> 
     up to the tenth neighbour in white residuals (Box and Pierce 1970); and how many times too narrow
     intervals are, with correlations that fade as the first.
     """
+    from scipy.special import chdtrc
+
     parts = [r[rows] for rows in only or [rows for _, rows in problem.series]]
     parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in parts]
     size = sum(map(len, parts))
     lags = range(1, 1 + min(LAGS, max(1, min(map(len, parts)) // 5)))
     rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) for k in lags]) / size
     factor = np.sqrt((1 + rho[0]) / (1 - rho[0])) if 0 < rho[0] < 1 else 1.0
-    return float(rho[0]), _chance(size * float(rho @ rho), len(rho)), float(factor)
-
-
-def _chance(chi_square: float, dof: int) -> float:
-    """Probability of a larger χ²."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(dof, chi_square))
+    return float(rho[0]), float(chdtrc(len(rho), size * float(rho @ rho))), float(factor)
 
 
 def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:

@@ -224,7 +224,7 @@ def _rivals(paths: Sequence[Iterations], path: Iterations) -> Iterator[str]:
         theta = other.estimate.solution
         apart = best.full_rank and not np.allclose(theta, best.solution, rtol=1e-3, atol=1e-12)
         if apart and other.converged and _cost(other) <= 1.5 * _cost(path):
-            values = ", ".join(f"{n} = {x:.6g}" for n, x in zip(path.names, theta, strict=True))
+            values = ", ".join(f"{n} = {x:.6g}" for n, x in zip(path.estimate.names, theta, strict=True))
             yield f"another start ends at {values}, which describes the record nearly as well"
             return
 

@@ -74,11 +74,6 @@ class NonlinearEstimate:
         return len(self.history) - 1
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return self.estimate.names
-
-    @property
     def values(self) -> FloatArray:
         """Parameters (n,); NaN where the data do not determine one."""
         return self.estimate.values

@@ -9,17 +9,12 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted
 from rotorid.report.options import file_of
-from rotorid.report.outcome import USUAL, Outcome, command, provenance
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from rotorid.report.outcome import Outcome, command, provenance
 
 __all__ = ["StudyOptions", "study"]
 
@@ -45,7 +40,7 @@ class StudyOptions:
     scheduler: str | None = None
     results: Path | str | None = None
     panels: ClassVar[Mapping[str, str]] = {"Work": "workers scheduler results"}
-    to: ClassVar[Sequence[str]] = USUAL
+    to: ClassVar[Sequence[str]] = ("output", "table", "json")
 
 
 @command
@@ -139,7 +134,6 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
             "coverage": coverage,
             "not_balanced": reasons,
         },
-        pictures={"Largest readings over their limit.": partial(_figure, frame.filter(like="ratio_"))},
         warnings=tuple(model.warnings),
         notes=tuple(notes),
         title="Study of machines",
@@ -163,17 +157,3 @@ def _workers(options: StudyOptions, executor: Executor | None) -> AbstractContex
         words = f"--scheduler {options.scheduler}: no cluster answers there ({error})"
         raise ValueError(words) from error
     return pool
-
-
-def _figure(ratios: pd.DataFrame) -> Figure:
-    """Shares of machines whose largest reading lies below a multiple of the limit."""
-    from rotorid.base.plot_style import on_figure, plain
-
-    def draw(ax: Axes) -> None:
-        plain(ax)
-        for k, values in enumerate(ratios.ffill(axis=1).dropna().T.to_numpy()):
-            ax.ecdf(values, label=f"after {counted(k, 'correction')}")
-        ax.set(xscale="log", xlabel="largest reading over its limit", ylabel="share of machines below")
-        ax.legend()
-
-    return on_figure(draw)

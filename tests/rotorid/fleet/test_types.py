@@ -9,7 +9,7 @@ import pytest
 from balancing import UndeterminedError
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import read_job
-from rotorid.fleet import FleetFitOptions, fleet_fit
+from rotorid.fleet import fleet_fit
 from rotorid.fleet.jobs import read_fleet
 from rotorid.fleet.machine_type import type_coefficients
 
@@ -68,9 +68,9 @@ class Machine:
         path.write_text("\n".join(lines) + "\n")
 
 
-def fit(tree, file, machine_type=None):
+def fit(tree, file):
     """The outcome of a fit, and the table of the fleet in a file."""
-    outcome = fleet_fit(tree, FleetFitOptions(machine_type))
+    outcome = fleet_fit(tree)
     file.write_bytes(outcome.written(file))
     return outcome
 

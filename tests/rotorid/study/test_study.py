@@ -1,4 +1,4 @@
-"""Studies: probabilities against closed forms, balancing by runs, starts of calibrations, files, pictures."""
+"""Studies: probabilities against closed forms, balancing by runs, starts of calibrations, files."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -127,11 +127,8 @@ def test_what_is_wrong_with_a_file_is_told_with_its_key(tmp_path, old, new, word
 
 def test_the_command(cli, tmp_path):
     file = write(tmp_path, TWO)
-    outcome = cli(
-        "study", file, "--json", "--results", tmp_path / "kept.parquet", "--plot", tmp_path / "a.png"
-    )
+    outcome = cli("study", file, "--json", "--results", tmp_path / "kept.parquet")
     assert outcome.code == 0, outcome.err
     assert {"probability", "interval", "samples"} < set(outcome.json)
     assert b'"seed": 1' in pq.read_schema(tmp_path / "kept.parquet").metadata[b"study"]
-    assert (tmp_path / "a.png").stat().st_size > 10_000
     assert cli("study", file, "--samples", "0").code == 2
