@@ -13,7 +13,6 @@ from balancing.conditioning import (
     Conditioning,
     UndeterminedError,
     check_runs,
-    clear_change,
     conditioning,
 )
 from balancing.convention_test import ConventionTest, convention_test
@@ -86,7 +85,6 @@ __all__ = [
     "best_subsets",
     "change_of_run",
     "check_runs",
-    "clear_change",
     "combine",
     "compare_check",
     "compare_planes",

@@ -305,22 +305,3 @@ def check_effects(
                 " changed the readings by no more than their errors explain: its effect is not determined; "
             )
             raise UndeterminedError("\n".join((*contradictions, words + remedy)))
-
-
-def clear_change(before: complex, after: complex) -> bool:
-    """Whether a reading changed enough, by the engineers' rule.
-
-    Parameters
-    ----------
-    before, after
-        The reading without and with a trial weight.
-
-    Returns
-    -------
-    bool
-        By 30 % of its amplitude or by 30°, or from rest.
-    """
-    if not before:
-        return True
-    ratio = after / before
-    return bool(abs(abs(ratio) - 1) >= ENGINEERS_AMPLITUDE or abs(np.angle(ratio)) >= ENGINEERS_PHASE)

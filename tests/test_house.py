@@ -21,8 +21,8 @@ PAIRS, NAMES, SCREEN = 230, 102, 25
 """Commands with options, without --help, and of one command: at most so many."""
 EXEMPT = 16
 """Functions that may be longer or take more than ruff's limits: at most so many."""
-DIALECT = 49
-"""Bindings named `said`, `told`, `found`, `own`, `known` or `felt`: at most so many, 50 in the end."""
+DIALECT = 50
+"""Bindings named `said`, `told`, `found`, `own`, `known` or `felt`: at most so many."""
 
 
 def modules():

@@ -3,14 +3,13 @@
 from balancing.plots.along_shaft import draw_tolerance, draw_unbalance, draw_verdict
 from balancing.plots.correction import correction_figure, draw_correction, residual_figure
 from balancing.plots.discs import draw_disc, draw_plane, mounted_discs, weight_figure
-from balancing.plots.polar import draw_readings, draw_trial_weight, trial_figure
+from balancing.plots.polar import draw_trial_weight, trial_figure
 
 __all__ = [
     "correction_figure",
     "draw_correction",
     "draw_disc",
     "draw_plane",
-    "draw_readings",
     "draw_tolerance",
     "draw_trial_weight",
     "draw_unbalance",

@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
-from balancing.regions import region_edge
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.plot_style import COLORS, MARKERS, QUIET, TEXT, legend_above, legend_below, new_figure
-from rotorid.base.text import cut, figures
+from rotorid.base.plot_style import COLORS, MARKERS, TEXT, legend_below, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
     from balancing.trial_weight import TrialWeight
-    from balancing.trials import Trials
 
 Shown = Callable[[ArrayLike], tuple[FloatArray, FloatArray]]
 """`Labels.weight` or `Labels.vibration`: size and angle in degrees as the job writes them."""
@@ -98,46 +95,6 @@ def on_paper(labels: Labels, vectors: ArrayLike) -> ComplexArray:
 def unit(labels: Labels) -> str:
     """Unit of the readings, as it stands behind the name of an axis."""
     return f", {labels.vibration_in}" if labels.vibration_in else ""
-
-
-def draw_readings(
-    trials: Trials, covariance: FloatArray, first: str | None = None, ax: Axes | None = None
-) -> Axes:
-    """Draw the readings of one sensor at one speed in polar axes.
-
-    Parameters
-    ----------
-    trials
-        Runs at one speed by one sensor.
-    covariance
-        Of their means, shape (R, 1, 1, 2, 2).
-    first
-        The baseline, from whose tip a dotted line goes to each other run; None: there is none yet.
-    ax
-        Polar axes; None: of a new figure.
-
-    Raises
-    ------
-    ValueError
-        For axes that are not polar.
-    """
-    labels, shown, values = trials.labels, trials.labels.vibration, trials.mean[:, 0, 0]
-    where = f"{trials.sensors[0]} at {labels.speed_words(float(trials.speeds[0]))}{unit(labels)}"
-    polar = polar_axes(ax, labels.phase_sign, f"{where}\nphase as {labels.phase}")
-    edges = region_edge(values, covariance[:, 0, 0], 121)
-    for r, (run, size, phase) in enumerate(zip(trials.runs, *shown(values), strict=True)):
-        name, look = f"{cut(run, 24)}: {figures(size)} at {phase:.0f}°", of_plane(r)
-        draw_line(polar, shown, [0, values[r]], lw=2, label=name, **look)
-        draw_line(polar, shown, edges[r], color=look["color"], lw=1)
-        if first is not None:
-            change = [values[trials.runs.index(first)], values[r]]
-            draw_line(polar, shown, change, ":", color=look["color"])
-    from_zero(polar, shown, values)
-    polar.plot([], [], color=QUIET, label="closed lines: 95 % of one reading")
-    if first is not None:
-        polar.plot([], [], ":", color=QUIET, label=f"dotted: change from {cut(first, 24)}")
-    legend_above(polar, 2, height=-0.08)
-    return polar
 
 
 def trial_figure(weights: Sequence[TrialWeight]) -> Figure:

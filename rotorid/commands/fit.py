@@ -170,7 +170,7 @@ def _read(
 ) -> list[Record]:
     """All records, with standard deviations for all of them or for none."""
     from rotorid.files import read_record
-    from rotorid.files.records import STD
+    from rotorid.files.measurements import STD
     from rotorid.identify.records import Record
 
     records = [

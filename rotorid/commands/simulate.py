@@ -202,7 +202,7 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     import numpy as np
 
     from rotorid.files import read_ode_model, read_record
-    from rotorid.files.records import record_columns
+    from rotorid.files.measurements import record_columns
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
     from rotorid.identify.simulation import simulated_record

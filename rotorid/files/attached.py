@@ -103,7 +103,7 @@ class _SupportKeys(Place):
             columns = {name: table.numbers(name) for name in table.fields}
             speeds = columns.pop("speed")
             if twice := values.keys() & columns:
-                raise ValueError(f"{NAMES[min(twice)]} once: {table.source} has this column, too")
+                raise ValueError(f"{NAMES[min(twice)]} once: {table.grid.source} has this column, too")
             values |= columns
         if not values:
             raise ValueError("its stiffness is missing, or its damping, here and in a table over speed")
@@ -277,7 +277,7 @@ def _matrices(quantity: str, values: Mapping[str, Any]) -> FloatArray:
 def _over_speed(path: Path, kind: str) -> Table:
     """A table of coefficients."""
     problems = Problems()
-    table = problems.need(read_table(path, kind, COLUMNS, problems))
+    table = read_table(path, kind, COLUMNS, problems)
     rising = ~(np.diff(table.numbers("speed"), prepend=-1e-300) <= 0)
     table.must_be("speed", rising, "a speed of 0 or more, above that of the row before (each once)")
     for name in _DIAGONAL if kind == "bearing" else ():

@@ -29,7 +29,7 @@ SMALLEST, LARGEST = 1e-30, 1e30
 LARGEST_STATED = 1e12
 """Of an option."""
 SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
-_SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])\s*(?:[,;\t].*)?", re.DOTALL)
+SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])\s*(?:[,;\t].*)?", re.DOTALL)
 """#N/A, #DIV/0!, #ИМЯ?, alone or at the beginning of a line."""
 _AROUND = '#"; ,\t'
 """Around the text of a comment."""
@@ -146,12 +146,7 @@ def show(cell: Cell) -> str:
 
 def is_comment(line: str) -> bool:
     """Whether a line, or the first cell of a row, begins as a comment and is no error of a spreadsheet."""
-    return line.startswith("#") and not is_spreadsheet_error(line)
-
-
-def is_spreadsheet_error(cell: str) -> bool:
-    """Whether a cell holds what a spreadsheet shows for an error, in English or another language."""
-    return _SPREADSHEET_ERROR.fullmatch(cell) is not None
+    return line.startswith("#") and not SPREADSHEET_ERROR.fullmatch(line)
 
 
 def decode(source: str, data: bytes, problems: Problems) -> str | None:
@@ -174,7 +169,7 @@ def decode(source: str, data: bytes, problems: Problems) -> str | None:
                     warnings.warn(message, TableWarning, stacklevel=2)
                 return text
     expected = next(words for mark, words in _OTHERS.items() if data.startswith(mark))
-    problems.add(source, None, None, None, expected)
+    problems.add(expected, source)
     return None
 
 
@@ -191,13 +186,13 @@ def parse_text(
     if declared:
         del lines[0]
         if declared[1] not in ";,\t":
-            problems.add(source, 1, None, f"sep={declared[1]}", "sep=; or sep=, or a tab")
+            problems.add("sep=; or sep=, or a tab", source, 1, None, f"sep={declared[1]}")
             return None
     start, names = header_place(_first_rows(lines), find)
     start = start or len(lines)
     separator = declared[1] if declared else _separator(lines[start - 1])
     if len(lines) + text.count(separator) > MOST_CELLS:
-        problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
+        problems.add(f"a table of at most {MOST_CELLS:,} cells", source)
         return None
     rows, complete = list[Row](), True
     for number, line in enumerate(lines, start=1):
@@ -207,7 +202,7 @@ def parse_text(
             rows.append((number, (clean(line),) if comment else _cells(line, separator)))
         except csv.Error as error:
             rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
-            problems.add(source, number, None, None, f"{rule}: {error}")
+            problems.add(f"{rule}: {error}", source, number)
             complete = False
     place = start, names
     return make_grid(
@@ -301,7 +296,7 @@ def make_grid(
         if complete:
             expected = "a table with a header row; the file is empty"
             expected = "rows below the header; there are none" if filled else expected
-            problems.add(source, filled[0][0] if filled else None, None, None, expected)
+            problems.add(expected, source, filled[0][0] if filled else None)
         return None
     (header_row, names), *body = filled
     header = [*map(show, names)]
@@ -318,7 +313,7 @@ def make_grid(
                     expected += (
                         "; numbers with a decimal comma need ; between the columns, comments have no ,"
                     )
-                problems.add(source, number, None, show(cells[lost[-1]]), expected)
+                problems.add(expected, source, number, None, show(cells[lost[-1]]))
         body = [(number, (cells + ("",) * width)[:width]) for number, cells in body]
     return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
 
@@ -384,7 +379,7 @@ def parse_number(text: str, *, comma: bool = False, separator: str = "") -> floa
     Raises
     ------
     NotANumber
-        For everything that is not plainly a finite number; nothing is guessed.
+        For everything that is not plainly a number; nothing is guessed.
     """
     written_with_comma = _COMMA.fullmatch(text) is not None
     if written_with_comma and not comma:
@@ -395,7 +390,4 @@ def parse_number(text: str, *, comma: bool = False, separator: str = "") -> floa
         raise NotANumber(
             "a number with a decimal comma, as elsewhere in this file (a point could separate thousands)"
         )
-    value = float(text.replace(",", "."))
-    if not math.isfinite(value):
-        raise NotANumber("a finite number")
-    return value
+    return float(text.replace(",", "."))

@@ -16,6 +16,7 @@ from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.choices import suggest
 from rotorid.base.text import listing
 from rotorid.files.cells import (
+    SPREADSHEET_ERROR,
     BadCell,
     Cell,
     Finder,
@@ -26,31 +27,19 @@ from rotorid.files.cells import (
     decimal_comma,
     decode,
     header_place,
-    is_spreadsheet_error,
     make_grid,
     parse_number,
     parse_text,
     show,
     thousands_or_decimals,
 )
-from rotorid.files.disk import read_bytes
-from rotorid.files.excel_workbook import is_workbook, pick_sheet, read_workbook
+from rotorid.files.disk import is_workbook, read_bytes
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")
 TOP = 10_000
 """Bytes of a file in which its headings stand."""
-KINDS = {
-    "a runs table": ("run", "speed", "sensor", "amplitude", "phase"),
-    "an influence table": ("speed", "sensor", "plane", "influence"),
-    "a weights table": ("run", "plane", "angle"),
-    "a table of modes": ("mode", "node", "shape"),
-    "a table of compliances": ("node", "force_node", "compliance"),
-    "a rotor table": ("length", "diameter"),
-    "an unbalance table": ("unbalance", "angle"),
-}
-"""Columns by which a table is known that is taken for another kind."""
 _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
 TEXT, UNCLEAR = Unit("", "text"), Unit("?", "unclear")
@@ -113,9 +102,9 @@ class Table:
 
     Attributes
     ----------
-    source
-        The file, and the sheet of a workbook.
-    header_row, rows
+    grid
+        Its cells, and where they are from.
+    rows
         Row numbers in the file.
     fields
         By stem of the column's name.
@@ -123,20 +112,13 @@ class Table:
         Collects the complaints.
     misspelt
         Stems that unknown columns were probably meant to have; they have been reported, with that suggestion.
-    comments
-        Comment lines.
-    complete
-        Whether every row of the file is here.
     """
 
-    source: str
-    header_row: int
+    grid: Grid
     rows: tuple[int, ...]
     fields: Mapping[str, Field]
     problems: Problems
-    misspelt: frozenset[str] = frozenset()
-    comments: tuple[str, ...] = ()
-    complete: bool = True
+    misspelt: frozenset[str]
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -173,7 +155,7 @@ class Table:
     def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
         """Note a problem with one cell."""
         name = self.fields[stem].names[index]
-        self.problems.add(self.source, self.rows[index], name, self.shown(stem, index), expected)
+        self.problems.add(expected, self.grid.source, self.rows[index], name, self.shown(stem, index))
 
     def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
         """Note a problem with each of these cells of a column."""
@@ -182,11 +164,12 @@ class Table:
 
     def in_header(self, column: str | None, expected: str) -> None:
         """Note a problem with the header: a column that it lacks, or has too much."""
-        self.problems.add(self.source, self.header_row, column, None, expected)
+        self.as_whole(column, expected, self.grid.header_row)
 
-    def as_whole(self, column: str | None, expected: str) -> None:
-        """Note a problem of no single row."""
-        self.problems.add(self.source, None, column, None, expected)
+    def as_whole(self, column: str | None, expected: str, row: int | None = None) -> None:
+        """Note a problem of no single row with a column, by its stem or any other name."""
+        field = self.fields.get(column or "")
+        self.problems.add(expected, self.grid.source, row, field.name if field else column)
 
     def must_be(self, stem: str, allowed: FloatArray | Iterable[bool], expected: str) -> None:
         """Complain about every number of a column that is not allowed; unreadable ones have been reported."""
@@ -200,7 +183,7 @@ class Table:
         if len(present) == 1:
             return present[0]
         if present or self.misspelt.isdisjoint(stems):
-            self.in_header(self.fields[present[1]].name if present else usual, expected)
+            self.in_header(present[1] if present else usual, expected)
         return None
 
     def once(self, stem: str, values: Iterable[Hashable], expected: str) -> None:
@@ -219,7 +202,7 @@ def read_table(
     sheet: str,
     columns: Sequence[Column],
     problems: Problems,
-) -> Table | None:
+) -> Table:
     """Read a table from a text file or a workbook.
 
     Parameters
@@ -235,11 +218,16 @@ def read_table(
 
     Returns
     -------
-    Table or None
-        None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
+    Table
+        Unusable cells hold NaN or `""`.
+
+    Raises
+    ------
+    InputError
+        Where not even the columns are clear.
     """
-    grid = read_grid(source, sheet, problems, first=True)
-    return None if grid is None else make_table(grid, columns, problems)
+    grid = problems.need(read_grid(source, sheet, problems, first=True))
+    return problems.need(make_table(grid, columns, problems))
 
 
 def read_grid(
@@ -257,6 +245,8 @@ def read_grid(
         return source
     path = Path(str(source))
     if is_workbook(path):
+        from rotorid.files.excel_workbook import pick_sheet, read_workbook
+
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
         if chosen is None:
@@ -307,7 +297,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
             places[column.stem] = k, unit, column
         if wrong:
             name = grid.named[0][k] if grid.named else names[k]
-            problems.add(grid.source, grid.header_row, name, name, wrong)
+            problems.add(wrong, grid.source, grid.header_row, name, name)
     of_numbers = [k for k, unit, _ in places.values() if unit is not TEXT]
     commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
     comma = decimal_comma(commas, grid.separator)
@@ -315,7 +305,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     if any(column.required and column.stem not in places for column in columns):
         return None
     rows = tuple(number for number, _ in grid.rows)
-    return Table(grid.source, grid.header_row, rows, fields, problems, misspelt, grid.comments, grid.complete)
+    return Table(grid, rows, fields, problems, misspelt)
 
 
 def column_of(name: str, columns: Sequence[Column]) -> Column | None:
@@ -352,28 +342,20 @@ def _has_columns(
     present, others, alone = listing(there, "and"), listing(unknown, "and"), len(unknown) == 1
     place = grid.source, grid.header_row
     if not stems or (len(missing) > 1 and unknown) or len(unknown) > max(2, len(stems)):
-        kinds = (
-            f": it seems to be {kind}"
-            for kind, its in KINDS.items()
-            if all(any(f"{name}_".startswith(f"{stem}_") for name in there) for stem in its)
-        )
-        seems = next(kinds, "; remarks go into 'note'")
         names = f"; there are {present}" if stems else ""  # else it may be no table, but a secret
-        expected = (
-            f"a header row with the names of columns, separated by , or ; or tabs: {possible}{names}{seems}"
-        )
+        expected = f"a header row with the names of columns, separated by , or ; or tabs: {possible}{names}"
         # that rows are longer than a title is no news
         problems[:] = [problem for problem in problems if problem.file != grid.source]
-        problems.add(*place, unknown[0] if stems else None, None, expected)
+        problems.add(expected, *place, unknown[0] if stems else None)
         return False
     if missing and all(problem.file != grid.source for problem in problems):
         needed = listing([one.names[0] for one in missing], "and")
         what = f"columns {needed}" if len(missing) > 1 else f"a column {listing(missing[0].names)}"
         expected = f"{what}; the columns are {present}"
-        problems.add(*place, missing[0].names[0], others or None, expected)
+        problems.add(expected, *place, missing[0].names[0], others or None)
     elif unknown and not missing:
         expected = f"{'a known column' if alone else 'known columns'}: {possible}; remarks go into 'note'"
-        problems.add(*place, others if alone else None, others, expected)
+        problems.add(expected, *place, others if alone else None, others)
     return True
 
 
@@ -392,7 +374,7 @@ def _field(grid: Grid, index: int, unit: Unit, column: Column, problems: Problem
                 read[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
         except NotANumber as error:
             if not column.lenient:
-                problems.add(grid.source, grid.rows[place][0], names[place], show(cell), str(error))
+                problems.add(str(error), grid.source, grid.rows[place][0], names[place], show(cell))
     values = [read.get(cell, nothing) for cell in cells]
     name = names[0] if len(set(names)) == 1 else header
     return Field(name, unit, cells, values if unit is TEXT else np.array(values, dtype=float), names)
@@ -406,7 +388,12 @@ def _value(cell: Cell, unit: Unit, separator: str, doubtful: set[str], *, comma:
         text = show(cell)
         if not text:
             raise NotANumber("a name")
-        if text[0] in "=@" or not text.isprintable() or is_spreadsheet_error(text) or not text.strip("#"):
+        if (
+            text[0] in "=@"
+            or not text.isprintable()
+            or SPREADSHEET_ERROR.fullmatch(text)
+            or not text.strip("#")
+        ):
             raise NotANumber(
                 "a name, not an error of the spreadsheet, hidden characters or a formula, with = or @ first"
             )

@@ -17,6 +17,8 @@ from rotorid.base.logs import files as log
 from rotorid.files.problems import STANDARD_INPUT, Problems, refusal
 
 MOST_BYTES = 200_000_000
+SUFFIXES = (".xlsx", ".xlsm")
+"""Of workbooks."""
 reading: ContextVar[Callable[[Path], None] | None] = ContextVar("reading", default=None)
 """Is called before a file is opened, and may refuse it by an OSError."""
 _files: ContextVar[tuple[dict[Path, bytes], dict[Path, None]] | None] = ContextVar("files", default=None)
@@ -101,8 +103,13 @@ def read_bytes(path: Path, problems: Problems) -> bytes | None:
     try:
         return file_content(path)
     except (OSError, ValueError) as error:
-        problems.add(str(path), None, None, None, why_unreadable(path, error))
+        problems.add(why_unreadable(path, error), path)
     return None
+
+
+def is_workbook(path: Path) -> bool:
+    """Whether the name says that the file is a workbook."""
+    return path.suffix.lower() in SUFFIXES
 
 
 def why_unreadable(path: Path, error: OSError | ValueError) -> str:

@@ -13,7 +13,6 @@ from rotorid.files.cells import MOST_CELLS, BadCell, Cell, Row, Shown, clean
 from rotorid.files.disk import read_bytes
 from rotorid.files.problems import InputError, Problems, refusal
 
-SUFFIXES = (".xlsx", ".xlsm")
 MOST_UNPACKED = 200_000_000
 """Bytes of all parts of a workbook."""
 _DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
@@ -25,11 +24,6 @@ _REFUSED = {
     "d": "a number or text; the spreadsheet turned the cell into a date or time",
 }
 """What is expected instead of a cell of these types of openpyxl."""
-
-
-def is_workbook(path: Path) -> bool:
-    """Whether the name says that the file is a workbook."""
-    return path.suffix.lower() in SUFFIXES
 
 
 def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None:
@@ -45,7 +39,7 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         expected = f"an intact Excel workbook (reading it failed: {reason})"
-        problems.add(str(path), None, None, None, expected)
+        problems.add(expected, path)
     return None
 
 
@@ -122,5 +116,5 @@ def pick_sheet(
     there = there or [title for title, rows in sheets.items() if rows] or list(sheets)
     if there and (first or len(there) == 1):
         return there[0], sheets[there[0]]
-    problems.add(str(path), None, None, None, f"a sheet {name!r}; the sheets are {', '.join(sheets)}")
+    problems.add(f"a sheet {name!r}; the sheets are {', '.join(sheets)}", path)
     return None

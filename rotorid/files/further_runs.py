@@ -22,10 +22,10 @@ import numpy as np
 from balancing import Influence, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
-from rotorid.base.text import counted, listing
+from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
-from rotorid.files.conventions import Conventions
+from rotorid.files.layout import Conventions
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 
@@ -97,7 +97,7 @@ def make_slow_roll(
         _complain(outside(runs, trials, ()), place, place, problems)
         if len(runs.runs) > 1:
             expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
-            problems.add(place, None, "run", runs.runs[1], expected)
+            problems.add(expected, place, None, "run", runs.runs[1])
         given, vectors, lowest = runs.sensors, runs.mean[0], float(trials.speeds.min())
         near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
         if len(runs.speeds) == 1:
@@ -114,7 +114,7 @@ def make_slow_roll(
             missing = show_speed(float(trials.speeds[near.index(None)]), unit)
             expected = "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
             expected += f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
-            problems.add(place, None, "speed", None, expected)
+            problems.add(expected, place, None, "speed")
         else:
             vectors = vectors[near]
     if len(problems) > before:
@@ -149,7 +149,7 @@ def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, pro
     """Note what is `outside` the job in the files of further runs and their weights."""
     for column, shown, there in more:
         file = weights if column in ("plane", "weight") else runs
-        problems.add(file, None, column, shown, f"what the job has: {there}")
+        problems.add(f"what the job has: {there}", file, None, column, shown)
 
 
 def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
@@ -160,15 +160,11 @@ def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
     def shown(amplitude: float) -> str:
         return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_in}".rstrip()
 
-    excess = S * (1.0 - 1e-12) - size
-    if others := int((excess > 0).sum()):
-        r, s, c = np.unravel_index(int(np.nanargmax(excess)), excess.shape)
-        more = f", and than {counted(others - 1, 'other reading')}" if others > 1 else ""
+    for r, s, c in np.argwhere(size < S * (1.0 - 1e-12))[:1]:
         words.append(
             f"the slow-roll vector of sensor {trials.sensors[c]!r}, {shown(S[s, c])}, is larger than "
             f"its reading in run {trials.runs[r]!r} at {labels.speed_words(float(trials.speeds[s]))}, "
-            f"{shown(size[r, s, c])}{more}: check its unit, and that the readings have not been "
-            "corrected already"
+            f"{shown(size[r, s, c])}: check its unit, and that the readings have not been corrected already"
         )
     largest = float(S.max(initial=0.0))
     if errors is not None and (share := max(errors.amplitude, errors.phase) * largest):
@@ -216,7 +212,7 @@ def check_runs(
     for k, at in enumerate(near):
         if at is not None and at in near[:k]:
             shown = show_speed(float(check.speeds[k]), units.SPEED[check.labels.speed_unit])
-            problems.add(runs, None, "speed", shown, "each speed of the job once")
+            problems.add("each speed of the job once", runs, None, "speed", shown)
     if len(problems) > before:
         return None
     rows = [at or 0 for at in near]

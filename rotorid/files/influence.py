@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, fields, replace
+from dataclasses import replace
 from itertools import islice, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,7 +126,7 @@ def load_influence(
         table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
         if table is None or table.unit("influence") == UNCLEAR:
             return None
-        text = "\n".join((table.fields["phase"].name, *reversed(table.comments)))
+        text = "\n".join((table.fields["phase"].name, *reversed(table.grid.comments)))
         stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
         usual = {"phase": phase or "lead", "angles": angles or "with rotation"}
         influence = _from_table(table, Labels(**{**usual, **stated}), before)
@@ -165,11 +165,8 @@ def _tidied(grid: Grid) -> Grid:
 
 def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     """The coefficients with these conventions, or None and more problems than `before`."""
-    size, angle, unit, std = (
-        *map(table.numbers, ("influence", "phase")),
-        table.unit("influence"),
-        "std" in table,
-    )
+    size, angle, std = table.numbers("influence"), table.numbers("phase"), "std" in table
+    unit = table.unit("influence")
     vibration, weight, reciprocal = _units(unit.name)
     keys = [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
     least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
@@ -178,9 +175,9 @@ def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
     if reciprocal and (std or len({key[1:] for key in keys}) > 1):
         alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
-        table.in_header(table.fields["influence"].name, alone)
+        table.in_header("influence", alone)
     elif std and table.unit("std") != unit:
-        table.in_header(table.fields["std"].name, f"the unit of the coefficients, std_{unit.name}")
+        table.in_header("std", f"the unit of the coefficients, std_{unit.name}")
     table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
     if not keys or len(table.problems) > before:
         return None
@@ -222,8 +219,7 @@ def _from_json(path: Path, problems: Problems) -> Influence | None:
         problems.refuse_newer(str(path), whole["schema_version"])
         return _of_document(whole["influence"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        problems.add(str(path), None, None, None, f"coefficients as rotorid balance writes them ({reason})")
+        problems.add(f"coefficients as rotorid balance writes them (missing or wrong: {error})", path)
     return None
 
 
@@ -261,7 +257,7 @@ def _complex(parts: Any) -> ComplexArray:  # noqa: ANN401  a part of a JSON docu
 def _document(influence: Influence) -> dict[str, Any]:
     """All that is known of coefficients and their errors, SI and phase lead: (2, …) real, imaginary parts."""
     covariance, common = influence.errors.noise.at(influence.errors.sizes)
-    run, reading = influence.run_errors, influence.reading
+    reading = influence.reading
     stored = {
         "speeds_rad_s": influence.speeds,
         "sensors": influence.sensors,
@@ -271,12 +267,12 @@ def _document(influence: Influence) -> dict[str, Any]:
         "covariance": covariance,
         "common": (common.real, common.imag),
         "reading": {
-            "errors": None if reading.errors is None else asdict(reading.errors),
+            "errors": reading.errors and vars(reading.errors),
             "source": reading.source,
             "dof": reading.dof,
         },
-        "run_errors": {field.name: getattr(run, field.name) for field in fields(run)},
-        "labels": asdict(influence.labels),
+        "run_errors": vars(influence.run_errors),
+        "labels": vars(influence.labels),
     }
     return plain({"schema_version": SCHEMA_VERSION, "influence": stored})
 
@@ -361,7 +357,7 @@ def fit_to_readings(
     for column, shown, there in outside(trials, influence, influence.planes, tolerance_percent):
         expected = f"coefficients for {column} {shown!r}, which the readings have; there are {there}"
         column = "influence" if column in ("amplitude", "weight") else column
-        problems.add(source, None, column, None, expected)
+        problems.add(expected, source, None, column)
     if len(problems) > before:
         return None
     rows = [nearest_speed(influence.speeds, v, tolerance_percent) or 0 for v in trials.speeds.tolist()]

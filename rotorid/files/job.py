@@ -14,7 +14,6 @@ from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
-from rotorid.files.conventions import ROTATIONS, Conventions, resolve_angles
 from rotorid.files.job_models import (
     READINGS,
     TABLES,
@@ -27,7 +26,7 @@ from rotorid.files.job_models import (
     named_tables,
 )
 from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
-from rotorid.files.layout import files_of_runs, stated_phase
+from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.settings import read_toml
@@ -282,20 +281,19 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     )
 
 
-_ARGUMENTS = ("phase", "angles", "amplitude_error_percent", "phase_error_deg")
+_ERRORS = {"amplitude_error_percent": "amplitude_percent", "phase_error_deg": "phase_deg"}
 
 
 def _stating(settings: JobSettings, stated: Mapping[str, Any]) -> JobSettings:
     """The settings of a job with what the caller states in their place."""
-    if unknown := [name for name in stated if name not in _ARGUMENTS]:
+    known = ("phase", "angles", *_ERRORS)
+    if unknown := [name for name in stated if name not in known]:
         raise TypeError(
-            f"a job is read with {listing(_ARGUMENTS, 'and')}, not {listing(unknown, 'and')}: other errors "
+            f"a job is read with {listing(known, 'and')}, not {listing(unknown, 'and')}: other errors "
             "are stated in the job, [errors]"
         )
     given = {name: value for name, value in stated.items() if value is not None}
-    percent, degrees = (given.pop(name, None) for name in _ARGUMENTS[2:])
-    errors = {"amplitude_percent": percent, "phase_deg": degrees}
-    if errors := {key: value for key, value in errors.items() if value is not None}:
+    if errors := {_ERRORS[name]: given.pop(name) for name in given.keys() & _ERRORS}:
         given["errors"] = (settings.errors or Errors.model_construct()).model_copy(update=errors)
     return settings.model_copy(update=given)
 
@@ -344,8 +342,7 @@ def _readings(
     if source is not None:
         name = source_name(source)
         adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
-        if adopted:
-            words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+        if words := " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted):
             notes.append(
                 "nothing states the conventions of the readings: those of "
                 f"{name} are used for them too, {words}"

@@ -16,8 +16,8 @@ from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, header_place, make_grid, show
 from rotorid.files.columns import REMARKS
-from rotorid.files.disk import read_bytes
-from rotorid.files.excel_workbook import is_workbook, read_workbook
+from rotorid.files.disk import is_workbook, read_bytes
+from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.headings import find_header
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
 from rotorid.files.problems import Problems, refusal
@@ -46,7 +46,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
                 f"a known sheet{did_you_mean(name, SHEETS)}; known are {listing(SHEETS, 'and')}, remarks go "
                 "into 'notes' (hidden sheets count too)"
             )
-            problems.add(str(path), None, None, title, expected)
+            problems.add(expected, path, None, None, title)
     for name in (name for name in SHEETS[:-1] if name in titles):
         rows = sheets[titles[name]]
         find = (
@@ -63,7 +63,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
             _read_rows(grid, name, job, problems)
     if "runs" not in titles:
         shown = listing((repr(title) for title in sheets), "and")
-        problems.add(str(path), None, None, None, f"a sheet 'runs' with readings; the sheets are {shown}")
+        problems.add(f"a sheet 'runs' with readings; the sheets are {shown}", path)
     if "runs" not in job.tables:
         problems.stop()
     return job
@@ -82,7 +82,7 @@ def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> N
     if at is None or not (named or [*columns.values()] == ["value"]):
         there = listing(filter(None, grid.header), "and")
         expected = f"a column {first}; the columns are {there}" if named else "the columns key and value"
-        problems.add(grid.source, grid.header_row, first, None, expected)
+        problems.add(expected, grid.source, grid.header_row, first)
         return
     for row, cells in grid.rows:
         key, place = show(cells[at]), (grid.source, row, grid.header[at])
@@ -90,7 +90,7 @@ def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> N
         again = job.where.get(".".join(parts))
         if isinstance(cells[at], BadCell) or not key or again:
             expected = f"each {first} once (row {again[1]} has it too)" if again else f"the name of a {first}"
-            problems.add(*place, key, getattr(cells[at], "expected", expected))
+            problems.add(getattr(cells[at], "expected", expected), *place, key)
             continue
         if named:
             _put(job, parts, {}, place)
@@ -98,10 +98,10 @@ def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> N
             inner, where = ([*parts, column] if named else parts), (grid.source, row, grid.header[i])
             value = _value(inner[-1], cells[i])
             if isinstance(value, BadCell):
-                problems.add(*where, value.value, value.expected)
+                problems.add(value.expected, *where, value.value)
             elif value != "" and not _put(job, inner, value, where):
                 expected = f"no parts of {'.'.join(parts[:-1])}, which has a value of its own"
-                problems.add(*place, key, expected)
+                problems.add(expected, *place, key)
 
 
 def _value(key: str, cell: Cell) -> Cell | bool:
@@ -187,7 +187,7 @@ def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
             book.remove(sheet)
         for cell in (cell for row in sheet.iter_rows() for cell in row):
             if cell.comment is not None:
-                cell.comment.width, cell.comment.height = 320, 24 + 20 * (1 + len(cell.comment.text) // 45)
+                cell.comment.width, cell.comment.height = 320, 160
             if isinstance(cell.value, float):  # of which openpyxl would keep 16 digits; 17 are needed
                 cell.value, cell.data_type = repr(cell.value), "n"
     return book

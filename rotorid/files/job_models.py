@@ -15,9 +15,10 @@ from balancing import Placement, ReadingErrors, RunScatter, Trials
 from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
-from rotorid.files.conventions import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
+from rotorid.files.layout import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
 from rotorid.files.problems import Problems, refusal
 from rotorid.files.settings import (
+    Count,
     Date,
     Label,
     NotNegative,
@@ -107,7 +108,6 @@ Limits: Any = Annotated[
 ]
 Weight = Annotated[Quantity, of(Positive)]
 File = Annotated[Text, AfterValidator(_printable)]
-Count = Annotated[Whole, Field(ge=1)]
 
 
 class _Placed(Settings):

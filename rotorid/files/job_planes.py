@@ -23,8 +23,8 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import NotANumber, parse_number
 from rotorid.files.columns import Source
-from rotorid.files.conventions import Conventions
 from rotorid.files.job_models import JobSettings, Plane, Sensor
+from rotorid.files.layout import Conventions
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.runs import nearest_speed, show_speeds
 from rotorid.files.settings import Settings

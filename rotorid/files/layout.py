@@ -1,4 +1,4 @@
-"""Runs and weights tables in any layout, brought by their headings into long rows of one form.
+"""Runs and weights tables in any layout, brought by headings into long rows of one form, and conventions.
 
 A runs table has a row for each run, speed and sensor, a weights table one for each run and plane. Columns for
 each sensor or plane, two heading rows, units rows, units in cells, two quantities in one cell (`6.93 @ 98°`)
@@ -11,16 +11,16 @@ import math
 import re
 import warnings
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, get_args
 
-from rotorid.base.text import Phase, listing
+from balancing import Labels
+from rotorid.base.text import Angles, Phase, Rotation, listing
 from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
-from rotorid.files.conventions import PHASES, Conventions
 from rotorid.files.headings import (
     BOTH_UNITS,
     LONGEST,
@@ -32,7 +32,7 @@ from rotorid.files.headings import (
     read_unit,
     readable,
 )
-from rotorid.files.problems import InputError, Problem, Problems
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.units import UnitError, spelt
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
@@ -48,6 +48,77 @@ MOUNTED = "note of weights: "
 _OF_READING = ("run", "speed", "repeat")
 _NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
+
+
+PHASES: tuple[Phase, ...] = get_args(Phase)
+ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
+DEFAULT_TOLERANCE = 0.5
+LARGEST_TOLERANCE = 20.0
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """What the numbers of a job's tables mean.
+
+    Attributes
+    ----------
+    labels
+        How phases and angles count and how the rotor turns; the units are those of the tables, once read.
+    speed_tolerance_percent
+        Speeds of different runs that differ by less count as one.
+    unstated
+        Which of "phase" and "angles" neither the job nor the caller states.
+    exchanged
+        Whether amplitudes and phases stand in each other's columns of the runs tables; None: unstated.
+    speed
+        Unit and number of the only speed, for runs tables without a column of speeds.
+    holes
+        Angle in degrees, as the job counts, of each hole by its name, for each plane that has holes.
+    removed
+        Planes in which material is taken away.
+    rms
+        Whether the job has limits in rms, so that mm/s alone are rms.
+
+    Raises
+    ------
+    ValueError
+        For a tolerance that is not allowed.
+    """
+
+    labels: Labels = field(default_factory=Labels)
+    speed_tolerance_percent: float = DEFAULT_TOLERANCE
+    unstated: tuple[str, ...] = ()
+    exchanged: bool | None = None
+    speed: tuple[str, float] | None = None
+    holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    removed: frozenset[str] = frozenset()
+    rms: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
+            raise ValueError(
+                f"speed_tolerance_percent must be from 0 to {LARGEST_TOLERANCE:g}, "
+                f"not {self.speed_tolerance_percent!r}"
+            )
+
+
+def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
+    """With or against the rotation, of clockwise too; `rotation` is seen from the same end.
+
+    Raises
+    ------
+    ValueError
+        For clockwise or counter-clockwise without a rotation.
+    """
+    if stated not in ROTATIONS:
+        angles: Angles = stated
+        return angles
+    if rotation is None:
+        raise ValueError(
+            f"angles that count {stated} need the direction of rotation seen from the same end: state "
+            'rotation = "clockwise" or "counter-clockwise" in a job file, or angles with or against rotation'
+        )
+    return "with rotation" if stated == rotation else "against rotation"
 
 
 class _Column(NamedTuple):
@@ -75,7 +146,7 @@ def _unclear(grid: Grid, column: _Column, expected: str, cell: Cell | None = Non
     row, value = grid.header_row, column.heading.name
     if cell is not None:
         row, value = grid.rows[column.cells.index(cell)][0], show(cell)
-    return InputError([Problem(grid.source, row, column.heading.name, value, expected)])
+    return refusal(grid.source, expected, row, column.heading.name, value)
 
 
 def files_of_runs(source: object) -> tuple[Path, ...]:
@@ -137,7 +208,7 @@ def joined(grids: Sequence[Grid] | None, problems: Problems) -> Grid | None:
     for grid in grids:
         if {*grid.header} != {*first.header}:
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
-            problems.add(grid.source, grid.header_row, None, listing(grid.header, "and"), expected)
+            problems.add(expected, grid.source, grid.header_row, None, listing(grid.header, "and"))
             return None
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]

@@ -1,10 +1,10 @@
-"""Measurement tables: amplitudes read in harmonic tests, and natural frequencies with shapes."""
+"""Measurements: amplitudes read in harmonic tests, natural frequencies with shapes, and records over time."""
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,21 @@ from rotorid.base.arrays import ComplexArray, FloatArray, polar
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import Shown, listing, speed_axis, vibration_unit_words
 from rotorid.files import units
-from rotorid.files.cells import Grid
+from rotorid.files.cells import Grid, show
 from rotorid.files.columns import Column, Table, make_table, read_grid
 from rotorid.files.instruments import DERIVATIVE, read_responses
 from rotorid.files.model import HarmonicFile
 from rotorid.files.node_tables import read_modes
 from rotorid.files.problems import Problems, TableWarning
-from rotorid.files.units import Unit, UnitError, UnitReader, one_of, spelt
+from rotorid.files.units import TIME, Unit, UnitError, UnitReader, one_of, ratio, spelt
 from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiments, real_matrices
+from rotorid.identify.ode import OdeModel
 from rotorid.identify.operator_model import HarmonicModel
+from rotorid.identify.records import Record
 
+MISSING = {"nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
+STD = "_std"
+"""At the end of the name of a column: standard deviations of the samples of an output."""
 PARTS = ("amplitude", "phase", "re", "im")
 _FREE = "a free vibration has real amplitudes"
 _AMPLITUDE = re.compile(r"(.+)_(?:amplitude|phase|re|im)(?:_.*)?")
@@ -78,8 +83,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         table.in_header(None, f"measured amplitudes: columns {listing(map(_forms, model.outputs))}")
     for name in model.varying:
         if name not in table:
-            near = did_you_mean(name, [*model.parameters, *model.known])
-            table.in_header(name, f"a column {name}: the equations multiply amplitudes by it{near}")
+            table.in_header(name, f"a column {name}: the equations multiply amplitudes by it")
     free = np.full(len(table), not model.has_constant_terms)
     for name in {*model.inputs} & rows.signals.keys():
         free &= rows.signals[name] == 0
@@ -89,7 +93,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         table.complain_where(unlike, _stems(table, name)[-1], excited)
     problems.stop()
     if lacking := {*model.outputs} - {*measured} - unmeasured:
-        message = f"{table.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"
+        message = f"{table.grid.source}: the table has no {listing(sorted(lacking), 'and')}: predicted"
         warnings.warn(message, TableWarning, stacklevel=2)
     signals = _unread(model) | {**rows.signals} | {name: table.numbers(name) for name in model.varying}
     data = experiments(model, rows.frequencies, signals, names=rows.names, free=free, errors=errors)
@@ -126,7 +130,7 @@ def read_amplitudes(path: str | Path) -> Experiments:
         bad = (rows.frequencies == 0) | ((name == "F") & ~(np.abs(z) > 0))
         table.complain_where(bad, size, "a frequency above 0, and a force F that is not 0")
         if not np.nan_to_num(z).any():
-            table.as_whole(table.fields[size].name, "a number that is not 0 in at least one row")
+            table.as_whole(size, "a number that is not 0 in at least one row")
         if order := DERIVATIVE.get(table.unit(size).kind, 0):
             signals[name] = z / (1j * np.where(bad, 1.0, rows.frequencies)) ** order
             shown[name] = microns
@@ -160,9 +164,9 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, errors: AmplitudeEr
     names = [*map(str, modes.nodes)]
     for node in {*names} - {*model.outputs}:
         expected = f"an amplitude of the model: {listing(model.outputs)}{did_you_mean(node, model.outputs)}"
-        problems.add(str(path), None, "node", node, expected)
+        problems.add(expected, path, None, "node", node)
     if model.varying or model.has_constant_terms:
-        problems.add(str(path), None, None, None, f"a model of amplitudes and parameters only, for {_FREE}")
+        problems.add(f"a model of amplitudes and parameters only, for {_FREE}", path)
     problems.stop()
     std, covariances = modes.frequency_std, {}
     if errors is None and modes.shape_std is not None:
@@ -243,7 +247,7 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
     size, *others = _stems(table, name)
     parts = [stem.removeprefix(f"{name}_") for stem in (size, *others)]
     if parts not in (["amplitude", "phase"], ["re", "im"], ["re"]):
-        table.in_header(table.fields[size].name, f"columns {_forms(name)}")
+        table.in_header(size, f"columns {_forms(name)}")
     first, second, blank = table.numbers(size), np.zeros(len(table)), table.is_blank(size)
     is_polar = parts[0] == "amplitude"
     for other in others[:1]:
@@ -253,7 +257,7 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
         table.complain_where(wrong, other, f"a number as {size} has (0 for a real amplitude), or both blank")
 
     if blank.all():
-        table.as_whole(table.fields[size].name, "a number in at least one row, or no such column")
+        table.as_whole(size, "a number in at least one row, or no such column")
     if not is_polar:
         return np.asarray(first + 1j * np.where(blank, np.nan, second))
     table.must_be(size, first >= 0, "an amplitude of 0 or more (a real part may be negative)")
@@ -285,3 +289,90 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
     if (rows.free & (steps < 1e-9 * rows.frequencies)).any():  # the root of a rounded number, or such
         return {}
     return {**covariances, "": np.where(rows.free, steps**2 / 12.0, 0.0)}
+
+
+def read_record(
+    path: str | Path,
+    model: OdeModel,
+    *,
+    allow_missing: bool = False,
+    sigma: Mapping[str, float] | None = None,
+    measured: bool = True,
+) -> Record:
+    """Read a time record.
+
+    Its columns are `t_s` (or `_ms`, `_us`, `_min`), increasing, and one for each output and each input of the
+    model, named exactly as there and in the units of the model. Beside an output `y` there may be `y_std`,
+    the standard deviation of each of its samples, in the same unit: for all outputs or for none.
+
+    Parameters
+    ----------
+    path
+        The file; in a workbook the sheet `record`, or else the first one.
+    model
+        Knows the names.
+    allow_missing
+        Whether blank cells, NaN and absent columns of outputs mean "not measured". Inputs never may.
+    sigma
+        Standard deviations of outputs by name, for a record that has none of its own.
+    measured
+        False: times and inputs are all that is needed.
+
+    Returns
+    -------
+    Record
+        Times in s; NaN where nothing was measured.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    taken = {*model.outputs, *model.inputs}
+    deviations = {name: name + STD for name in model.outputs if name + STD not in taken}
+    problems, needed = Problems(), measured and not allow_missing
+    columns = [Column("t", one_of(TIME), ("t_s",)), *(Column(name, ratio) for name in model.inputs)]
+    for names, required in ((model.outputs, needed), (deviations.values(), False)):
+        more = [name for name in names if name not in model.inputs]
+        columns += [Column(name, ratio, (), required, blank=True) for name in more]
+    grid = problems.need(read_grid(path, "record", problems, first=True))
+    if allow_missing:
+        rows = ((n, ("" if show(c).casefold() in MISSING else c for c in cells)) for n, cells in grid.rows)
+        grid = replace(grid, rows=tuple((number, tuple(cells)) for number, cells in rows))
+    table = problems.need(make_table(grid, columns, problems))
+    clear = not len(problems)  # otherwise a misspelt column would be called missing
+    t, outputs = table.numbers("t"), {name: table.numbers(name) for name in model.outputs if name in table}
+    for late in np.flatnonzero(np.diff(t) <= 0) + 1:
+        before = f"{table.shown('t', late - 1)} of row {table.rows[late - 1]}"
+        table.complain(late, "t", f"a time above {before}: sort the rows; repeated runs are other records")
+    if measured and clear and not outputs:
+        table.in_header(None, f"a column for at least one output of the model: {listing(model.outputs)}")
+    for name in outputs if measured else ():
+        blank = table.is_blank(name)
+        if not allow_missing:
+            table.complain_where(blank, name, "a number (--allow-missing: blanks were not measured)")
+        elif blank.all():
+            table.as_whole(name, "a number in at least one row, or no such column")
+    stated = {name: table.numbers(column) for name, column in deviations.items() if column in table}
+    if stated and clear and (sigma is not None or stated.keys() != outputs.keys()):
+        expected = "standard deviations of all outputs or none, and no such column together with --sigma"
+        table.in_header(deviations[next(iter(stated))], expected)
+    for name in stated.keys() & outputs.keys():
+        wrong = ~np.isnan(outputs[name]) & ((stated[name] <= 0) | table.is_blank(deviations[name]))
+        expected = f"a standard deviation above 0 wherever {name} was measured"
+        table.complain_where(wrong, deviations[name], expected)
+    problems.stop()
+    unit = table.unit("t")
+    alike = {name: value for name, value in (sigma or {}).items() if name in table}
+    axis = Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale)
+    return Record(
+        t, outputs, {k: table.numbers(k) for k in model.inputs}, stated or alike or None, str(path), axis
+    )
+
+
+def record_columns(record: Record) -> dict[str, FloatArray]:
+    """The table as `read_record` reads it: times in s, outputs, their standard deviations, inputs."""
+    stated = {
+        f"{name}{STD}": np.broadcast_to(std, record.t.shape) for name, std in (record.sigma or {}).items()
+    }
+    return {"t_s": record.t, **record.outputs, **stated, **record.inputs}

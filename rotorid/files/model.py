@@ -358,7 +358,7 @@ def _read(path: Path) -> ModelFile:
     for name, value in data.items():
         if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
             expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
-            problems.add(str(path), None, name, None, expected)
+            problems.add(expected, path, None, name)
     problems.stop()
     return problems.need(read_settings(ModelFile, data, str(path), problems))
 

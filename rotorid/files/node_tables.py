@@ -24,8 +24,7 @@ RECIPROCAL = 1e-3
 FREQUENCIES = ("frequency", "critical_speed")
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": Unit("percent", "ratio", 1.0, 100.0)})
-_PER_FORCE = {"m_per_N": 1.0, "mm_per_N": 1e3, "um_per_N": 1e6}
-_COMPLIANCE = one_of({name: Unit(name, "compliance", 1.0, divide) for name, divide in _PER_FORCE.items()})
+
 _ANGLE = Column("angle", one_of(units.ANGLE), ("angle_deg",))
 
 UNBALANCE_COLUMNS = (
@@ -50,7 +49,7 @@ MODE_COLUMNS = (
 COMPLIANCE_COLUMNS = (
     Column("node"),
     Column("force_node"),
-    Column("compliance", _COMPLIANCE, ("compliance_m_per_N", "compliance_um_per_N")),
+    Column("compliance", one_of(units.COMPLIANCE), ("compliance_m_per_N", "compliance_um_per_N")),
 )
 
 
@@ -78,7 +77,7 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "unbalance", UNBALANCE_COLUMNS, problems))
+    table = read_table(path, "unbalance", UNBALANCE_COLUMNS, problems)
     sizes = {"unbalance", "mass", "radius"}
     present = sizes & {*table.fields}
     if present not in ({"unbalance"}, {"mass", "radius"}) and table.misspelt.isdisjoint(sizes):
@@ -111,7 +110,7 @@ def read_bow(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, complex]:
         With all problems of the file.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "bow", BOW_COLUMNS, problems))
+    table = read_table(path, "bow", BOW_COLUMNS, problems)
     if len(table) < 3:
         table.as_whole("node", "three nodes or more: any two lie on a straight line")
     pairs = _vectors(table, "node", {"bow"}, rotor)
@@ -194,7 +193,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         With all problems of the cells, or else with all contradictions between them.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems))
+    table = read_table(path, "modes", MODE_COLUMNS, problems)
     expected = "one column frequency_rad_s (or _Hz, _rpm) or critical_speed_rpm"
     stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
     nodes, number, values = _nodes(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
@@ -272,7 +271,7 @@ def read_compliance(
         With all problems of the cells, or else with all contradictions between them.
     """
     problems = Problems()
-    table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems))
+    table = read_table(path, "compliance", COMPLIANCE_COLUMNS, problems)
     ends = {stem: _nodes(table, stem, rotor) for stem in ("node", "force_node")}
     problems.stop()
     order = tuple(dict.fromkeys([*ends["node"], *ends["force_node"]] if nodes is None else nodes))
@@ -294,9 +293,9 @@ def read_compliance(
         "as much as the other way round"
     )
     table.complain_where(differs[p, q], "compliance", expected)
-    alpha, name = (one + other) / 2, table.fields["compliance"].name
+    alpha = (one + other) / 2
     if lost := [f"{order[i]} with {order[j]}" for i, j in np.argwhere(np.triu(np.isnan(alpha)))]:
-        table.as_whole(name, f"a row for every pair of nodes; missing: {listing(lost, 'and')}")
+        table.as_whole("compliance", f"a row for every pair of nodes; missing: {listing(lost, 'and')}")
     problems.stop()
     scale = np.sqrt(np.diag(alpha))
     lowest = np.linalg.eigvalsh(alpha / np.outer(scale, scale))[0]
@@ -306,6 +305,6 @@ def read_compliance(
             f"smallest eigenvalue of α_ij / √(α_ii α_jj) is {lowest:.2g}. Check them, give more digits, or "
             "nodes farther apart"
         )
-        table.as_whole(name, expected)
+        table.as_whole("compliance", expected)
     problems.stop()
     return order, alpha

@@ -80,9 +80,16 @@ class TableWarning(UserWarning):
 class Problems(list[Problem]):
     """Collects the problems of one or several files, to be raised together."""
 
-    def add(self, file: str, row: int | None, column: str | None, value: str | None, expected: str) -> None:
+    def add(
+        self,
+        expected: str,
+        file: Path | str,
+        row: int | None = None,
+        column: str | None = None,
+        value: str | None = None,
+    ) -> None:
         """Note one problem."""
-        self.append(Problem(file, row, column, value, expected))
+        self.append(Problem(str(file), row, column, value, expected))
 
     def need(self, value: _T | None) -> _T:
         """What was read; raises `InputError` where that is nothing, for which there is a problem then."""
@@ -95,14 +102,15 @@ class Problems(list[Problem]):
         """Note a file of a later `schema_version`, which may mean something else, and what is none."""
         if isinstance(version, bool) or version not in range(1, SCHEMA_VERSION + 1):  # or 1.0, of a workbook
             expected = f"{SCHEMA_VERSION}: a file of a later version needs a newer rotorid"
-            self.add(file, None, "schema_version", str(version), expected)
+            self.add(expected, file, None, "schema_version", str(version))
 
     def stop(self) -> None:
         """Raise `InputError` with all problems, file by file and row by row, if there are any."""
         if self:
-            files = list(dict.fromkeys(problem.file for problem in self))
-            unique = dict.fromkeys(self)
-            raise InputError(sorted(unique, key=lambda one: (files.index(one.file), one.row or 0)))
+            files = [problem.file for problem in self]
+            raise InputError(
+                sorted(dict.fromkeys(self), key=lambda one: (files.index(one.file), one.row or 0))
+            )
 
 
 def _message(problems: Sequence[Problem]) -> str:

@@ -41,7 +41,7 @@ from rotorid.files.attached import (
 )
 from rotorid.files.columns import Column, read_table
 from rotorid.files.disk import each_file_once, write_files
-from rotorid.files.problems import InputError, Problem, Problems, TableWarning
+from rotorid.files.problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import (
     NotNegative,
     Number,
@@ -244,7 +244,7 @@ def read_rotor(path: str | Path) -> Rotor:
         data = problems.need(read_toml(path, problems))
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
-            raise InputError([Problem(str(path), None, "shaft", None, expected)])
+            raise refusal(path, expected, column="shaft")
     file = problems.need(read_settings(RotorFile, data, str(path), problems))
     shaft, stations = path.parent / file.shaft if is_file else path, dict[str, int]()
     parts = _shaft(shaft, file.material)
@@ -293,7 +293,7 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
 def _shaft(path: Path, material: Material) -> dict[str, Any]:
     """What a rotor table says, by the attributes of a rotor."""
     problems, doubts = Problems(), Problems()
-    table = problems.need(read_table(path, "rotor", COLUMNS, problems))
+    table = read_table(path, "rotor", COLUMNS, problems)
     values: dict[str, FloatArray] = {}
     for stem in (column.stem for column in COLUMNS if column.unit):
         default = getattr(material, stem, 0.0)
@@ -302,7 +302,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
     table.must_be("length", (values["length"] > 0) | (last & ~elements), expected)
     if not elements.any():
-        table.in_header(table.fields["length"].name, "at least one row with a length above 0")
+        table.in_header("length", "at least one row with a length above 0")
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     for stem in ("diameter", "youngs_modulus"):
@@ -314,7 +314,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
         table.must_be(stem, values[stem] >= 0, OUTWARDS if "support" in stem else "a number of 0 or more")
     problems.stop()
     for stem, (low, high, of) in USUAL.items():
-        odd = elements & (values[stem] > 0) & ((values[stem] < low) | (values[stem] > high))
+        odd = elements & (values[stem] > 0) & (np.clip(values[stem], low, high) != values[stem])
         for value in values[stem][odd][:1].tolist():
             written = value * (table.unit(stem).scale if stem in table else 1.0)
             meant = [name for name, unit in of.items() if low <= unit.to_si(written) <= high]
@@ -380,7 +380,7 @@ def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
     """
     path = Path(path)
     if path.suffix.lower() != ".toml":
-        raise InputError([Problem(str(path), None, None, None, "a name that ends in .toml")])
+        raise refusal(path, "a name that ends in .toml")
     files = rotor_file_bytes(path, rotor)
     write_files(files)
     return tuple(reversed(files))

@@ -23,8 +23,14 @@ from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
-from rotorid.files.conventions import DEFAULT_TOLERANCE, Conventions
-from rotorid.files.layout import MOUNTED, joined, read_runs_grids, stated_phase
+from rotorid.files.layout import (
+    DEFAULT_TOLERANCE,
+    MOUNTED,
+    Conventions,
+    joined,
+    read_runs_grids,
+    stated_phase,
+)
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
 from rotorid.files.weights import read_weights
@@ -169,7 +175,7 @@ def read_runs(
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
     table = None if grid is None else readings_table(grid, problems)
-    if grid is None or table is None:
+    if table is None:
         return None, None
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
@@ -188,7 +194,7 @@ def read_runs(
         readings[place] += 1
     if len(problems) == start:  # with unclear speeds all the rest would be noise
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
-    if table.complete and len(usable) == len(table) and len(problems) == start:
+    if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
     if not len(problems):
         _ask_about_exchange(table, conventions)
@@ -215,7 +221,7 @@ def read_runs(
     )
     passed_over = [
         f"column {name.removeprefix(MOUNTED)!r} is passed over: weights stand in the weights table"
-        for name in grid.header
+        for name in table.grid.header
         if name.startswith(MOUNTED)
     ]
     stated = np.moveaxis(covariances(table, vectors), 0, -1) if "phase_std" in table else None
@@ -272,11 +278,11 @@ def _merge_speeds(
         shown = [show_speed(speed, unit) for speed in speeds]
         alike.append(f"{', '.join(words.split()[0] for words in shown)} as {show_speed(one, unit)}")
         if not same_speed(speeds[0], speeds[-1], band):
-            chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
+            chain = f"{len(shown)} speeds from {shown[0]} to {shown[-1]}"
             words = (
                 f"speeds that are clearly the same or not: {chain} form a chain, neighbours {_remedy(band)}"
             )
-            table.as_whole(table.fields["speed"].name, words)
+            table.as_whole("speed", words)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
     words = f"speeds within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
     return np.array(merged), dict(zip(usable, groups, strict=True)), [words] if alike else []
@@ -310,14 +316,14 @@ def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = C
     stems = [stem for stem in ("amplitude_std", "phase_std") if stem in table]
     if len(stems) == 1:
         expected = "amplitude_std_… and phase_std_deg together: one alone does not tell how a reading errs"
-        table.in_header(table.fields[stems[0]].name, expected)
+        table.in_header(stems[0], expected)
         return table
     for stem in stems:
         allowed = table.numbers(stem) > 0
         table.must_be(stem, allowed, "a standard deviation above 0: nothing is measured exactly")
     if stems and (unit := table.unit("amplitude")).kind != table.unit("amplitude_std").kind:
         expected = f"a unit that converts to that of the amplitude, {unit.name or 'none'}"
-        table.in_header(table.fields["amplitude_std"].name, expected)
+        table.in_header("amplitude_std", expected)
     return table
 
 
@@ -336,9 +342,7 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
     if conventions.exchanged is not None or table.unit("phase").name != "deg" or len(table) < 4:
         return
     amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
-    small = np.all(np.abs(table.numbers("phase")) < np.radians(30)) and table.steps(
-        "phase"
-    ).min() < np.radians(0.5)
+    small = np.abs(table.numbers("phase")).max() < np.radians(30) and table.steps("phase").min() < 0.008
     whole = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
     if small and whole and np.ptp(amplitude) > 90:
         expected = (
@@ -375,7 +379,7 @@ def _complain_about_gaps(
 ) -> None:
     """Every run needs every sensor at every speed: influence coefficients compare runs."""
     runs, speeds, sensors = names
-    unit, column = table.unit("speed"), table.fields["speed"].name
+    unit = table.unit("speed")
     read = {(r, s) for r, s, _ in present}
     shape = len(runs), len(speeds), len(sensors)
     gaps = (key for key in np.ndindex(shape) if key not in present) if len(present) < np.prod(shape) else ()
@@ -387,7 +391,7 @@ def _complain_about_gaps(
             near = min((speeds[k] for q, k in read if q == r), key=lambda speed: abs(speed - speeds[s]))
             hint = f"its nearest speed is {show_speed(near, unit)}, speeds count as one within "
             hint += f"{tolerance_percent:g} %"
-            table.as_whole(column, f"readings of {place}; {hint}")
+            table.as_whole("speed", f"readings of {place}; {hint}")
 
 
 def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:

@@ -52,7 +52,7 @@ Place = tuple[str, int, str]
 """Sheet, row and column of a setting of a workbook."""
 _Model = TypeVar("_Model", bound="Settings")
 _UNMARKED = str.maketrans("", "", "`")
-_BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+_BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "le": "maximum"}
 _WORDS = {
     "bool": "true or false, without quotes (in a sheet: yes or no)",
     "string": "a text in quotes",
@@ -62,7 +62,6 @@ _WORDS = {
     "greater_than_equal": "a number of {ge:g} or more",
     "greater_than": "a number above {gt:g}",
     "less_than_equal": "a number up to {le:g}",
-    "less_than": "a number below {lt:g}",
     "literal": "{expected}",
     "value_error": "{error}",
     "model": "a table of settings, [{name}]",
@@ -138,7 +137,7 @@ def key(
     example
         How a file writes it.
     **limits
-        Of pydantic: gt, ge, lt, le, min_length, max_length.
+        Of pydantic: gt, ge, le, min_length, max_length.
     """
     names = tuple(name.split())
     plain = about.translate(_UNMARKED)
@@ -215,7 +214,7 @@ class Settings(BaseModel):
 
     def complain(self, problems: Problems, field: str, expected: str) -> None:
         """Note a problem with a field."""
-        problems.extend([self.problem(field, expected)])
+        problems.append(self.problem(field, expected))
 
     def written(self, field: str) -> str:
         """The key of a field as it is written, or would be."""
@@ -361,7 +360,7 @@ def _plain(value: object) -> object:
     """A number, also as its text."""
     if isinstance(value, str):
         try:
-            return parse_number(value.strip(), comma=decimal_comma([value.strip()], ""))
+            value = parse_number(value.strip(), comma=decimal_comma([value.strip()], ""))
         except NotANumber as error:
             in_a_key = "the unit stands in the name of the key"
             raise ValueError(str(error).replace("write the unit in the header", in_a_key)) from None
@@ -405,6 +404,7 @@ NotNegative = Annotated[Number, Field(ge=0)]
 Turn = Annotated[Number, Field(ge=-360, le=360)]
 """An angle in degrees."""
 Whole = Annotated[int, BeforeValidator(_plain, json_schema_input_type=int)]
+Count = Annotated[Whole, Field(ge=1)]
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Label = Annotated[
     Text,
@@ -457,9 +457,9 @@ def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
         # A lone carriage return ends a line for no reader of TOML.
         settings = tomllib.loads(text.replace("\r\n", "\n"))
     except UnicodeDecodeError:
-        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
+        problems.add("a text file in UTF-8, as TOML demands", path)
     except (ValueError, RecursionError) as error:
-        problems.add(str(path), None, None, None, f"a TOML file: {error}")
+        problems.add(f"a TOML file: {error}", path)
     else:
         problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
         return settings

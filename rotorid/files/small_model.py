@@ -27,7 +27,7 @@ from rotorid.files.attached import (
     support_tables,
     whole,
 )
-from rotorid.files.problems import InputError, Problem, Problems, TableWarning
+from rotorid.files.problems import Problems, TableWarning, refusal
 from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
@@ -233,7 +233,7 @@ def small_equations(path: Path) -> dict[str, Any]:
         )
         merged = {name: equations.get(name, {}) | more.get(name, {}) for name in ("force", "bounds")}
     except (ValueError, TypeError) as error:
-        raise InputError([Problem(str(path), None, "equations", None, str(error))]) from None
+        raise refusal(path, str(error), column="equations") from None
     return equations | more | merged
 
 

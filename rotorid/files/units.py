@@ -69,6 +69,7 @@ _FACTORS = {
     **dict.fromkeys(("m", "kg", "s", "N", "Pa", "rad"), (1.0, 1.0)),
     **dict.fromkeys(("mm", "g", "ms", "mPa", "cP"), (1.0, 1e3)),
     **dict.fromkeys(("um", "mg", "us"), (1.0, 1e6)),
+    "cm": (1.0, 100.0),
     "kN": (1e3, 1.0),
     "mil": (254.0, 1e7),
     "in": (254.0, 1e4),
@@ -110,9 +111,9 @@ INERTIA = _units("inertia", "kg_m2 lb_in2")
 STIFFNESS = _units("stiffness", "N_per_m N_per_mm N_per_um lbf_per_in")
 DAMPING = _units("damping", "N_s_per_m N_s_per_mm lbf_s_per_in")
 MODULUS = _units("modulus", "Pa MPa GPa psi")
-_GRAMS = {"g_per_cm3": Unit("g_per_cm3", "density", 1e3)}
-DENSITY = _units("density", "kg_per_m3") | _GRAMS | _units("density", "lb_per_in3")
+DENSITY = _units("density", "kg_per_m3 g_per_cm3 lb_per_in3")
 FORCE = _units("force", "N kN lbf")
+COMPLIANCE = _units("compliance", "m_per_N mm_per_N um_per_N")
 TIME = _units("time", "s ms us min")
 VELOCITY = _units("velocity", "m_s mm_s in_s")
 VISCOSITY = _units("viscosity", "Pa_s mPa_s cP")

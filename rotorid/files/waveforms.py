@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
 from balancing import Labels
 from rotorid.base.arrays import AnyArray, significant
@@ -24,6 +24,7 @@ from rotorid.files.cells import Grid
 from rotorid.files.instruments import DERIVATIVE, read_samples
 from rotorid.files.problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import (
+    Count,
     NotNegative,
     Number,
     Positive,
@@ -52,7 +53,6 @@ if TYPE_CHECKING:
     Vibration = Unit
 else:
     Vibration = Annotated[Text, AfterValidator(units.vibration)]
-Order = Annotated[Whole, Field(ge=1)]
 
 
 class ChannelKeys(Settings):
@@ -96,7 +96,7 @@ class WaveformsFile(Settings):
     amplitude: Vibration | None = key(
         "unit in which vectors are written, default that of the first channel", default=None, example="um"
     )
-    orders: listed(Order) = key("orders, default 1", default=(1,), example="orders = [1, 2]")  # type: ignore[valid-type]
+    orders: listed(Count) = key("orders, default 1", default=(1,), example="orders = [1, 2]")  # type: ignore[valid-type]
     rate: Positive | None = key("samples a second, where the records do not say", "rate_Hz", None)
     speeds: listed(Positive) | None = key(  # type: ignore[valid-type]
         "speeds at which vectors are wanted",
@@ -168,7 +168,7 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
         data = dict(problems.need(read_toml(settings, problems)))
     if len(paths) > (1 if settings else len(data["records"])):
         words = "records of different names, which are those of the runs; or one waveforms file alone"
-        problems.add(source, None, None, None, words)
+        problems.add(words, source)
     options = {key: value for key, value in (stated or {}).items() if value is not None}
     if "speeds_rad_s" in options:
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}

@@ -19,9 +19,8 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
-from rotorid.files.conventions import Conventions
 from rotorid.files.headings import WEIGHT, find_header, read_headings
-from rotorid.files.layout import NUMBER, long_rows
+from rotorid.files.layout import NUMBER, Conventions, long_rows
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
 

@@ -49,7 +49,7 @@ from balancing.noise import Gaussian, Mounted, kind_sizes, run_noise
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import counted, listing
-from rotorid.files.conventions import DEFAULT_TOLERANCE
+from rotorid.files.layout import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight
 from rotorid.fleet.jobs import known_errors, machine_of, mounted_in, quantity_of, read_fleet, runs_of
 from rotorid.regression import covariance_root, unstretch

@@ -1,4 +1,4 @@
-"""What the worksheet shows, computed by the commands in processes beside the server.
+"""What the worksheet shows, computed by the commands in a process beside the server.
 
 The page computes nothing, and neither does this: it calls what the command line calls.
 """

@@ -11,8 +11,7 @@ from typing import Any
 
 from rotorid.base.text import listing
 from rotorid.files.cells import Grid, clean
-from rotorid.files.disk import MOST_BYTES, file_content, first_bytes, write_files
-from rotorid.files.excel_workbook import SUFFIXES, is_workbook
+from rotorid.files.disk import MOST_BYTES, SUFFIXES, file_content, first_bytes, is_workbook, write_files
 from rotorid.files.job import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems

@@ -1,7 +1,5 @@
 """Models and records of [Q] and [F], and oscillators, for tests of fits."""
 
-import tomllib
-
 import numpy as np
 
 import fem
@@ -50,15 +48,6 @@ def book_model():
     )
 
 
-def book_record():
-    """The closed form of [Q] at truth (1, −1, −1)."""
-    t, w = np.linspace(0.0, np.pi, 31), np.sqrt(3) / 2
-    decay, c, s = np.exp(-t / 2), np.cos(w * t), np.sin(w * t)
-    x1 = np.sin(t) + decay * (1.5 * c + w * s)
-    x2 = np.cos(t) + decay * (-0.75 * c - w / 2 * s - 1.5 * w * s + w**2 * c)
-    return Record(t, {"y1": x1 + 2 * x2, "y2": 2 * x1 + x2})
-
-
 def decay(**options):
     return ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0}, **options)
 
@@ -67,34 +56,6 @@ def decay_record(n=41, error=0.01, seed=0, **options):
     t = np.linspace(0.0, 4.0, n)
     noise = error * np.random.default_rng(seed).standard_normal(n)
     return Record(t, {"x": 2.0 * np.exp(-0.8 * t) + noise}, **options)
-
-
-def fitzhugh_nagumo():
-    return ode_model(
-        {"V": "c*(V - V**3/3 + R)", "R": "-(V - a + b*R)/c"},
-        initial={"V": -1.0, "R": 1.0},
-        estimate={"a": 0.5, "b": 0.5, "c": 5.0},
-    )
-
-
-def fitzhugh_nagumo_record():
-    t, rng = np.linspace(0.0, 20.0, 201), np.random.default_rng(1)
-    y = simulate(fitzhugh_nagumo(), [0.2, 0.2, 3.0], t, sensitivities=False).y
-    y = y + 0.05 * rng.standard_normal(y.shape)
-    return Record(t, {"V": y[:, 0], "R": y[:, 1]})
-
-
-def motion_in(path, values=()):
-    """M, C and K of a model file, its parameters at their starting values or at these."""
-    said = tomllib.loads(path.read_text(encoding="utf-8"))
-    put = said["estimate"] | dict(values)
-
-    def entry(cell):
-        parts = cell.split(" + ") if isinstance(cell, str) else [cell]
-        return sum(float(put.get(part, part)) for part in parts)
-
-    M, C, K = (np.array([[entry(cell) for cell in row] for row in said[key]]) for key in "MCK")
-    return fem.Motion(M, C, K, tuple(said["coordinates"]), said.get("speed_rad_s", 0.0))
 
 
 def state_space_of(model, theta=None):

@@ -86,7 +86,7 @@ def test_balance_writes_measured_coefficients_for_people_and_without_loss(folder
     [
         (1, HEADER[3], "influence", "influence_<vibration unit>_per_<weight unit>"),
         (2, HEADER[3], -1, "a coefficient of 0 or more"),
-        (2, "phase_deg", 400, "an angle from -360 to 360 degrees"),
+        (2, "phase_deg", 400, "from -360 to 360 degrees"),
         (2, "speed_rpm", 0, "a speed above 0"),
     ],
 )

@@ -258,9 +258,9 @@ def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
 @each_of(
     "command, files, words, lines",
     [
-        ("modes", ["modes/modes.csv"], "it seems to be a table of modes", 1),
-        ("balance", ["bk_two_plane/weights.csv", "bk_two_plane/runs.csv"], "it seems to be a weights", 2),
-        ("critical", ["bk_two_plane/runs.csv"], "it seems to be a runs table", 1),
+        ("modes", ["modes/modes.csv"], "there are mode, ", 1),
+        ("balance", ["bk_two_plane/weights.csv", "bk_two_plane/runs.csv"], "there are run, ", 2),
+        ("critical", ["bk_two_plane/runs.csv"], "names of columns", 1),
     ],
 )
 def test_the_wrong_kind_of_file_is_one_message(command, files, words, lines, cli):

@@ -96,7 +96,7 @@ WRONG = [
         ("amplitude_um_pp", "7.2 um", "a number in um_pp, as the heading says"),
         ("amplitude_um_pp", "1e300", "between 1e-30 and 1e+30 in size"),
         ("amplitude_um_pp", -1, "an amplitude of 0 or more"),
-        ("phase_deg", 361, "a phase from -360 to 360 degrees"),
+        ("phase_deg", 361, "from -360 to 360 degrees"),
         ("speed_rpm", 0, "a speed above 0"),
         ("sensor", "", "a name"),
         ("run", "", "a name"),
@@ -116,7 +116,7 @@ WRONG += [
     ([[*line, line[3]] for line in RUNS], 1, RUNS[0][3], RUNS[0][3], "one column of the amplitude"),
     ([*RUNS, ["trial 2", 1000, "B", 12.5, 290]], 8, "sensor", "B", "(row 7 has the same); repeated readings"),
     (RUNS[:4] + RUNS[5:], None, "sensor", None, "a reading of sensor 'B' in run 'trial 1' at 1000 rpm, as"),
-    (at_speeds(4), None, "speed_rpm", None, "1000 rpm, 1004 rpm, 1008 rpm form a chain"),
+    (at_speeds(4), None, "speed_rpm", None, "3 speeds from 1000 rpm to 1008 rpm form a chain"),
     (RUNS[1:], 1, None, None, "a header row with the names of columns, separated by , or ; or tabs: run"),
 ]
 

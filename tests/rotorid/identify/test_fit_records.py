@@ -9,15 +9,10 @@ from repetitions import FULL
 from timedomain_cases import (
     CHAIN_ERRORS,
     CHAIN_OPTIMUM,
-    CHAIN_STATES,
-    book_model,
-    book_record,
     chain,
     chain_record,
     decay,
     decay_record,
-    fitzhugh_nagumo,
-    fitzhugh_nagumo_record,
 )
 
 from rotorid.base.choices import names
@@ -183,27 +178,6 @@ def test_what_cannot_be_fitted_is_refused(record, options, words):
         fit(decay(), record, **options)
 
 
-def right_or_said(result, truth):
-    """Whether the truth is within five standard deviations, or there are no intervals and words why."""
-    if result.std is None:
-        return not result.reliable and len(result.warnings) > 0
-    return bool((np.abs(result.values - truth) < 5 * result.std).all())
-
-
-@pytest.mark.parametrize("method", ["levenberg-marquardt", "gauss-newton"])
-def test_three_masses_from_far_off(method):
-    result = fit(chain(), chain_record(), method=method, start={"c1": 1.0, "m1": 1.0, "m2": 100.0})
-    assert right_or_said(result, [0.14, 12.0, 28.0])
-
-
-@pytest.mark.full
-def test_fitzhugh_nagumo_from_far_off():
-    for start in [(1.0, 1.0, 1.0), (0.5, 0.5, 5.0), (0.0, 1.5, 0.5)][: 3 if FULL else 1]:
-        start = dict(zip("abc", start, strict=True))
-        result = fit(fitzhugh_nagumo(), fitzhugh_nagumo_record(), start=start, max_iterations=20)
-        assert right_or_said(result, [0.2, 0.2, 3.0])
-
-
 def test_parameter_at_its_bound():
     result = fit(decay(bounds={"a": (0.0, 0.7)}), decay_record())
     assert (result.at_bounds, result.values[0]) == (("a",), 0.7)
@@ -227,17 +201,6 @@ def test_every_record_has_its_own_initial_state():
 
 
 # Steps of Gauss–Newton and quasilinearization
-
-
-def test_a_linear_model_takes_one_step_and_one_that_is_nothing():
-    t = np.linspace(0.0, 1.0, 5)
-    given = "a + b*t", {"a": 1.0, "b": 1.0}, 2 - 3 * t, t
-    result = curve(*given, method="gauss-newton")
-    assert (result.converged, result.iterations) == (True, 2)
-    np.testing.assert_allclose(result.history, [[1.0, 1.0], [2.0, -3.0], [2.0, -3.0]], rtol=1e-12)
-    few = curve(*given, method="gauss-newton", max_iterations=1)
-    assert (few.converged, few.iterations, few.stopped_by, few.std) == (False, 1, None, None)
-    assert "no intervals are given" in few.warnings[0]
 
 
 def decaying(noise, method="gauss-newton", **options):
@@ -274,21 +237,6 @@ def test_a_stop_far_from_the_minimum_is_no_estimate():
     assert "the next step still matters; lower --tolerance" in coarse.message
     assert fine.converged
     assert abs(fine.values[0] - decaying(0.01).values[0]) < 0.1 * fine.std[0]
-
-
-def test_quasilinearization_of_q_and_its_tables():
-    """With error control the truth; I(beta) and each state over time by iteration, as tables 2.2 and 2.3."""
-    result = fit(book_model(), book_record(), method="quasilinearization")
-    assert result.iterations <= 7
-    assert result.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
-    assert result.warnings == ()
-    result = fit(book_model(), book_record(), method="quasilinearization", integrator="sequential-heun")
-    iterations, x1, x2 = result.tables()
-    np.testing.assert_array_equal([row[1:4] for row in iterations.rows], result.history)
-    assert (x1.name, x2.name) == ("x1 by iteration", "x2 by iteration")
-    np.testing.assert_array_equal([row[2] for row in x2.rows], result.trajectories[1][0][:, 1])
-    r = result.simulations[0].y - np.column_stack([*result.records[0].outputs.values()])
-    assert result.integrals[-1] == pytest.approx(np.sum(r**2) * np.pi / 30, rel=1e-3)
 
 
 def test_quasilinearization_of_several_records_with_gaps_and_uneven_times():
@@ -332,16 +280,6 @@ def without(record, name, at=0):
     outputs = {n: y.copy() for n, y in record.outputs.items()}
     outputs[name][at] = np.nan
     return replace(record, outputs=outputs)
-
-
-def test_the_record_of_f_gives_what_known_initial_values_give():
-    model = read_ode_model(FOLDER / "from_record.toml")
-    result = fit(model, read_record(FOLDER / "record.csv", model), method="gauss-newton", integrator="rk4")
-    assert result.parameters == ("c1", "m1", "m2", *(f"{name}_0" for name in CHAIN_STATES))
-    truth = [0.14, 12.0, 28.0, 0.5, 0.1, -0.2, -0.1, 0.3, 0.1]
-    assert (np.abs(result.values - truth) < 4 * result.std).all()
-    assert (result.std < 2e-5 * np.abs(truth)).all()
-    assert (result.std[:3] > fit(chain(), chain_record()).std).all()
 
 
 def test_the_sample_counts_once():

@@ -56,15 +56,6 @@ def test_rows_of_lesson_1_are_those_of_an_independent_derivation():
     np.testing.assert_allclose(Y, stack(np.array(right)), rtol=1e-13)
 
 
-def test_rows_of_task_21_are_the_printed_ones():
-    model = harmonic_model(["(p**3 + a1*p**2 + a2*p + a3)*X = F"], estimate=["a1", "a2", "a3"])
-    w, x, force = 1.7, 0.4 - 0.9j, 2.0
-    K, Y, *_ = build_rows(model, experiments(model, [w], {"F": force, "X": [x]}))
-    printed = [[-(w**2) * x.real, -w * x.imag, x.real], [-(w**2) * x.imag, w * x.real, x.imag]]
-    np.testing.assert_allclose(K, printed, rtol=1e-14)
-    np.testing.assert_allclose(Y, [force - w**3 * x.imag, w**3 * x.real], rtol=1e-14)
-
-
 def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
     truth = np.array([4.0, 1.5, 2.5])
     signals = simulate(lesson_1(), truth, np.array([8.0, 15.0, 20.0]), {"F": 5.0}).signals
@@ -73,10 +64,6 @@ def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
     result = identify(lesson_1(), data)
     np.testing.assert_allclose(result.values, truth, rtol=1e-11)
     assert result.left_out == ("experiment b: X2 not measured",)
-    assert result.linear.rows.left_out == (
-        "experiment b, equation 1: an amplitude in it is not measured",
-        "experiment b, equation 2: an amplitude in it is not measured",
-    )
     assert not result.linear.rows.used[1].any()
 
 
@@ -226,15 +213,6 @@ def test_units_of_a_combination_change_nothing(unit):
     inverse = np.linalg.pinv(np.array([[1.0, 0.0], [0.0, 0.5], [3.0, 2.0]]))
     np.testing.assert_allclose(recovery.values, [2, 3] + inverse @ [0.0, 0.0, 2e-4], rtol=1e-8)
     np.testing.assert_allclose(recovery.gain * scale, inverse * [1.0, 0.5, 1.0], rtol=1e-3, atol=1e-9)
-
-
-def test_gain_is_the_derivative_of_the_recovery():
-    monomials, values = [[1, 0, 0], [1, 1, 0], [0, 1, 1]], np.array([2.0, 6.0, 15.0])
-    recovery = recover(system("xyz", monomials, values))
-    np.testing.assert_allclose(recovery.values, [2.0, 3.0, 5.0], rtol=1e-12)
-    for i, step in enumerate(1e-6 * np.eye(3)):
-        up, down = (recover(system("xyz", monomials, values + s)).values for s in (step, -step))
-        np.testing.assert_allclose(recovery.gain[:, i], (up - down) / 2e-6, rtol=1e-6, atol=1e-8)
 
 
 def test_linked_unknowns_are_solved_for_together():

@@ -12,25 +12,6 @@ from rotorid.identify.second_order import second_order
 from rotorid.identify.simulation import simulate
 
 
-def test_functions_over_many_points_have_the_shapes_promised():
-    """What they are of stands first, then derivatives by states, then by parameters."""
-    model, theta = book_model(), [2.0, 3.0, 5.0]
-    t, x = np.linspace(0, 1, 5), np.arange(10.0).reshape(5, 2)
-    f, h = model.f(t, x, theta), model.h(t, x, theta)
-    rates = np.stack([2 * x[:, 1], 3 * x[:, 0] + 5 * x[:, 1] + np.cos(t)], 1)
-    np.testing.assert_allclose(f[..., 0], rates, rtol=1e-15)
-    np.testing.assert_array_equal(f[..., 1:3], np.broadcast_to([[0, 2], [3, 5]], (5, 2, 2)))
-    expected = np.zeros((5, 2, 3))
-    expected[:, 0, 0], expected[:, 1, 1], expected[:, 1, 2] = x[:, 1], x[:, 0], x[:, 1]
-    np.testing.assert_array_equal(f[..., 3:], expected)
-    np.testing.assert_array_equal(h[..., 0], x @ [[1, 2], [2, 1]])
-    np.testing.assert_array_equal(h[3, :, 1:], [[1, 2, 0, 0, 0], [2, 1, 0, 0, 0]])
-    one = model.f(t[2], x[2], theta)
-    np.testing.assert_allclose(one, f[2], rtol=1e-15)
-    augmented = model.augmented(t[2], x[2][:, None], np.array(theta), np.zeros(0))
-    np.testing.assert_array_equal(augmented, one[:, :1])
-
-
 @each_of("function", FUNCTIONS)
 def test_derivatives_of_every_function(function):
     """Against central differences, on either side of zero where the function exists."""

@@ -13,11 +13,8 @@ from rotorid.identify import identify
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.plots import figure_identification
-from rotorid.identify.plots_records import draw_parameters, draw_residuals, draw_signal, figure_fit
+from rotorid.identify.plots_records import draw_parameters, draw_residuals, draw_signal
 from rotorid.identify.records import Record
-from rotorid.samples import sample_data
-
-FOLDER = sample_data() / "identify"
 
 
 def named(figure, start):
@@ -63,16 +60,6 @@ def test_amplitudes_and_phases_in_the_units_of_the_table(tmp_path):
     np.testing.assert_allclose(phases[:, 1], np.degrees(np.angle(X)))
     np.testing.assert_allclose(ends - phases[:, 1:], np.tile([-6.0, 6.0], (4, 1)))
     check_hygiene(figure, unitless=("", "output"))
-
-
-def test_free_vibrations_are_points_and_crosses_at_their_frequencies():
-    file = read_harmonic_model(FOLDER / "task_7_1" / "model.toml")
-    result = identify(file.model, read_measurements(FOLDER / "task_7_1" / "data.csv", file))
-    lines = figure_identification(result).axes[0].get_lines()
-    for name, read, crosses in zip(("X1", "X2", "X3"), lines[::2], lines[1::2], strict=True):
-        np.testing.assert_allclose(read.get_xdata(), result.experiments.frequencies)
-        np.testing.assert_allclose(read.get_ydata(), np.abs(result.experiments.signals[name]))
-        np.testing.assert_allclose(crosses.get_ydata(), np.abs(result.predicted[name]))
 
 
 # Modes
@@ -128,25 +115,6 @@ def result():
         Record(T, {"x": k * (1 - np.exp(-T)) + noise[k]}, {"u": np.full(31, k)}, name=f"runs/run_{k}.csv")
         for k in (1, 2, 3)
     ])  # fmt: skip
-
-
-def test_several_records_differ_by_mark_line_and_colour_in_every_panel(result):
-    figure = figure_fit(result)
-    check_hygiene(figure, unitless=("",))
-    above, _ = figure.subfigs
-    (legend,) = above.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["run_1.csv", "run_2.csv", "run_3.csv"]
-    assert [ax.get_ylabel().split(",")[0] for ax in above.axes] == ["x", "residual", "input u"]
-    assert [ax.get_xlabel() for ax in above.axes] == ["", "", "time, s"]
-    signal, residual, entered = above.axes
-    for get in ("get_color", "get_marker"):
-        seen = [getattr(key, get)() for key in legend.legend_handles]
-        assert len(set(seen)) == 3
-        for ax in (signal, residual):
-            assert seen == [getattr(line, get)() for line in ax.lines[:3]]
-    assert len({line.get_linestyle() for line in signal.lines[3:]}) == 3
-    assert [line.get_color() for line in signal.lines[3:]] == [line.get_color() for line in signal.lines[:3]]
-    assert [line.get_ydata()[0] for line in entered.lines] == [1, 2, 3]
 
 
 def test_points_are_the_record_and_lines_pass_through_the_model(result):

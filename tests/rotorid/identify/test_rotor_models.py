@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 from exact_solutions import frequency_response
-from timedomain_cases import motion_in, state_space_of
+from timedomain_cases import state_space_of
 
 import fem
 from fem import state_space
-from rotorid.files import read_ode_model, read_rotor
+from rotorid.files import read_ode_model
 from rotorid.files.settings import toml_bytes
 from rotorid.files.small_model import equations_of
 from rotorid.identify.fit_records import fit
 from rotorid.identify.records import Record
 from rotorid.identify.second_order import second_order
 from rotorid.identify.simulation import simulate
-from rotorid.reduction import reduce, small_model
+from rotorid.reduction import small_model
 from rotorid.samples import sample_data
 
 SPEED = 150.0
@@ -53,20 +53,6 @@ def damped(motion, dampers):
     for name, value in dampers.items():
         C[motion.index(name), motion.index(name)] += value
     return fem.Motion(motion.M, C, motion.K, motion.coordinates, motion.speed)
-
-
-def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
-    small = reduce(read_rotor(sample_data() / "rotor23.csv"), (7, 12, 18), 2)
-    dampers, inputs = {"x7": 500.0, "x12": 90.0}, ["f_x7", "f_x18"]
-    path, ours = through_a_file(tmp_path, small.equations_of_motion, dampers, inputs=inputs)
-    theirs = state_space(damped(small.equations_of_motion, dampers), inputs=inputs)
-    again = state_space(motion_in(path), inputs=inputs)
-    for one in (theirs, again):
-        assert farthest(ours.eigenvalues, one.eigenvalues) < 1e-10
-        assert (ours.inputs, ours.outputs) == (one.inputs, one.outputs)
-        np.testing.assert_allclose(frequency_response(ours, W), frequency_response(one, W), rtol=1e-9)
-    still = state_space_of(read_ode_model(path), [0.0, 0.0]).eigenvalues
-    np.testing.assert_allclose(np.sort(np.abs(still))[::2], small.frequencies, rtol=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -97,17 +97,6 @@ def test_sensitivities_against_differences(make, integrator):
     assert not plain.y_theta.any()
 
 
-def test_uneven_times_do_not_matter():
-    """Gaps, repeated and single steps: each time has the value that it has alone."""
-    model = chain()
-    t = np.concatenate([np.arange(0, 3, 0.1), [3.05, 3.2, 3.21], np.arange(5, 8, 0.2), np.sqrt([70, 72, 75])])
-    run = simulate(model, model.start, t, integrator="expm")
-    for i in (5, 29, 31, 34, 45, 50):
-        alone = simulate(model, model.start, t[[0, i]], integrator="expm")
-        np.testing.assert_allclose(run.x[i], alone.x[1], atol=1e-13)
-        np.testing.assert_allclose(run.S[i], alone.S[1], atol=1e-12)
-
-
 @pytest.mark.parametrize("begin", [1e3, 1.7e9])
 def test_time_stamps_far_from_zero_cost_no_more_than_their_digits(begin):
     """Steps between such times are rounded; the error of one must not add up over the record."""
@@ -118,17 +107,6 @@ def test_time_stamps_far_from_zero_cost_no_more_than_their_digits(begin):
     assert run.integrator == "expm"
     x = np.exp(-passed) * (np.cos(w * passed) + np.sin(w * passed) / w)
     np.testing.assert_allclose(run.x[:, 0], x, atol=2e-16 * begin * w + 1e-10)
-
-
-def test_constant_rates_are_part_of_the_exact_solution():
-    """A mass falling in a fluid: v = (g/c)(1 − e^{−ct}), with g and c unknown."""
-    t = np.linspace(1, 7, 13)
-    run = simulate(one_state("g - c*x", 0, estimate={"g": 9.81, "c": 0.5}), [9.81, 0.5], t)
-    e, passed = np.exp(-0.5 * (t - 1)), t - 1
-    slope = -9.81 / 0.25 * (1 - e) + 9.81 / 0.5 * passed * e
-    assert run.integrator == "expm"
-    np.testing.assert_allclose(run.x[:, 0], 9.81 / 0.5 * (1 - e), rtol=1e-13, atol=1e-14)
-    np.testing.assert_allclose(run.S[:, 0], np.stack([(1 - e) / 0.5, slope], 1), rtol=1e-12, atol=1e-13)
 
 
 def test_the_closed_form_of_q_and_orders_of_fixed_steps():

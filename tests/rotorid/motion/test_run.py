@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import fem
 import rotorid.base.compiled
-from fem import CubicSpring, JournalBearing, MuszynskaSeal, Stop
+from fem import JournalBearing, MuszynskaSeal, Stop
 from rotorid.motion import rosenbrock
 from rotorid.motion.run import MotionRun, run
 from rotorid.motion.steady import begin, steady_end, synchronous_part
@@ -54,18 +54,6 @@ def test_the_error_falls_with_the_fifth_root_of_the_work():
     errors, steps = [np.abs(one.z - exact.z).max() for one in runs], [one.steps for one in runs]
     assert 4.5 < np.log(errors[0] / errors[1]) / np.log(steps[1] / steps[0]) < 6.0
     assert errors[1] < 1e-8
-
-
-def test_energy_of_a_free_rotor_is_kept():
-    m, k, cubic = 3.0, 2e5, 5e10
-
-    def energy(q, v):
-        return m / 2 * v @ v + k / 2 * q @ q + cubic / 4 * (q @ q) ** 2
-
-    start = np.array([1e-3, 2e-4]), np.array([0.1, -0.3])
-    free = one_mass(m, 0.0, k, forces=[CubicSpring(1, "", 0.0, cubic)])
-    motion = run(free, (0.0, 0.0), 1.0, start, tolerance=1e-11)
-    assert energy(motion.q, motion.v) == pytest.approx(energy(*start), rel=1e-8)
 
 
 def test_the_steady_end_on_linear_supports_is_the_response():
@@ -217,60 +205,6 @@ def test_the_frequency_of_a_whirl_with_other_lines_beside_it(ratio):
         lambda a: np.exp(1j * ratio * a) + 0.4 * np.exp(-1j * ratio * a) + 0.2 * np.exp(0.75j * a)
     )
     assert end.whirl_ratio == pytest.approx(ratio, abs=1e-4)
-
-
-@pytest.mark.full
-def test_three_masses_in_two_bearings_without_mass():
-    """Against scipy, where the velocities of the journals follow from the balance of forces."""
-    L, D, c, eta = 0.05, 0.11, 1.5e-4, 0.02
-    m, k, e, damping = 40.0, 2e7, 2e-5, 30.0
-    K = k * np.array(
-        [[2, -2, 0, 0, 0], [-2, 3, -1, 0, 0], [0, -1, 2, -1, 0], [0, 0, -1, 3, -2], [0, 0, 0, -2, 2]]
-    )
-    M, C, K2 = (
-        np.kron(np.eye(2), A) for A in (np.diag([0, m, m, m, 0]), np.diag([0, 1, 1, 1, 0]) * damping, K)
-    )
-    names = tuple(f"{axis}{node}" for axis in "xy" for node in range(1, 6))
-    made = system(
-        lambda speed: fem.Motion(M, C, K2, names, speed),
-        np.array([50.0, 900.0]),
-        forces=[JournalBearing(node, "", L, D, c, eta) for node in (1, 5)],
-        weight={f"y{node}": -m * 9.81 for node in (2, 3, 4)},
-        unbalance={3: m * e},
-    )
-    first, last, time = 100.0, 300.0, 0.15
-    alpha, (points, weights) = (last - first) / time, np.polynomial.legendre.leggauss(64)
-    phi, weights = points * np.pi / 2, weights * np.pi / 2
-
-    def velocity(z, speed, force):
-        """Of a journal whose film must carry a force: it depends on z' − i Ω z / 2 alone, and in scale."""
-        direction = np.angle(force)
-        for _ in range(200):  # of the motion whose pressure, by quadrature, pushes against the force
-            turned = np.exp(1j * (phi + direction))
-            pressure = eta * L**3 * np.cos(phi) / (c - (z / turned).real) ** 3
-            film = -D / 2 * np.sum(weights * pressure * turned)
-            miss = np.angle(-film / force)
-            if abs(miss) < 1e-13:
-                break
-            direction -= miss
-        return np.abs(force / film) * np.exp(1j * direction) + 0.5j * speed * z
-
-    def slope(t, s):
-        z, dz = s[:5] + 1j * s[5:10], np.zeros(5, dtype=complex)
-        dz[1:4] = s[10:13] + 1j * s[13:16]
-        speed, turned, elastic = first + alpha * t, first * t + alpha * t * t / 2, -K @ z
-        for j in (0, 4):
-            dz[j] = velocity(z[j], speed, elastic[j])
-        a = elastic[1:4] / m - damping * dz[1:4] / m - 9.81j
-        a[1] += e * (speed**2 - 1j * alpha) * np.exp(1j * turned)
-        return np.concatenate([dz.real, dz.imag, a.real, a.imag])
-
-    q, v, _ = begin(made, first)
-    motion = run(made, (first, last), time, (q, v))
-    s0 = np.concatenate([q, v[1:4], v[6:9]])
-    exact = solve_ivp(slope, (0, time), s0, "LSODA", motion.time[::50], rtol=1e-8, atol=1e-12)
-    z = (exact.y[:5] + 1j * exact.y[5:10]).T
-    assert np.abs(motion.z[::50] - z).max() < 1e-5 * np.abs(z).max()
 
 
 def test_a_shaft_that_touches_its_wall_stops_the_motion():

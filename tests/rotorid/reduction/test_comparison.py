@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
-from fem_rotors import ROOT, rotor23
+from fem_rotors import rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
@@ -15,7 +15,6 @@ from small_models import compare_response, compare_stability, small_rotor, stabi
 from whirl_rotors import whirling_rotors
 
 import fem
-import rotorid
 from rotorid.reduction import reduce
 
 NODES = (7, 12, 18)
@@ -24,11 +23,6 @@ NODES = (7, 12, 18)
 def book():
     rotor = rotor23()
     return small_rotor(rotor, NODES, reduce(rotor, NODES, 2).masses.solution)
-
-
-def compressor(nodes, modes):
-    rotor = rotorid.read_rotor(ROOT / "sample_data" / "compressor" / "rotor.toml")
-    return small_rotor(rotor, nodes, reduce(rotor, nodes, modes).masses.solution)
 
 
 def lumped(supports, *, material=0.0):
@@ -111,18 +105,6 @@ def test_masses_that_are_lumped(kind):
     assert cost.full.shape[1] == (3 if small.rotor.symmetric else 6)
 
 
-def test_gyroscopic_rotor_with_tables():
-    """The compressor with three masses: speeds inside its tables by default, both planes."""
-    small = compressor((8, 14, 20), 1)
-    cost = compare_response(small)
-    assert cost.speeds[0] == pytest.approx(1000 * np.pi / 30)
-    assert cost.sizes["median"] < 0.03
-    assert cost.worst[cost.speeds < 0.9 * cost.criticals[0]].max() < 0.04
-    whole = fem.influence(small.rotor, (8, 14, 20), [(8, 90.0)], cost.speeds[:1]).W[0, 0]
-    assert len(cost.sensors) == 6
-    assert cost.full[0, 3] == pytest.approx(whole)
-
-
 def test_what_no_steady_response_follows_is_said():
     q = 1e6
     small = lumped([*BEARINGS["damped"], fem.Support(4, ((0, q), (-q, 0)), kind="seal")])
@@ -154,16 +136,6 @@ def test_what_no_steady_response_follows_is_said():
 def test_bad_speeds_and_bands_are_refused(speeds, options, message):
     with pytest.raises(ValueError, match=message):
         compare_response(book(), speeds, **options)
-
-
-def test_modal_damping_is_left_out_of_the_comparison():
-    """The full rotor has none: what it takes away from a peak is no error of the reduction."""
-    plain = book()
-    masses = plain.small.masses[plain.small.masses > 0]
-    damped = small_rotor(plain.rotor, plain.small.massive, masses, modal_damping=(0.05, 0.05))
-    one, other = (compare_response(pair, [120.0, 135.0], bands=0.0) for pair in (plain, damped))
-    np.testing.assert_allclose(other.small, one.small, rtol=1e-12)
-    assert other.warnings[0].startswith("the modal damping of the small model is left out")
 
 
 # Stability
@@ -230,26 +202,6 @@ def test_thresholds_and_decrements_of_a_lumped_rotor_are_the_rotor_s():
     assert (cost.small.mode, cost.small.direction) == (cost.full.mode, cost.full.direction)
     assert cost.small_decrement == pytest.approx(cost.full_decrement, rel=1e-6, abs=1e-9)
     assert cost.warnings == ()
-
-
-def test_compressor():
-    """Speed-dependent bearings and a swirling seal: the small model loses stability within 3 %."""
-    pair = compressor((4, 13, 18, 22), 3)
-    cost = compare_stability(pair, 1600.0, lowest=110.0, steps=20)
-    assert cost.full.threshold == pytest.approx(1144.84, rel=1e-5)
-    assert abs(cost.relative_difference) < 0.03
-    assert cost.small.frequency == pytest.approx(cost.full.frequency, rel=0.01)
-    at = cost.small.threshold
-    assert abs(growth(pair, at)) < 1e-9
-    assert growth(pair, 0.999 * at) < 0 < growth(pair, 1.001 * at)
-    assert np.sign(cost.small_decrement).tolist() == np.where(cost.speeds < at, 1.0, -1.0).tolist()
-    for k in (0, 10, 20):
-        values = pair.eigenvalues(cost.speeds[k])
-        values = values[values.imag > 0.1 * np.abs(values)]
-        decrements = -2 * np.pi * values.real / values.imag
-        assert cost.small_decrement[k] == pytest.approx(decrements[np.argmin(decrements)], rel=1e-7)
-        full = fem.campbell(pair.rotor, cost.speeds[k : k + 1], 8).log_decrements
-        assert cost.full_decrement[k] == pytest.approx(np.nanmin(full), rel=1e-6)
 
 
 def test_running_away_and_never_growing():

@@ -153,39 +153,6 @@ def test_condensed_supports_are_formula_50(rotor, reduction):
     np.testing.assert_allclose(np.sort(eigenvalues(small).imag)[-6::2], reduction.frequencies, rtol=1e-10)
 
 
-def test_unknowns_and_their_order():
-    small = small_model(full_machine(), (8, 4), (20.0, 30.0))
-    names = ("x8", "x4", "x1", "x11", "y8", "y4", "y1", "y11", "foot_x2", "foot_y2")
-    assert small.coordinates == names
-    motion = small.motion(100.0)
-    assert motion.coordinates == names
-    assert motion.speed == 100.0
-    np.testing.assert_array_equal(np.diag(motion.M), [20, 30, 0, 0, 20, 30, 0, 0, 20, 20])
-    # the pedestal: bearing B between node 11 and its foot, at 100 rad/s a fifth up its table
-    k = 0.8 * 1e7 + 0.2 * 3e7
-    assert motion.K[motion.index("x11"), motion.index("foot_x2")] == pytest.approx(-k)
-    assert motion.K[motion.index("foot_x2"), motion.index("foot_x2")] == pytest.approx(3e8 + k)
-    assert motion.C[motion.index("x1"), motion.index("y1")] == pytest.approx(1e2, rel=1e-6)
-    shaft = small.stiffness
-    rigid = np.column_stack((np.ones(4), full_machine().positions[np.array(small.nodes) - 1]))
-    np.testing.assert_allclose(shaft @ rigid, 0.0, atol=1e-9 * np.abs(shaft).max())
-
-
-def test_modal_damping_has_the_ratios_of_the_plane_x():
-    """On bearings that differ the same matrix acts in y; without masses of pedestals."""
-    stand = fem.Pedestal(0.0, (3e7, 6e7))
-    supports = [fem.Support(1, ((2e7, 0.0), (0.0, 4e7))), fem.Support(11, 3e7, pedestal=stand)]
-    rotor = full_machine(supports=supports, material_damping=0.0)
-    plain, damped = (
-        state_space(small_model(rotor, (4, 8), (30.0, 20.0), **how).motion(plane="x")).eigenvalues
-        for how in ({}, {"modal_damping": (0.03, 0.03)})
-    )
-    omega = plain.imag[plain.imag > 0]
-    assert len(omega) == 2
-    np.testing.assert_allclose(np.sort(np.abs(damped))[::2], np.sort(omega), rtol=1e-9)
-    np.testing.assert_allclose(damped.real / np.abs(damped), -0.03, rtol=1e-9)
-
-
 def test_state_space_has_the_same_eigenvalues_and_response():
     discs = [fem.Disc(4, 30.0, 0.6, 0.3), fem.Disc(8, 20.0, 0.4, 0.2)]
     rotor = full_machine(discs=discs, model=fem.Model(True, True, True))
@@ -204,20 +171,6 @@ def test_state_space_has_the_same_eigenvalues_and_response():
         np.testing.assert_allclose(x, expected[:, k], rtol=1e-9)
     bearing = small.state_space(250.0, inputs=["f_x1"], outputs=["x1", "v_x4"])
     assert frequency_response(bearing, 250.0).shape == (1, 2, 1)
-
-
-def test_gyroscopic_moments_at_supports_follow_statically_when_condensed(rotor):
-    discs = [fem.Disc(d.node, d.mass, 0.02 * d.mass, 0.01 * d.mass) for d in rotor.discs]
-    turning = replace(rotor, discs=discs, model=fem.Model(rotary_inertia=True, gyroscopic=True))
-    small = small_model(turning, NODES, (134.2, 196.6, 157.1))
-    few = state_space(small.motion(300.0, condensed=True)).eigenvalues
-    kept = eigenvalues(small, 300.0)
-    assert len(few) == 12
-    assert len(kept) == 16
-    assert np.abs(kept[12:]).min() > 100 * np.abs(kept[:12]).max()  # far above: of the massless supports
-    for value in few:
-        assert np.abs(kept - value).min() < 5e-6 * abs(value)
-    assert np.abs(kept[:12].real).max() < 1e-8  # nothing takes energy out or brings it in
 
 
 def test_damped_supports_cannot_be_condensed():

@@ -112,14 +112,12 @@ def test_what_a_page_should_not_ask_for_is_one_sentence(shared, path, body, monk
 def test_kill_loses_no_finished_cell(tmp_path, serve):
     job = copy(tmp_path) / "job.toml"
     served = serve(job)
-    cells = [name for name in served.state()["cells"] if name.endswith("phase_deg") and "baseline" in name][
-        :12
-    ]
+    cells = [f"runs|baseline|1220|probe {k}|1|phase_deg" for k in (1, 2, 3, 4)]
     for k, name in enumerate(cells):
         assert served.type(name, str(k))[0] == 200
     served.kill()
-    lines = (job.parent / "runs.csv").read_text().splitlines()[1:13]
-    assert [line.split(",")[-1] for line in lines] == [str(k) for k in range(12)]
+    lines = (job.parent / "runs.csv").read_text().splitlines()[1:5]
+    assert [line.split(",")[-1] for line in lines] == ["0", "1", "2", "3"]
     assert not [path for path in job.parent.iterdir() if path.name.endswith(".tmp")]
     assert serve(job).settled()["numbers"]
 
