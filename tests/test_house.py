@@ -44,6 +44,18 @@ def test_no_ceiling_in_force_is_exceeded():
     assert house.exceeded(house.measured(ceilings=in_force)) == []
 
 
+def test_modules_are_at_most_240():
+    assert len(modules()) <= 240
+
+
+def test_pages_are_at_most_30_000_words_and_what_makes_them_500_lines():
+    pages = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").rglob("*.md"))]
+    assert sum(len(page.split()) for page in pages) <= 30_000
+    code = [ROOT / "docs" / "conf.py", *(ROOT / "docs" / "_ext").glob("*.py")]
+    assert sum(path.read_text(encoding="utf-8").count("\n") for path in code) <= 500
+    assert sum(path.read_text(encoding="utf-8").count("\n") for path in ROOT.glob("benchmarks/*.py")) <= 1000
+
+
 def test_every_package_stands_in_a_row():
     assert house.in_no_row() == []
 
