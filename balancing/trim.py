@@ -158,7 +158,16 @@ def after_check_run(
         why = blocked or c.decision.cause
     elif worth:
         word, why = "trim", change
-    return LeftToDo(word, why, c, run, planes, there, trim if word == "trim" else 0 * trim, pieces)
+    return LeftToDo(
+        word,
+        why,
+        c,
+        run,
+        planes,
+        there,
+        trim if word == "trim" else 0 * trim,
+        pieces if word == "trim" else None,
+    )
 
 
 def _within_its_error(c: Correction) -> bool:

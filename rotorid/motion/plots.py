@@ -204,7 +204,7 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
         tip, tail = ((speed * RPM, 1e6 * size[0]) for size in (after, before))
         ax.annotate("", tip, tail, arrowprops={"arrowstyle": "->", "color": DARK, "shrinkA": 4})
     ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {label}, µm")
-    ax.set_ylim(bottom=0.0)
+    ax.set_ylim(bottom=-0.04 * ax.get_ylim()[1])  # a branch at rest stands above the axis
     plain(ax)
     second_scale(ax)
     pairs = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))

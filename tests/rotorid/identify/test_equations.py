@@ -220,7 +220,7 @@ def test_columns_of_a_table(tmp_path):
     for name, equations, words in (
         ("Omega_im", GYRO, "Omega_im"),
         ("note", GYRO, "a column Omega: the equations multiply amplitudes"),
-        ("Omega", misspelt, r"a column kk.*did you mean '?k'?"),
+        ("Omega", misspelt, "a column kk: the equations multiply amplitudes"),
     ):
         with pytest.raises(InputError, match=words):
             read(name, 3, equations=equations)

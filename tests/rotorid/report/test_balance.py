@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from sheets import disagreements
 
 from balancing.plots import draw_plane, residual_figure
+from rotorid.commands.balance import BalanceOptions, balance
 
 JOBS = {
     "checked": ("turbo_job/checked.toml", {}),
@@ -188,3 +189,19 @@ def test_pieces_are_drawn_in_their_holes():
         rows = [row for row in report.mounted.to_dict()["holes"] if row["plane"] == plane]
         angles = sorted(np.degrees(np.angle(complex(*p.center))) % 360 for p in full)
         assert angles == pytest.approx(sorted(row["angle_deg"] for row in rows), abs=1e-6)
+
+
+def test_no_piece_is_to_be_added_where_all_is_done(tmp_path):
+    """A sheet with a piece to tick below "Done" would be mounted."""
+    job = 'runs = "r.csv"\nweights = "w.csv"\ncheck = "c.csv"\nphase = "lag"\nangles = "against rotation"\n'
+    job += "".join(f"[planes.{plane}]\nholes = 16\navailable_g = [5, 10, 20]\n" for plane in ("P1", "P2"))
+    head = "run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg\n"
+    rows = ["bare,1480,DE,6.2,120", "bare,1480,NDE,4.1,300", "t1,1480,DE,4.9,95", "t1,1480,NDE,4.4,290"]
+    rows += ["t2,1480,DE,5.8,131", "t2,1480,NDE,2.9,330"]
+    (tmp_path / "job.toml").write_text(job)
+    (tmp_path / "r.csv").write_text(head + "\n".join(rows) + "\n")
+    (tmp_path / "w.csv").write_text("run,plane,mass_g,angle_deg\nt1,P1,20,0\nt2,P2,20,90\n")
+    (tmp_path / "c.csv").write_text(head + "check,1480,DE,1.0,80\ncheck,1480,NDE,0.8,200\n")
+    outcome = balance(tmp_path / "job.toml", BalanceOptions(split=True))
+    left = outcome.document["left_to_do"]
+    assert (left["word"], left["holes"]) == ("done", [])
