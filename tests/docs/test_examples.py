@@ -26,7 +26,7 @@ PINNED = {
         "largest_after_um_pp": 0.648889174,
         "largest_with_pieces_um_pp": 4.98415698,
         "largest_in_check_um_pp": 0.96,
-        "trim_left_g_mm": 13.6474819,
+        "trim_left_g_mm": 13.6524444,
     },
     "balance_workflow": {
         "holes": 7,
