@@ -68,3 +68,16 @@ def test_runs_that_disagree_are_named_before_what_follows(cli, name, run):
         assert follows.startswith("the trial weight in plane 'P1'")
         assert follows.endswith("mend the table, or measure these runs again until they agree")
         assert not rest
+
+
+def test_a_trial_weight_that_did_nothing_is_repeated_with_one_that_does(cli, tmp_path):
+    """The effect is 0.53 times its error; five times its error asks for 1.5 g · 5 / 0.53 = 14 g."""
+    head = "run,speed_rpm,sensor,amplitude_mm_s_rms,phase_deg\n"
+    rows = ["0,1480,A,6.50,205", "0,1480,B,6.55,224", "1,1480,A,6.24,205", "1,1480,B,6.30,222"]
+    rows += ["2,1480,A,5.11,184", "2,1480,B,1.50,276"]
+    (tmp_path / "r.csv").write_text(head + "\n".join(rows) + "\n")
+    (tmp_path / "w.csv").write_text("run,plane,mass_g,angle_deg\n1,front,1.5,0\n2,back,25,0\n")
+    words = ("--phase", "lag", "--angles", "with rotation")
+    text = " ".join(cli("balance", tmp_path / "r.csv", tmp_path / "w.csv", *words).out.split())
+    assert "its trial weight (1.5 g) is only 0.53 times its error" in text
+    assert "repeat the trial run of plane 'front' with at least 14 g" in text
