@@ -262,12 +262,13 @@ def _merge_speeds(
         rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
     values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
+    runs = table.texts("run")
     distinct = np.unique(values[usable])
     apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
     groups = np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist()
     read: dict[int, set[tuple[str, float]]] = defaultdict(set)
     for row, g in zip(usable, groups, strict=True):
-        read[g].add((table.texts("run")[row], float(values[row])))
+        read[g].add((runs[row], float(values[row])))
     merged, alike = [], []
     for g in sorted(read):
         speeds = sorted({speed for _, speed in read[g]})
