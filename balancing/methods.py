@@ -421,7 +421,6 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
     if not len(start):
         return _fit_plain(job)
-    from scipy.optimize import brentq
     from scipy.special import chdtrc
 
     common = np.moveaxis(np.ascontiguousarray(columns[:, on]).view(np.float64), 0, 2)
@@ -452,6 +451,8 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
     elif unexplained:
         unexplained = chdtrc(dof, wider(0.0).chi_square(D, common, measured=True)) < 1 - UNEXPLAINED
     if unexplained:
+        from scipy.optimize import brentq
+
         D, high = start, chi / dof - 1
         while excess(high) > 0:
             high *= 2

@@ -19,7 +19,7 @@ from rotorid.commands.balance_solution import (
     solve,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS
+from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, needs_trial_run
 from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
@@ -186,8 +186,6 @@ def _answer(
     influence: Influence,
 ) -> Answer:
     """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-    from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
-
     weights, sound = result.answer, result.sound
     if needs_trial_run(job, influence):
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
