@@ -347,7 +347,17 @@ class _Errors(NamedTuple):
         return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
-        """Weights at which Q is smallest, sought from some start."""
+        """Weights at which Q is smallest, sought from some start: by Gauss and Newton, or with a library."""
+        D, Q = start, np.inf
+        for _ in range(50):
+            state = self.at(D)
+            step = solution(state.rows, state.r)
+            Q, before = float(state.r @ state.r), Q
+            if Q > before * (1 + 1e-12):
+                break
+            if np.sum((state.rows @ step) ** 2) <= 1e-16 * (1 + Q):
+                return D
+            D = D - unstretch(step)
         from scipy.optimize import least_squares
 
         @lru_cache(1)
@@ -439,24 +449,25 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
         return errors._replace(C=C)
 
     @cache
-    def excess(share: float) -> float:
+    def least(share: float) -> float:
+        """Least χ² of a share."""
         nonlocal D
         D = wider(share).minimum(D)
-        return wider(share).chi_square(D, common) - dof
+        return wider(share).chi_square(D, common)
 
-    chi, share = dof + excess(0.0), 0.0
+    chi, share = least(0.0), 0.0
     unexplained = chi > dof > 0
     if unexplained and job.explained is not None:
         unexplained = not job.explained(D)
     elif unexplained:
         unexplained = chdtrc(dof, wider(0.0).chi_square(D, common, measured=True)) < 1 - UNEXPLAINED
-    if unexplained:
-        from scipy.optimize import brentq
-
-        D, high = start, chi / dof - 1
-        while excess(high) > 0:
-            high *= 2
-        share = brentq(excess, 0.0, high, xtol=1e-8 * high)
+    if unexplained:  # 1/χ² is nearly linear in the share
+        D, before, share = start, 0.0, chi / dof - 1
+        for _ in range(50):
+            slope = (1 / least(share) - 1 / least(before)) / (share - before)
+            before, share = share, max(share - (1 / least(share) - 1 / dof) / slope, 0.0)
+            if abs(share - before) <= 1e-8 * share:
+                break
         D = wider(share).minimum(D)
     wide = wider(share)
     if not within(bounds, D):
