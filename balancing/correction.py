@@ -319,7 +319,8 @@ class Correction(Prediction, Answered):
         widths, turns = self.half_widths()
         each = zip(mass, widths * self.labels.weight_scale, places, np.degrees(turns), strict=True)
         words = (
-            f"{figures(m)}{_within(width)} at {degrees(at)}{_within(turn, '°')}" for m, width, at, turn in each
+            f"{figures(m)}{_within(width)} at {degrees(at)}{_within(turn, '°')}"
+            for m, width, at, turn in each
         )
         return ", ".join(f"{plane} {weight}" for plane, weight in zip(self.planes, words, strict=True))
 

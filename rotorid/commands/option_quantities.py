@@ -12,7 +12,7 @@ from math import radians
 from typing import TYPE_CHECKING, get_args
 
 from rotorid.base.choices import did_you_mean
-from rotorid.base.text import Angles, listing
+from rotorid.base.text import SHORT_ANGLES, Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
@@ -147,7 +147,7 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
     """
     from balancing import Labels
 
-    way: Angles = one_of(angles, "--angles", get_args(Angles))
+    way: Angles = one_of(SHORT_ANGLES.get(angles, angles), "--angles", get_args(Angles))
     if not isinstance(given, str | int | float | complex):
         raise ValueError(f"{what}: a text such as 35g@120 or one complex weight is needed, not {given!r}")
     if not isinstance(given, str):

@@ -22,9 +22,9 @@ from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.base.text import Angles, Phase
 from rotorid.files import units
 from rotorid.files.cells import Grid
+from rotorid.files.check_and_slow_roll import outside
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.disk import read_bytes, write_files
-from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems, refusal

@@ -245,7 +245,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     holes = make_holes(planes, trials.labels, limits, problems)
     check, mounted = None, tables.get("check_weights")
     if "check" in tables:
-        from rotorid.files.further_runs import check_runs
+        from rotorid.files.check_and_slow_roll import check_runs
 
         sources = tables["check"], mounted
         check = check_runs(sources, trials, [*planes], conventions, settings.errors, slow_roll, problems)
@@ -355,7 +355,7 @@ def _readings(
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors, slow_roll = tables.get("slow_roll", settings.slow_roll), None
     if vectors is not None:
-        from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
+        from rotorid.files.check_and_slow_roll import make_slow_roll, subtract_slow_roll
 
         if (made := make_slow_roll(vectors, trials, conventions, problems)) is not None:
             slow_roll, further = made

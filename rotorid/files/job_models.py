@@ -366,9 +366,9 @@ class JobSettings(Settings):
         "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
     )
-    angles: Literal[Angles, Rotation] | None = optional(
-        "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
-        "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
+    angles: Literal[Angles, Rotation, "with", "against"] | None = optional(
+        "how angles on the rotor count: with (rotation), against (rotation), or clockwise or "
+        "counter-clockwise with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
     )
     rotation: Rotation | None = optional("how the rotor turns, seen from the same end as the angles")
     view: View | None = optional("the end from which that is seen")

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from balancing import Labels
-from rotorid.base.text import Angles, Phase, Rotation, listing
+from rotorid.base.text import SHORT_ANGLES, Angles, Phase, Rotation, listing
 from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.headings import (
@@ -78,6 +78,8 @@ class Conventions:
         Planes in which material is taken away.
     rms
         Whether the job has limits in rms, so that mm/s alone are rms.
+    run
+        Name of the only run, for tables without a column of runs; empty: they need one.
 
     Raises
     ------
@@ -93,6 +95,7 @@ class Conventions:
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()
     rms: bool = False
+    run: str = ""
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
@@ -103,7 +106,7 @@ class Conventions:
 
 
 def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
-    """With or against the rotation, of clockwise too; `rotation` is seen from the same end.
+    """With or against the rotation, of clockwise and short forms too; `rotation` is seen from the same end.
 
     Raises
     ------
@@ -111,7 +114,7 @@ def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401
         For clockwise or counter-clockwise without a rotation.
     """
     if stated not in ROTATIONS:
-        angles: Angles = stated
+        angles: Angles = SHORT_ANGLES.get(stated, stated)
         return angles
     if rotation is None:
         raise ValueError(
@@ -245,7 +248,7 @@ def long_rows(
     columns = [column for h in headings for column in _columns(grid, h, headings, pair, conventions)]
     sensors = _by_name(grid, columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
-    stems, n = {column.stem for column in common}, len(grid.rows)
+    stems, n, run = {column.stem for column in common}, len(grid.rows), run or conventions.run
     if run and "run" not in stems:
         common.insert(0, _Column(Heading(0, "run"), "run", "", [run] * n))
     if key == "sensor" and "speed" not in stems and conventions.speed is not None:
