@@ -317,12 +317,11 @@ class Correction(Prediction, Answered):
         """Weights and their 95 %, in a line."""
         mass, places = self.labels.weight(self.weights)[0], self.places(self.planes, self.weights)
         widths, turns = self.half_widths()
-        each = zip(mass, widths * self.labels.weight_scale, places, np.degrees(turns), strict=True)
-        words = (
-            f"{figures(m)}{_within(width)} at {degrees(at)}{_within(turn, '°')}"
-            for m, width, at, turn in each
+        sizes, angles = widths * self.labels.weight_scale, np.degrees(turns)
+        return ", ".join(
+            f"{plane} {figures(m)}{_within(size)} at {degrees(place)}{_within(angle, '°')}"
+            for plane, m, size, place, angle in zip(self.planes, mass, sizes, places, angles, strict=True)
         )
-        return ", ".join(f"{plane} {weight}" for plane, weight in zip(self.planes, words, strict=True))
 
     def _weights_text(self) -> str:
         """Weights and their 95 %, in each plane; under other conventions, and beside what is mounted."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,11 +19,11 @@ from rotorid.commands.balance_solution import (
     solve,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS
+from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, needs_trial_run
 from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
+from rotorid.report.outcome import Outcome, command, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +47,8 @@ class Balance(Outcome):
     mounted, check, left, verdict, of_type
         Pieces in holes, check runs beside their prediction, what is left to do after them, what limits and
         tolerances say, where the coefficients are those of a type; None where there is nothing.
+    told
+        Makes the answer, which JSON does without.
     """
 
     influence: Influence
@@ -56,6 +58,12 @@ class Balance(Outcome):
     left: LeftToDo | None
     verdict: Verdict | None
     of_type: TypeKnowledge | None
+    told: Callable[[], Answer]
+
+    @property
+    def answer(self) -> Answer:
+        """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        return self.told()
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -137,19 +145,16 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
-    plain = outcome_of(
-        result,
-        made,
-        answer=_answer(result, mounted, check, left, verdict, read, influence),
+    outcome = Balance(
+        result=result,
+        provenance=made,
+        told=lambda: _answer(result, mounted, check, left, verdict, read, influence),
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),
-    )
-    outcome = Balance(
-        **vars(plain),
         influence=influence,
         job=read,
         mounted=mounted,
@@ -186,8 +191,6 @@ def _answer(
     influence: Influence,
 ) -> Answer:
     """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-    from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
-
     weights, sound = result.answer, result.sound
     if needs_trial_run(job, influence):
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False

@@ -15,7 +15,7 @@ from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings, run_errors
-from rotorid.files.disk import sha256
+from rotorid.commands.coefficients import NEEDS_TRIAL
 
 if TYPE_CHECKING:
     from balancing import Influence
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray
     from rotorid.commands.model_places import ModelPlaces
     from rotorid.files import Job
-
-NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
-"""Why its coefficients alone are not enough."""
 
 
 def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
@@ -47,20 +44,6 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
         return with_errors
     warnings = *with_errors.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(with_errors, remarks=with_errors.remarks._replace(warnings=warnings))
-
-
-def counted_before(job: Job) -> bool:
-    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
-    calibration = None if job.rotor is None else job.rotor.calibration
-    job_and_runs = job.files[:2]  # the job, then its runs
-    return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
-
-
-def needs_trial_run(job: Job, influence: Influence) -> bool:
-    """Whether these coefficients are those of a model alone that contradicts its own data."""
-    calibration = None if job.rotor is None else job.rotor.calibration
-    alone = influence is not job.influence and not job.trials.weights.any()
-    return calibration is not None and calibration.needs_trial_run and alone
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:

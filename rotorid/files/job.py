@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials
-from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
@@ -34,6 +33,7 @@ from rotorid.files.settings import read_toml
 if TYPE_CHECKING:
     from balancing import Mounted
     from fem import Rotor
+    from fem import Sensor as Probe
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +125,8 @@ class Job:
     @property
     def sensor_places(self) -> dict[str, Probe]:
         """Node and direction of each sensor that has a node."""
+        from fem import Sensor as Probe
+
         angles, sensors = self.sensor_angles, self.sensors.items()
         return {s: Probe(one.node, angles.get(s, 0.0)) for s, one in sensors if one.node is not None}
 

@@ -368,7 +368,8 @@ class JobSettings(Settings):
     )
     angles: Literal[Angles, Rotation, "with", "against"] | None = optional(
         "how angles on the rotor count: with (rotation), against (rotation), or clockwise or "
-        "counter-clockwise with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
+        "counter-clockwise with `rotation`; unstated: with rotation, named so where an angle other than "
+        "0° and 180° is written",
     )
     rotation: Rotation | None = optional("how the rotor turns, seen from the same end as the angles")
     view: View | None = optional("the end from which that is seen")
