@@ -26,7 +26,7 @@ from rotorid.files.job_models import (
 )
 from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
 from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
-from rotorid.files.problems import Problems
+from rotorid.files.problems import InputError, Problems
 from rotorid.files.runs import make_trials
 from rotorid.files.settings import read_toml
 
@@ -218,7 +218,7 @@ def open_job(path: Path, problems: Problems) -> WrittenJob:
         If there is nothing of a job in it.
     """
     if path.suffix.lower() == ".toml":
-        return WrittenJob(path, problems.need(read_toml(path, problems)))
+        return WrittenJob(path, read_toml(path))
     from rotorid.files.job_excel import job_in_sheets
 
     return job_in_sheets(path, problems)
@@ -330,7 +330,10 @@ def _readings(
         from rotorid.files.influence import fit_to_readings, load_influence
 
         resolved = None if angles is None else resolve_angles(angles, settings.rotation)
-        influence, stated = load_influence(source, phase, resolved, problems) or (None, stated)
+        try:
+            influence, stated = load_influence(source, phase, resolved)
+        except InputError as error:
+            problems.extend(error.problems)
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     if source is not None and influence is not None and trials is not None:

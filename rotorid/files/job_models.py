@@ -16,7 +16,7 @@ from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
 from rotorid.files.layout import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
-from rotorid.files.problems import Problems, refusal
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.settings import (
     Count,
     Date,
@@ -433,7 +433,10 @@ class WrittenJob:
         source = "" if self.path is None else str(self.path)
         if not self.tables and "runs" not in self.settings:
             raise refusal(source, 'a job, which names the runs table, runs = "runs.csv"', column="runs")
-        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
+        try:
+            settings = read_settings(JobSettings, self.settings, source, self.where)
+        except InputError as error:
+            raise InputError([*problems, *error.problems]) from None
         for name in filter(settings.has, self.tables):
             settings.complain(problems, name, f"the table in the sheet {name!r} of this workbook, not a file")
         return settings

@@ -12,6 +12,7 @@ import re
 import warnings
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
@@ -164,10 +165,11 @@ def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
     directions = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
-        with warnings.catch_warnings():
+        header: Sequence[str] = ()
+        with warnings.catch_warnings(), suppress(InputError):
             warnings.simplefilter("ignore")  # of a file that is read once more
-            grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
-        for heading in read_headings(grid.header) if grid else ():
+            header = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True).header
+        for heading in read_headings(header):
             if heading.stem == "phase" and readable("phase", heading.unit):
                 directions.add(read_unit("phase", heading.unit)[1])
     return next((phase for phase in PHASES if directions - {""} == {phase}), None)
@@ -193,11 +195,10 @@ def read_runs_grids(
     files = source if isinstance(source, tuple) else files_of_runs(source)
     grids = list[Grid]()
     for file in files or (source,):
-        grid = read_grid(file, "runs", problems, first=first, find=find_header)
         run = file.stem if isinstance(file, Path) and files else ""
         try:
-            if grid is not None:
-                grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
+            grid = read_grid(file, "runs", problems, first=first, find=find_header)
+            grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
         except InputError as error:
             problems.extend(error.problems)
     return grids if len(grids) == len(files or (source,)) else None
