@@ -198,9 +198,14 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
 
     def run_command(**typed: Any) -> None:  # noqa: ANN401 - what typer has read
+        from rotorid.files.cells import LARGEST_STATED
         from rotorid.files.disk import each_file_once
 
-        _check_sizes(typed)
+        for name, value in typed.items():  # squares of larger ones no computer holds
+            if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
+                raise ValueError(
+                    f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}"
+                )
         given = [typed.pop(name) for name in arguments]
         target, chosen = _taken(Destination, typed), _taken(kind, typed)
         with each_file_once():
@@ -214,15 +219,6 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     run_command.__annotations__ = {one.name: one.annotation for one in parameters}
     run_command.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return run_command
-
-
-def _check_sizes(typed: Mapping[str, Any]) -> None:
-    """Refuse numbers whose squares no computer holds."""
-    from rotorid.files.cells import LARGEST_STATED
-
-    for name, value in typed.items():
-        if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
-            raise ValueError(f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}")
 
 
 def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:

@@ -21,7 +21,6 @@ from rotorid.commands.balance_solution import (
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, needs_trial_run
 from rotorid.commands.quantities import one_of
-from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, provenance, table_of
 
@@ -248,6 +247,8 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
+    from rotorid.commands.tolerance import ToleranceOptions, permissible
+
     stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
     return permissible(stated, names=("--rotor-mass", "--service-speed"))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -50,7 +50,7 @@ class RunUpOptions:
     unit: str | None = None
     acceleration: str | float | None = None
     bands: str | Sequence[Band] | None = None
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
 
 
 @command

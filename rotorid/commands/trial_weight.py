@@ -71,7 +71,7 @@ class TrialWeightOptions:
         "Angle": "reading_phase lag sensor_angle",
         "Conventions": "phase angles",
     }
-    to: ClassVar[Sequence[str]] = WITHOUT_FILE
+    to = WITHOUT_FILE
 
 
 @command

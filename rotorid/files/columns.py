@@ -280,7 +280,8 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     stems = misspelt.union(column.stem for column in meant.values() if column is not None)
     missing = [column for column in columns if column.required and column.stem not in stems]
     unknown = [names[k] for k, name in near.items() if name is None]
-    if not _has_columns(grid, columns, stems, missing, unknown, problems):
+    strange = missing or unknown or not stems
+    if strange and not _has_columns(grid, columns, stems, missing, unknown, problems):
         return None
     places: dict[str, tuple[int, Unit, Column]] = {}
     for k, column in meant.items():
