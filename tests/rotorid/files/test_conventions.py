@@ -20,5 +20,8 @@ def test_another_word_instead_of_that_of_the_job(job):
     assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "against rotation")
     read = job(CLOCKWISE, angles="counter-clockwise")
     assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "counter-clockwise")
+    read = job('angles = "against"\n')
+    assert (read.conventions.labels.angles, read.trials.labels.assumed) == ("against rotation", ("phase",))
+    assert job("", angles="with").conventions.labels.angles == "with rotation"
     with pytest.raises(ValueError, match="angles that count clockwise need the direction of rotation"):
         job("", angles="clockwise")

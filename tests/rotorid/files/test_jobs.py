@@ -241,6 +241,9 @@ def test_check_runs(checked, folder):
     read = checked(CHECKED)
     assert (read.check.sensors, read.check.planes, read.check_mounted) == (("B", "A"), (), False)
     np.testing.assert_array_equal(read.check.speeds, read.trials.speeds)
+    alone = checked(CHECKED, [row[1:] for row in CHECK]).check  # the only run need not be named
+    assert alone.runs == ("check",)
+    np.testing.assert_array_equal(alone.readings, read.check.readings)
     nothing = checked(mounted=CHECK_WEIGHTS[:1]).check  # a weights table without rows says so
     assert (nothing.planes, nothing.weights.any()) == (("1", "2"), False)
     again = checked(check=replaced(CHECK, 1, "amplitude_um_pp", "amplitude_mm"))
