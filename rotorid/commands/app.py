@@ -148,16 +148,11 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Refuse to write a result over a file that was read for it."""
     for path, source in itertools.product(targets, inputs):
-        if _same_file(path, source):
+        there = path.exists() and source.exists()  # realpath: of a circle of links, too
+        if path.samefile(source) if there else os.path.realpath(path) == os.path.realpath(source):
             raise ValueError(
                 f"{path}: this is an input of the command, which must not be overwritten; choose another name"
             )
-
-
-def _same_file(a: Path, b: Path) -> bool:
-    if a.exists() and b.exists():
-        return a.samefile(b)
-    return os.path.realpath(a) == os.path.realpath(b)  # of a circle of links, too
 
 
 def json_text(document: Mapping[str, Any]) -> str:

@@ -28,8 +28,6 @@ NAMED = {"planes": "plane", "sensors": "sensor"}
 RESULTS = "results"
 """Sheets whose names begin so hold what a command has computed: they are not read."""
 SHEETS = (*TABLES, *NAMED, "settings", RESULTS)
-TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
-"""Columns of names, in which `1` is text."""
 
 
 def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
