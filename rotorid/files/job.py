@@ -26,7 +26,7 @@ from rotorid.files.job_models import (
 )
 from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
 from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.runs import make_trials
 from rotorid.files.settings import read_toml
 
@@ -205,7 +205,10 @@ def job_from_files(
         )
     tables: dict[str, Source] = dict(zip(("runs", "weights"), map(Path, files), strict=False))
     if influence is not None:
-        tables["influence"] = Path(influence)
+        tables["influence"], first = Path(influence), Path(files[0])
+        if first.suffix.lower() == ".toml" and "runs" in read_toml(first):
+            expected = f'influence = "{influence}" in the job; --influence goes with a runs table'
+            raise refusal(first, expected, column="influence")
     return job_of(WrittenJob(None, tables=tables), Problems(), **stated)
 
 

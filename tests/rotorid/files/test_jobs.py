@@ -95,6 +95,12 @@ def test_stored_coefficients(folder, stored, job):
     np.testing.assert_array_equal(read.limits.max_weight, [np.inf, 0.003])
 
 
+def test_coefficients_beside_a_job_stand_in_it(folder, job):
+    job()
+    found = complaints(job_from_files, [folder / "job.toml"], influence="w.csv")
+    the_only(found, "job.toml", None, "influence", None, 'influence = "w.csv" in the job')
+
+
 @each_of(
     ("row", "column", "value", "where", "words"),
     [
