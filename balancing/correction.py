@@ -313,6 +313,16 @@ class Correction(Prediction, Answered):
         words = f"{before} → {left} {unit}".rstrip(" ,")
         return f"{words}; a check run stays below {checked} in 95 of 100" if checked else words
 
+    def in_words(self) -> str:
+        """Weights and their 95 %, in a line."""
+        mass, places = self.labels.weight(self.weights)[0], self.places(self.planes, self.weights)
+        widths, turns = self.half_widths()
+        sizes, angles = widths * self.labels.weight_scale, np.degrees(turns)
+        return ", ".join(
+            f"{plane} {figures(m)}{_within(size)} at {degrees(place)}{_within(angle, '°')}"
+            for plane, m, size, place, angle in zip(self.planes, mass, sizes, places, angles, strict=True)
+        )
+
     def _weights_text(self) -> str:
         """Weights and their 95 %, in each plane; under other conventions, and beside what is mounted."""
         labels, removed = self.labels, set(self.planes) & set(self.remove)
@@ -364,6 +374,10 @@ class Correction(Prediction, Answered):
         if self.errors_known:
             lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
         return "\n".join(fill(line, WIDTH) for line in lines)
+
+
+def _within(half: float, unit: str = "") -> str:
+    return f" ± {figures(half, 2)}{unit}" if half == half else ""
 
 
 def _angle_width(half: float) -> str:

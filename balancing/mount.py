@@ -37,7 +37,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records, text
-from rotorid.base.text import figures
+from rotorid.base.text import capital, figures, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,14 +119,18 @@ class Mounted(Answered):
         first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
         if not c.sound or self.check_rms > HARDLY_BELOW * rms(c.before):
             first = "These pieces would leave"
+        if c.errors_known:
+            most = figures(self.check_rms * labels.vibration_scale, 2)
+            left += f"; a check run stays below {most} in 95 of 100"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
         each = zip(c.planes, self.in_planes(), strict=True)
         lines = [
             f"Pieces in {labels.weight_in}{stays}:",
             *(f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each),
+            f"{capital(labels.turning_in_words())}: {self._first_holes()}.",
             "",
             f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}",
-            f"Weights at any angle: rms {small(rms(free), old.max())} {unit}".rstrip() + ".",
+            f"Weights at any angle: {c.in_words()}; rms {small(rms(free), old.max())} {unit}".rstrip() + ".",
         ]
         fewer = (self._left(one, one.residual) for one in self.discrete.fewer)
         less = [f"{one['pieces']} → {three_figures(one['rms_after'])}" for one in fewer]
@@ -142,6 +146,21 @@ class Mounted(Answered):
             more="hole by hole",
             to_mount=True,
         )
+
+    def _first_holes(self) -> str:
+        """Where numbers of holes begin and which way they rise, plane by plane where they differ."""
+        c, planes = self.correction, dict[str, list[str]]()
+        for plane, holes in zip(c.planes, self.holes, strict=True):
+            if holes is not None:
+                at = c.places([plane] * len(holes.names), np.exp(1j * holes.angles)).tolist()[:2]
+                words = (f"{name} at {angle:.4g}°" for name, angle in zip(holes.names, at, strict=False))
+                planes.setdefault(", ".join(words), []).append(plane)
+        several = len(planes) > 1
+        each = (
+            f"holes{several * ' of '}{several * listing(names, 'and')} {words}"
+            for words, names in planes.items()
+        )
+        return "; ".join(each)
 
     def in_holes(self) -> str:
         """What is in which hole of each plane, in a line."""

@@ -181,8 +181,9 @@ def terminal(table: Table, width: int = WIDTH) -> str:
 
 
 def csv(table: Table) -> bytes:
-    """A CSV file; a note stands in a line with # above the header."""
-    return csv_bytes(table.headings, table.rows, table.note)
+    """A CSV file, of numbers 15 digits; a note stands in a line with # above the header."""
+    rows = [[float(f"{x:.15g}") if isinstance(x, float) else x for x in row] for row in table.rows]
+    return csv_bytes(table.headings, rows, table.note)
 
 
 def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 Phase = Literal["lead", "lag"]
 Angles = Literal["with rotation", "against rotation"]
 Rotation = Literal["clockwise", "counter-clockwise"]
+SHORT_ANGLES = {"with": "with rotation", "against": "against rotation"}
 View = Literal["drive end", "free end"]
 Quantity = Literal["displacement", "velocity", "acceleration"]
 

@@ -16,7 +16,7 @@ from rotorid.base.choices import one_of
 from rotorid.cli.choices import Command, Commands, whole_paragraphs
 from rotorid.cli.demo import demo
 from rotorid.commands.app import json_text, run, typer_command, written_help
-from rotorid.commands.progress import markup_mode
+from rotorid.commands.progress import plain
 
 _JOBS = {
     "Balance rotors": "balance vectors trial_weight split tolerance unbalance",
@@ -87,7 +87,7 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
     app = typer.Typer(
         name="rotorid",
         cls=Commands,
-        rich_markup_mode=markup_mode(),
+        rich_markup_mode=None if plain() else "rich",  # else without any escape code
         invoke_without_command=True,
         add_completion=False,
         pretty_exceptions_enable=False,

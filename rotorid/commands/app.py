@@ -148,16 +148,11 @@ def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
 def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Refuse to write a result over a file that was read for it."""
     for path, source in itertools.product(targets, inputs):
-        if _same_file(path, source):
+        there = path.exists() and source.exists()  # realpath: of a circle of links, too
+        if path.samefile(source) if there else os.path.realpath(path) == os.path.realpath(source):
             raise ValueError(
                 f"{path}: this is an input of the command, which must not be overwritten; choose another name"
             )
-
-
-def _same_file(a: Path, b: Path) -> bool:
-    if a.exists() and b.exists():
-        return a.samefile(b)
-    return os.path.realpath(a) == os.path.realpath(b)  # of a circle of links, too
 
 
 def json_text(document: Mapping[str, Any]) -> str:
@@ -198,9 +193,14 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
 
     def run_command(**typed: Any) -> None:  # noqa: ANN401 - what typer has read
+        from rotorid.files.cells import LARGEST_STATED
         from rotorid.files.disk import each_file_once
 
-        _check_sizes(typed)
+        for name, value in typed.items():  # squares of larger ones no computer holds
+            if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
+                raise ValueError(
+                    f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}"
+                )
         given = [typed.pop(name) for name in arguments]
         target, chosen = _taken(Destination, typed), _taken(kind, typed)
         with each_file_once():
@@ -214,15 +214,6 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     run_command.__annotations__ = {one.name: one.annotation for one in parameters}
     run_command.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return run_command
-
-
-def _check_sizes(typed: Mapping[str, Any]) -> None:
-    """Refuse numbers whose squares no computer holds."""
-    from rotorid.files.cells import LARGEST_STATED
-
-    for name, value in typed.items():
-        if isinstance(value, float) and not abs(value) <= LARGEST_STATED:
-            raise ValueError(f"{option_name(name)} takes a number up to {LARGEST_STATED:g}, not {value:g}")
 
 
 def _argument(name: str, one: inspect.Parameter, about: _Documented, place: int) -> inspect.Parameter:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,9 +21,8 @@ from rotorid.commands.balance_solution import (
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, needs_trial_run
 from rotorid.commands.quantities import one_of
-from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
+from rotorid.report.outcome import Outcome, command, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +46,8 @@ class Balance(Outcome):
     mounted, check, left, verdict, of_type
         Pieces in holes, check runs beside their prediction, what is left to do after them, what limits and
         tolerances say, where the coefficients are those of a type; None where there is nothing.
+    make_answer
+        Makes the answer, which JSON does without.
     """
 
     influence: Influence
@@ -56,6 +57,12 @@ class Balance(Outcome):
     left: LeftToDo | None
     verdict: Verdict | None
     of_type: TypeKnowledge | None
+    make_answer: Callable[[], Answer]
+
+    @property
+    def answer(self) -> Answer:
+        """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        return self.make_answer()
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -137,19 +144,16 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
-    plain = outcome_of(
-        result,
-        made,
-        answer=_answer(result, mounted, check, left, verdict, read, influence),
+    outcome = Balance(
+        result=result,
+        provenance=made,
+        make_answer=lambda: _answer(result, mounted, check, left, verdict, read, influence),
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),
-    )
-    outcome = Balance(
-        **vars(plain),
         influence=influence,
         job=read,
         mounted=mounted,
@@ -243,6 +247,8 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
+    from rotorid.commands.tolerance import ToleranceOptions, permissible
+
     stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
     return permissible(stated, names=("--rotor-mass", "--service-speed"))
 

@@ -104,8 +104,8 @@ class BalanceOptions:
         "Limits, mounting, check run": "max_mass limit split refine grade rotor_mass service_speed",
         "Output": "template",
     }
-    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".json")
+    to = (*WITH_REPORT, *EQUATIONS)
+    outputs = (".csv", ".xlsx", ".json")
 
     def before(self, job: Sequence[Path] | None) -> str | None:
         """Write the empty workbook where it is asked for, and say so.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -42,8 +42,8 @@ class BearingsOptions:
     """
 
     speeds: Speeds
-    outputs: ClassVar[tuple[str, ...]] = (".csv", ".xlsx", ".toml")
-    to: ClassVar[tuple[str, ...]] = USUAL
+    outputs = (".csv", ".xlsx", ".toml")
+    to = USUAL
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -45,8 +45,8 @@ class CalibrateOptions:
     estimate: Names
     prior: str | Mapping[str, str] = ""
     exact: bool = False
-    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml")
-    to: ClassVar[Sequence[str]] = ("output", "table", "json")
+    outputs = (".csv", ".xlsx", ".toml")
+    to = ("output", "table", "json")
 
 
 def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:

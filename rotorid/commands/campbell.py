@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -49,7 +49,7 @@ class CampbellOptions:
     heavy: float = 6.0
     mesh_check: bool = False
     cross_coupling: str | tuple[float, float] | None = None
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
     panels: ClassVar[Mapping[str, str]] = {"Method": "heavy mesh_check cross_coupling"}
 
 

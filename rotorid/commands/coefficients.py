@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rotorid.files.disk import sha256
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -15,6 +17,8 @@ NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated 
 KINDS = ("measured", "computed", "combined")
 MODEL_ERROR = 20.0
 """Percent of a computed coefficient, one standard deviation, unless its rotor is calibrated."""
+NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
+"""Why the coefficients of a calibrated model alone are not enough."""
 
 
 def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple[Influence, Trials | None]:
@@ -73,6 +77,20 @@ def _separate(trials: Trials) -> bool:
     except UndeterminedError:
         return False
     return True
+
+
+def counted_before(job: Job) -> bool:
+    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
+    calibration = None if job.rotor is None else job.rotor.calibration
+    job_and_runs = job.files[:2]  # the job, then its runs
+    return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
+
+
+def needs_trial_run(job: Job, influence: Influence) -> bool:
+    """Whether these coefficients are those of a model alone that contradicts its own data."""
+    calibration = None if job.rotor is None else job.rotor.calibration
+    alone = influence is not job.influence and not job.trials.weights.any()
+    return calibration is not None and calibration.needs_trial_run and alone
 
 
 def used_planes(job: Job, influence: Influence) -> list[str]:

@@ -61,7 +61,7 @@ class FitOptions:
         "Input": "sigma start allow_missing",
         "Method": "method ridge integrator tolerance",
     }
-    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
+    to = (*WITH_REPORT, *EQUATIONS)
 
 
 def choices() -> dict[str, tuple[Method[Any], ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
@@ -33,7 +33,7 @@ class IdentifyOptions:
     """
 
     errors: Errors | None = None
-    to: ClassVar[tuple[str, ...]] = (*WITH_REPORT, *EQUATIONS)
+    to = (*WITH_REPORT, *EQUATIONS)
 
 
 @command

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
 from rotorid.report.options import rotor_of
@@ -33,7 +33,7 @@ class InfluenceOptions:
     planes: Nodes
     sensors: str | Sequence[Sensor]
     speeds: Speeds
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
 
 
 @command

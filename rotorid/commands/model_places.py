@@ -75,12 +75,8 @@ def _quantity(unit: str) -> Quantity:
     """
     from rotorid.files.units import vibration
 
-    kinds: dict[str, Quantity] = {
-        "length": "displacement",
-        "displacement": "displacement",
-        "velocity": "velocity",
-        "acceleration": "acceleration",
-    }
+    kinds: dict[str, Quantity] = {"length": "displacement", "velocity": "velocity"}
+    kinds["acceleration"] = "acceleration"
     kind = vibration(unit).kind if unit else ""
     if kind not in kinds:
         raise ValueError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import SPEEDS, counted, error_figures, listing
@@ -44,7 +44,7 @@ class ModesOptions:
     excitation: Excitation | None = None
     bands: str | Sequence[Band] | None = None
     errors: Errors | None = None
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
 
 
 @command

@@ -95,7 +95,7 @@ class MotionOptions:
         "Method": "rate",
         "Output": "view",
     }
-    to: ClassVar[tuple[str, ...]] = USUAL
+    to = USUAL
 
 
 class Motion(NamedTuple):

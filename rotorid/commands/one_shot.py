@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rotorid.commands.model_places import ModelPlaces
     from rotorid.files import Job
 
+
 def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence:
     """Computed coefficients as those of a job's calibrated rotor: at the angles it found, with its errors.
 

@@ -6,20 +6,20 @@ From Python they are given in SI: kg, m, N, rad/s, kg·m; complex weights count 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, get_args
 
 from rotorid.base.choices import did_you_mean
-from rotorid.base.text import Angles, listing
+from rotorid.base.text import SHORT_ANGLES, Angles, listing
 from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 
 if TYPE_CHECKING:
-    from balancing import Labels
+    from balancing import Labels, Trials
     from rotorid.files import Job
 
 Amount = str | float
@@ -147,7 +147,7 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
     """
     from balancing import Labels
 
-    way: Angles = one_of(angles, "--angles", get_args(Angles))
+    way: Angles = one_of(SHORT_ANGLES.get(angles, angles), "--angles", get_args(Angles))
     if not isinstance(given, str | int | float | complex):
         raise ValueError(f"{what}: a text such as 35g@120 or one complex weight is needed, not {given!r}")
     if not isinstance(given, str):
@@ -169,76 +169,33 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
     return labels, [complex(labels.weight_from(*one)) for one in zip(sizes, turned, strict=True)]
 
 
-def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -> dict[str, Quantity]:
-    """Largest weights by plane: "5g" of every plane that is not left out, "left=5g,right=3g" of these.
-
-    Without a unit in that of the job's weights; numbers in SI.
-
-    Raises
-    ------
-    ValueError
-        Naming the option and what is wrong with it.
-    """
-    unit = job.trials.labels.weight_unit
-
-    def read(value: Amount) -> tuple[float, Unit]:
-        if isinstance(value, str):
-            return read_with_unit(value, what, lambda word: units.weight(word or unit), "5g")
-        return value, _si(unit)
-
-    if isinstance(given, str) and "," in given and "=" not in given:
-        raise ValueError(
-            f"{what} {given!r}: give one value for all planes, or each plane once (a decimal sign is a point)"
-        )
-    example = "5g or left=5g,right=3g; to use no weight at all, leave the plane out"
-    return {} if given is None else _limits(given, what, read, example, "plane", list(job.planes), job.used)
-
-
-def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> dict[str, Quantity]:
-    """Largest amplitudes by sensor: each `SENSOR=VALUE`, or `VALUE` of every sensor.
-
-    In the job's amplitude unit, or with one that converts to it; numbers in SI.
-
-    Raises
-    ------
-    ValueError
-        Naming the option and what is wrong with it.
-    """
-    unit, sensors = units.vibration(job.trials.labels.vibration_unit), job.trials.sensors
-
-    def unit_of(word: str) -> Unit:
-        other = units.vibration(word or unit.name)
-        if other.kind != unit.kind:
-            raise UnitError(
-                f"a unit that converts to that of the readings, {unit.name or 'none'}, not {word}"
-            )
-        return other
-
-    def read(value: Amount) -> tuple[float, Unit]:
-        if isinstance(value, str):
-            return read_with_unit(value, what, unit_of, "20")
-        return value * unit.scale, unit
-
-    several = [given] if isinstance(given, str | Mapping) else given
-    limits: dict[str, Quantity] = {}
-    for one in several:
-        if not isinstance(one, str | Mapping):
-            raise ValueError(f"{what} {given!r}: texts are needed, such as SENSOR=20")
-        names = [one] if isinstance(one, str) else one  # names of sensors may hold commas
-        limits |= _limits(names, what, read, "SENSOR=20", "sensor", sensors, sensors)
-    return limits
-
-
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
-    """The job with these limits in place of its own; holes keep to the largest weight of their plane."""
+    """The job with these limits in place of its own; holes keep to the largest weight of their plane.
+
+    Without a unit they are in that of the job's weights and readings.
+
+    Raises
+    ------
+    ValueError
+        Naming the option and what is wrong with it.
+    """
     import numpy as np
 
     from balancing import Limits
 
-    weights, amplitudes = largest_weights(job, max_mass), largest_amplitudes(job, limits)
+    trials, unit, weights = job.trials, job.trials.labels.weight_unit, dict[str, Quantity]()
+    if isinstance(max_mass, str) and "," in max_mass and "=" not in max_mass:
+        once = "give one value for all planes, or each plane once (a decimal sign is a point)"
+        raise ValueError(f"--max-mass {max_mass!r}: {once}")
+    if max_mass is not None:
+        example = "5g or left=5g,right=3g; to use no weight at all, leave the plane out"
+        planes, used, si = [*job.planes], job.used, _si(unit)
+        weights = _limits(
+            max_mass, "--max-mass", lambda w: units.weight(w or unit), si, example, "plane", planes, used
+        )
+    amplitudes = _amplitudes(trials, limits)
     if not weights and not amplitudes:
         return job
-    trials, unit = job.trials, job.trials.labels.weight_unit
     old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
     most, residual = dict(zip(job.planes, old.max_weight.tolist(), strict=True)), old.residual.copy()
     for plane, weight in weights.items():
@@ -255,16 +212,38 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
     return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)
 
 
+def _amplitudes(trials: Trials, given: Amplitudes) -> dict[str, Quantity]:
+    """Largest amplitudes by sensor: each `SENSOR=VALUE`, or `VALUE` of every sensor."""
+    unit, sensors = units.vibration(trials.labels.vibration_unit), trials.sensors
+    si, limits = Unit("", unit.kind), dict[str, Quantity]()
+
+    def unit_of(word: str) -> Unit:
+        other = units.vibration(word or unit.name)
+        if other.kind != unit.kind:
+            raise UnitError(
+                f"a unit that converts to that of the readings, {unit.name or 'none'}, not {word}"
+            )
+        return other
+
+    for one in [given] if isinstance(given, str | Mapping) else given:
+        if not isinstance(one, str | Mapping):
+            raise ValueError(f"--limit {given!r}: texts are needed, such as SENSOR=20")
+        names = [one] if isinstance(one, str) else one  # names of sensors may hold commas
+        limits |= _limits(names, "--limit", unit_of, si, "SENSOR=20", "sensor", sensors, sensors)
+    return limits
+
+
 def _limits(
     given: Amount | Sequence[str] | Mapping[str, Amount],
     what: str,
-    read: Callable[[Amount], tuple[float, Unit]],
+    unit_of: UnitReader,
+    si: Unit,
     example: str,
     noun: str,
-    existing: Sequence[str],
+    there: Sequence[str],
     every: Sequence[str],
 ) -> dict[str, Quantity]:
-    """Limits above 0 of known planes or sensors, or one of every."""
+    """Limits above 0 of some planes or sensors of those that are there, or one of every; numbers in SI."""
     texts: dict[str, Amount]
     if isinstance(given, int | float):
         texts = dict.fromkeys(every, given)
@@ -272,12 +251,12 @@ def _limits(
         texts = pairs(given, what, lambda _, text: text, example, lambda text: dict.fromkeys(every, text))
     limits = {}
     for name, text in texts.items():
-        if name not in existing:
+        if name not in there:
             raise ValueError(
-                f"{what} {given!r}: there is no {noun} {name!r}{did_you_mean(name, existing)}; there are "
-                f"{listing(map(repr, existing), 'and')}"
+                f"{what} {given!r}: there is no {noun} {name!r}{did_you_mean(name, there)}; there are "
+                f"{listing(map(repr, there), 'and')}"
             )
-        value, unit = read(text)
+        value, unit = read_with_unit(text, what, unit_of, example) if isinstance(text, str) else (text, si)
         limits[name] = Quantity(f"{what} {text!r}", _above_zero(value, text, what, example), unit)
     return limits
 

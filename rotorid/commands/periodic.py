@@ -60,7 +60,7 @@ class PeriodicOptions:
         "Motion": "limit_cycle",
         "Method": "max_seconds",
     }
-    to: ClassVar[tuple[str, ...]] = USUAL
+    to = USUAL
 
 
 def _outcome(motion: PeriodicMotion, labels: Sequence[str], directions: FloatArray) -> Outcome:

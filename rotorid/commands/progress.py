@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Literal
 
 from rotorid.base.logs import progress as log
 
@@ -15,11 +14,6 @@ from rotorid.base.logs import progress as log
 def plain() -> bool:
     """Whether colours, frames and movement are unwanted: NO_COLOR is set, or the terminal is a dumb one."""
     return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM", "").lower() in ("dumb", "unknown")
-
-
-def markup_mode() -> Literal["rich"] | None:
-    """How typer prints help and complaints: with rich, or as plain text without any escape code."""
-    return None if plain() else "rich"
 
 
 @contextmanager

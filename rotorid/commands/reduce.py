@@ -125,8 +125,8 @@ class ReduceOptions:
         "Small model": "response stability damping force keep_supports",
         "Expert": "rows nonnegative supports_apart",
     }
-    to: ClassVar[Sequence[str]] = (*WITH_REPORT, *EQUATIONS)
-    outputs: ClassVar[Sequence[str]] = (".csv", ".xlsx", ".toml", *STATE_SPACE)
+    to = (*WITH_REPORT, *EQUATIONS)
+    outputs = (".csv", ".xlsx", ".toml", *STATE_SPACE)
 
 
 @command

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -50,7 +50,7 @@ class RunUpOptions:
     unit: str | None = None
     acceleration: str | float | None = None
     bands: str | Sequence[Band] | None = None
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
 
 
 @command
@@ -78,13 +78,12 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     from rotorid.identify.modes import constant_vectors, fit_sweep
 
     options = options or RunUpOptions()
-    files: list[Path] = []
+    files: Sequence[Path] = ()
     notes = []
     if isinstance(data, Path | str):
         file = file_of(data, "a table of vectors, or a record")
         recorded = file.suffix.lower() not in TABLES or options.tacho is not None
-        data, read = _of_records(file, options) if recorded else _of_table(file, options)
-        files = [*read]
+        data, files = _read(file, options, recorded)
         if options.phase is None and not recorded:
             notes.append("nobody says whether phases lead or lag: lead is assumed (--phase)")
     if len(data) > 1:
@@ -135,18 +134,13 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     )
 
 
-def _of_table(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
-    """Vectors of each run in a table, and the files that were read."""
-    from rotorid.files.runs import read_vectors
-
-    return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
-
-
-def _of_records(file: Path, options: RunUpOptions) -> tuple[Sequence[Readings], Sequence[Path]]:
-    """The same of a record, or of those of a waveforms file."""
+def _read(file: Path, options: RunUpOptions, recorded: bool) -> tuple[Sequence[Readings], Sequence[Path]]:
+    """Vectors of each run in a table, or of records, and the files that were read."""
     from rotorid.files.runs import read_vectors
     from rotorid.files.waveforms import read_vectors_grid
 
+    if not recorded:
+        return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)
     given = {"tacho": options.tacho, "unit": options.unit, "phase": options.phase}
     grid, phase, read = read_vectors_grid(file, None, given, moving=True)
     return read_vectors(grid, phase), read

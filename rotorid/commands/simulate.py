@@ -87,7 +87,7 @@ class SimulateOptions:
     sigma: Values | float | None = None
     seed: int | None = None
     panels: ClassVar[Mapping[str, str]] = {"As if read": "digits errors sigma seed"}
-    to: ClassVar[Sequence[str]] = ("output", "table", "json")
+    to = ("output", "table", "json")
 
 
 _Simulated = tuple[dict[str, float], "Mapping[str, FloatArray]", str, tuple[str, ...]]

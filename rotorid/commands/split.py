@@ -11,7 +11,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.commands.option_quantities import size, vectors, weight, weights
 from rotorid.commands.quantities import degrees, pairs
 from rotorid.report.options import changed, refuse
-from rotorid.report.outcome import Outcome, command, provenance
+from rotorid.report.outcome import Outcome, command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +65,7 @@ class SplitOptions:
         "Holes": "holes pieces per_hole taken",
         "Instead of holes": "two drill",
     }
-    to: ClassVar[Sequence[str]] = ("plot", "json")
+    to = ("plot", "json")
 
 
 @command
@@ -114,7 +114,6 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
         file=Table("weight", tuple(Column(name, [row[name] for row in rows]) for name in rows[0])),
         keys=keys,
         pictures={"": lambda: _figure(placed, labels, target)},
-        provenance=provenance((), options, vector=vector),
     )
 
 

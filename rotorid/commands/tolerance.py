@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
-from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance
+from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from balancing import Tolerance
@@ -40,7 +39,7 @@ class ToleranceOptions:
     planes: Positions | None = None
     bearings: str | tuple[float, float] | None = None
     centre: Amount | None = None
-    to: ClassVar[Sequence[str]] = WITHOUT_FILE
+    to = WITHOUT_FILE
 
 
 @command
@@ -69,7 +68,7 @@ def tolerance(options: ToleranceOptions) -> Outcome:
 
     result = permissible(options)
     pictures = {"Permissible unbalance.": lambda: on_figure(lambda ax: draw_tolerance(result, ax))}
-    return outcome_of(result, provenance((), options), pictures=pictures, title="Tolerance")
+    return outcome_of(result, pictures=pictures, title="Tolerance")
 
 
 def permissible(options: ToleranceOptions, names: tuple[str, str] = ("--mass", "--speed")) -> Tolerance:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, get_args
 
 from rotorid.base.answer import together
-from rotorid.base.text import Angles, Phase
+from rotorid.base.text import SHORT_ANGLES, Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
@@ -71,7 +71,7 @@ class TrialWeightOptions:
         "Angle": "reading_phase lag sensor_angle",
         "Conventions": "phase angles",
     }
-    to: ClassVar[Sequence[str]] = WITHOUT_FILE
+    to = WITHOUT_FILE
 
 
 @command
@@ -146,9 +146,10 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     if options.speed is None or options.radius is None or load is None:
         raise ValueError("without a job, give --load, --speed and --radius")
     phase_means: Phase = one_of(options.phase or "lead", "--phase", get_args(Phase))
-    counted: Angles = one_of(options.angles or "with rotation", "--angles", get_args(Angles))
-    labels = Labels(weight_unit="g", weight_scale=1e3, phase=phase_means, angles=counted)
-    phase = options.reading_phase
+    way, phase = options.angles or "with rotation", options.reading_phase
+    counted: Angles = one_of(SHORT_ANGLES.get(way, way), "--angles", get_args(Angles))
+    assumed = ("phase",) if options.phase is None and phase is not None else ()
+    labels = Labels(weight_unit="g", weight_scale=1e3, phase=phase_means, angles=counted, assumed=assumed)
     return trial_from_force(
         "1",
         speed_with_unit(options.speed, "--speed"),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.commands.coefficients import computed
 from rotorid.commands.quantities import Nodes, nodes
@@ -31,7 +30,7 @@ class UnbalanceOptions:
     """
 
     stations: Nodes
-    to: ClassVar[Sequence[str]] = WITHOUT_FILE
+    to = WITHOUT_FILE
 
 
 def unbalance_figure(unbalance: Unbalance, rotor: Rotor) -> Figure:

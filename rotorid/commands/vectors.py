@@ -47,7 +47,7 @@ class VectorsOptions:
         "Input": "tacho unit phase",
         "Vectors": "orders speeds",
     }
-    to: ClassVar[Sequence[str]] = USUAL
+    to = USUAL
 
 
 @command

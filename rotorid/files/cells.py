@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.problems import Problems, TableWarning, refusal
 
 MOST_ABOVE = 60
 """Rows among which a header stands that is known by its columns."""
@@ -149,8 +149,8 @@ def is_comment(line: str) -> bool:
     return line.startswith("#") and not SPREADSHEET_ERROR.fullmatch(line)
 
 
-def decode(source: str, data: bytes, problems: Problems) -> str | None:
-    """Text of a file in any encoding that Excel writes, or None and a problem.
+def decode(source: str, data: bytes) -> str:
+    """Text of a file in any encoding that Excel writes; InputError for other files.
 
     An encoding that had to be guessed (cp1251, cp1252) is named in a `TableWarning`.
     """
@@ -169,14 +169,13 @@ def decode(source: str, data: bytes, problems: Problems) -> str | None:
                     warnings.warn(message, TableWarning, stacklevel=2)
                 return text
     expected = next(words for mark, words in _OTHERS.items() if data.startswith(mark))
-    problems.add(expected, source)
-    return None
+    raise refusal(source, expected)
 
 
 def parse_text(
     source: str, text: str, problems: Problems, *, may_be_empty: bool = False, find: Finder | None = None
-) -> Grid | None:
-    """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`.
+) -> Grid:
+    """Rows of cells of a text table; `may_be_empty` as in `make_grid`.
 
     With `find`, what stands above the header that it finds is comment.
     """
@@ -186,14 +185,12 @@ def parse_text(
     if declared:
         del lines[0]
         if declared[1] not in ";,\t":
-            problems.add("sep=; or sep=, or a tab", source, 1, None, f"sep={declared[1]}")
-            return None
+            raise refusal(source, "sep=; or sep=, or a tab", 1, None, f"sep={declared[1]}")
     start, names = header_place(_first_rows(lines), find)
     start = start or len(lines)
     separator = declared[1] if declared else _separator(lines[start - 1])
     if len(lines) + text.count(separator) > MOST_CELLS:
-        problems.add(f"a table of at most {MOST_CELLS:,} cells", source)
-        return None
+        raise refusal(source, f"a table of at most {MOST_CELLS:,} cells")
     rows, complete = list[Row](), True
     for number, line in enumerate(lines, start=1):
         try:
@@ -270,7 +267,7 @@ def make_grid(
     place: tuple[int, tuple[str, ...]] = (0, ()),
     complete: bool = True,
     may_be_empty: bool = False,
-) -> Grid | None:
+) -> Grid:
     """Find the header, drop comments, blank lines and empty trailing columns; complain about the rest.
 
     Parameters
@@ -284,20 +281,20 @@ def make_grid(
     may_be_empty
         Whether a header without rows says something (a weights table: nothing was mounted).
 
-    Returns
-    -------
-    Grid or None
-        None if there is nothing to read; the problems say why.
+    Raises
+    ------
+    InputError
+        If there is nothing to read.
     """
     comments, filled = _without_comments(rows, *place)
     for version in filter(None, map(_VERSION.fullmatch, comments)):
         problems.refuse_newer(source, int(version[1]))
     if len(filled) < (1 if may_be_empty else 2):
-        if complete:
-            expected = "a table with a header row; the file is empty"
-            expected = "rows below the header; there are none" if filled else expected
-            problems.add(expected, source, filled[0][0] if filled else None)
-        return None
+        if not complete:
+            problems.stop()
+        expected = "a table with a header row; the file is empty"
+        expected = "rows below the header; there are none" if filled else expected
+        raise refusal(source, expected, filled[0][0] if filled else None)
     (header_row, names), *body = filled
     header = [*map(show, names)]
     while not header[-1]:

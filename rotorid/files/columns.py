@@ -226,7 +226,7 @@ def read_table(
     InputError
         Where not even the columns are clear.
     """
-    grid = problems.need(read_grid(source, sheet, problems, first=True))
+    grid = read_grid(source, sheet, problems, first=True)
     return problems.need(make_table(grid, columns, problems))
 
 
@@ -239,26 +239,26 @@ def read_grid(
     may_be_empty: bool = False,
     find: Finder | None = None,
     top: bool = False,
-) -> Grid | None:
-    """The cells of a text file or of a sheet: those from the header on that `find` finds, or only the top."""
+) -> Grid:
+    """The cells of a text file or of a sheet: those from the header on that `find` finds, or only the top.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to read; other problems are collected.
+    """
     if isinstance(source, Grid):
         return source
     path = Path(str(source))
     if is_workbook(path):
         from rotorid.files.excel_workbook import pick_sheet, read_workbook
 
-        sheets = read_workbook(path, problems)
-        chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
-        if chosen is None:
-            return None
-        title, rows = chosen
+        title, rows = pick_sheet(path, read_workbook(path, problems), sheet, first=first)
         place = header_place(rows, find)
         name = f"{path} (sheet {title!r})"
         return make_grid(name, rows, "", problems, place=place, may_be_empty=may_be_empty)
-    data = read_bytes(path, problems)
-    text = None if data is None else decode(str(path), data[:TOP] if top else data, problems)
-    if text is None:
-        return None
+    data = read_bytes(path)
+    text = decode(str(path), data[:TOP] if top else data)
     return parse_text(str(path), text, problems, may_be_empty=may_be_empty, find=find)
 
 
@@ -280,7 +280,8 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     stems = misspelt.union(column.stem for column in meant.values() if column is not None)
     missing = [column for column in columns if column.required and column.stem not in stems]
     unknown = [names[k] for k, name in near.items() if name is None]
-    if not _has_columns(grid, columns, stems, missing, unknown, problems):
+    strange = missing or unknown or not stems
+    if strange and not _has_columns(grid, columns, stems, missing, unknown, problems):
         return None
     places: dict[str, tuple[int, Unit, Column]] = {}
     for k, column in meant.items():

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.logs import files as log
-from rotorid.files.problems import STANDARD_INPUT, Problems, refusal
+from rotorid.files.problems import STANDARD_INPUT, refusal
 
 MOST_BYTES = 200_000_000
 SUFFIXES = (".xlsx", ".xlsm")
@@ -98,13 +98,12 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def read_bytes(path: Path, problems: Problems) -> bytes | None:
-    """The content of a file, or None and a problem."""
+def read_bytes(path: Path) -> bytes:
+    """The content of a file; InputError where it cannot be read."""
     try:
         return file_content(path)
     except (OSError, ValueError) as error:
-        problems.add(why_unreadable(path, error), path)
-    return None
+        raise refusal(path, why_unreadable(path, error)) from error
 
 
 def is_workbook(path: Path) -> bool:

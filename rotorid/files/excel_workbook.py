@@ -26,21 +26,18 @@ _REFUSED = {
 """What is expected instead of a cell of these types of openpyxl."""
 
 
-def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None:
-    """All sheets of a workbook as rows of cells, or None and a problem.
+def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]]:
+    """All sheets of a workbook as rows of cells; InputError where it is none.
 
     Formulas count with the values that the spreadsheet program stored.
     """
-    data = read_bytes(path, problems)
     try:
-        return None if data is None else _sheets(path, data, problems)
-    except InputError as error:
-        problems.extend(error.problems)
+        return _sheets(path, read_bytes(path), problems)
+    except InputError:
+        raise
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        expected = f"an intact Excel workbook (reading it failed: {reason})"
-        problems.add(expected, path)
-    return None
+        raise refusal(path, f"an intact Excel workbook (reading it failed: {reason})") from None
 
 
 def _sheets(path: Path, data: bytes, problems: Problems) -> dict[str, list[Row]]:
@@ -109,12 +106,11 @@ def _cell(cell: Any) -> Cell:  # noqa: ANN401
 
 
 def pick_sheet(
-    path: Path, sheets: dict[str, list[Row]], name: str, problems: Problems, *, first: bool = False
-) -> tuple[str, list[Row]] | None:
+    path: Path, sheets: dict[str, list[Row]], name: str, *, first: bool = False
+) -> tuple[str, list[Row]]:
     """The sheet of this name, else the only one that holds something (or, with `first`, the first)."""
     there = [title for title in sheets if title.strip().casefold() == name][:1]
     there = there or [title for title, rows in sheets.items() if rows] or list(sheets)
     if there and (first or len(there) == 1):
         return there[0], sheets[there[0]]
-    problems.add(f"a sheet {name!r}; the sheets are {', '.join(sheets)}", path)
-    return None
+    raise refusal(path, f"a sheet {name!r}; the sheets are {', '.join(sheets)}")

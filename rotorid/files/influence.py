@@ -22,9 +22,9 @@ from rotorid.base.json import SCHEMA_VERSION, plain
 from rotorid.base.text import Angles, Phase
 from rotorid.files import units
 from rotorid.files.cells import Grid
+from rotorid.files.check_and_slow_roll import outside
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.disk import read_bytes, write_files
-from rotorid.files.further_runs import outside
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems, refusal
@@ -108,30 +108,26 @@ def read_influence(
     InputError
         With all problems of the file.
     """
-    problems = Problems()
-    influence, _ = problems.need(load_influence(Path(path), phase, angles, problems))
-    problems.stop()
-    return influence
+    return load_influence(Path(path), phase, angles)[0]
 
 
 def load_influence(
-    source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
-) -> tuple[Influence, dict[str, Any]] | None:
+    source: Source, phase: Phase | None, angles: Angles | None
+) -> tuple[Influence, dict[str, Any]]:
     """As `read_influence`, from a file or from the cells of a sheet, and the conventions that it states."""
     if isinstance(source, Path) and source.suffix.lower() == ".json":
-        influence = _from_json(source, problems)
-        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in _STATED} if influence else {}
+        influence = _from_json(source)
+        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in _STATED}
     else:
-        before, grid = len(problems), read_grid(source, "influence", problems)
-        table = None if grid is None else make_table(_tidied(grid), COLUMNS, problems)
-        if table is None or table.unit("influence") == UNCLEAR:
-            return None
+        problems = Problems()
+        grid = read_grid(source, "influence", problems)
+        table = problems.need(make_table(_tidied(grid), COLUMNS, problems))
+        if table.unit("influence") == UNCLEAR:
+            problems.stop()
         text = "\n".join((table.fields["phase"].name, *reversed(table.grid.comments)))
         stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
         usual = {"phase": phase or "lead", "angles": angles or "with rotation"}
-        influence = _from_table(table, Labels(**{**usual, **stated}), before)
-    if influence is None:
-        return None
+        influence = _from_table(table, Labels(**{**usual, **stated}))
     its = influence.labels
     labels = replace(its, phase=phase or its.phase, angles=angles or its.angles)
     return replace(influence, labels=labels), stated
@@ -163,8 +159,8 @@ def _tidied(grid: Grid) -> Grid:
     return replace(grid, header=tuple(header), rows=rows)
 
 
-def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
-    """The coefficients with these conventions, or None and more problems than `before`."""
+def _from_table(table: Table, labels: Labels) -> Influence:
+    """The coefficients with these conventions; InputError with all problems of the table."""
     size, angle, std = table.numbers("influence"), table.numbers("phase"), "std" in table
     unit = table.unit("influence")
     vibration, weight, reciprocal = _units(unit.name)
@@ -179,16 +175,14 @@ def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     elif std and table.unit("std") != unit:
         table.in_header("std", f"the unit of the coefficients, std_{unit.name}")
     table.once("plane", keys, "one coefficient per speed, sensor and plane (row {} has the same)")
-    if not keys or len(table.problems) > before:
-        return None
+    table.problems.stop()
     speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*keys, strict=True))
     speeds.sort()
     row = {key: k for k, key in enumerate(keys)}
     for place in islice((key for key in product(speeds, sensors, planes) if key not in row), MOST_LINES):
         words = f"sensor {place[1]!r} and plane {place[2]!r} at {show_speed(place[0], table.unit('speed'))}"
         table.as_whole("plane", f"a coefficient of {words}")
-    if len(table.problems) > before:
-        return None
+    table.problems.stop()
     S, C, P = len(speeds), len(sensors), len(planes)
     at = np.reshape([row[key] for key in product(speeds, sensors, planes)], (S, C, P))
     values = 1.0 / labels.weight_from(size, angle) if reciprocal else labels.vibration_from(size, angle)
@@ -209,18 +203,17 @@ def _from_table(table: Table, labels: Labels, before: int) -> Influence | None:
     return Influence(np.array(speeds), tuple(sensors), tuple(planes), values[at], nothing, errors, labels)
 
 
-def _from_json(path: Path, problems: Problems) -> Influence | None:
-    """The coefficients of `_document`, or None and a problem."""
-    data = read_bytes(path, problems)
-    if data is None:
-        return None
+def _from_json(path: Path) -> Influence:
+    """The coefficients of `_document`; InputError for anything else."""
+    data, problems = read_bytes(path), Problems()
     try:
         whole = json.loads(data)
         problems.refuse_newer(str(path), whole["schema_version"])
-        return _of_document(whole["influence"])
+        influence = _of_document(whole["influence"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         problems.add(f"coefficients as rotorid balance writes them (missing or wrong: {error})", path)
-    return None
+    problems.stop()
+    return influence
 
 
 def _of_document(stored: Mapping[str, Any]) -> Influence:

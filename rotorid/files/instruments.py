@@ -23,7 +23,7 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files.cells import decode
 from rotorid.files.disk import file_content, first_bytes, why_unreadable
-from rotorid.files.problems import InputError, Problems, printable, refusal
+from rotorid.files.problems import InputError, printable, refusal
 from rotorid.files.units import FORCE, TIME, VIBRATION, Unit, spelt
 
 DERIVATIVE = {"length": 0, "velocity": 1, "acceleration": 2}
@@ -138,8 +138,7 @@ def _read_text(path: Path) -> Sampled:
     """A column a channel; a preamble may stand above the header, a row of units below it."""
     import pandas as pd
 
-    problems = Problems()
-    text = re.sub(r"\r\n?", "\n", problems.need(decode(str(path), file_content(path), problems)))
+    text = re.sub(r"\r\n?", "\n", decode(str(path), file_content(path)))
     lines = text.split("\n", HEAD)[:HEAD]
     separator = max("\t;,", key=lambda sign: sum(sign in line for line in lines[len(lines) // 2 :]))
     rows = [[*map(str.strip, next(csv.reader([line], delimiter=separator), ()))] for line in lines]

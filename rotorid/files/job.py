@@ -26,7 +26,7 @@ from rotorid.files.job_models import (
 )
 from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
 from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
-from rotorid.files.problems import Problems
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.runs import make_trials
 from rotorid.files.settings import read_toml
 
@@ -205,7 +205,10 @@ def job_from_files(
         )
     tables: dict[str, Source] = dict(zip(("runs", "weights"), map(Path, files), strict=False))
     if influence is not None:
-        tables["influence"] = Path(influence)
+        tables["influence"], first = Path(influence), Path(files[0])
+        if first.suffix.lower() == ".toml" and "runs" in read_toml(first):
+            expected = f'influence = "{influence}" in the job; --influence goes with a runs table'
+            raise refusal(first, expected, column="influence")
     return job_of(WrittenJob(None, tables=tables), Problems(), **stated)
 
 
@@ -218,7 +221,7 @@ def open_job(path: Path, problems: Problems) -> WrittenJob:
         If there is nothing of a job in it.
     """
     if path.suffix.lower() == ".toml":
-        return WrittenJob(path, problems.need(read_toml(path, problems)))
+        return WrittenJob(path, read_toml(path))
     from rotorid.files.job_excel import job_in_sheets
 
     return job_in_sheets(path, problems)
@@ -247,7 +250,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     holes = make_holes(planes, trials.labels, limits, problems)
     check, mounted = None, tables.get("check_weights")
     if "check" in tables:
-        from rotorid.files.further_runs import check_runs
+        from rotorid.files.check_and_slow_roll import check_runs
 
         sources = tables["check"], mounted
         check = check_runs(sources, trials, [*planes], conventions, settings.errors, slow_roll, problems)
@@ -330,7 +333,10 @@ def _readings(
         from rotorid.files.influence import fit_to_readings, load_influence
 
         resolved = None if angles is None else resolve_angles(angles, settings.rotation)
-        influence, stated = load_influence(source, phase, resolved, problems) or (None, stated)
+        try:
+            influence, stated = load_influence(source, phase, resolved)
+        except InputError as error:
+            problems.extend(error.problems)
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     if source is not None and influence is not None and trials is not None:
@@ -357,7 +363,7 @@ def _readings(
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors, slow_roll = tables.get("slow_roll", settings.slow_roll), None
     if vectors is not None:
-        from rotorid.files.further_runs import make_slow_roll, subtract_slow_roll
+        from rotorid.files.check_and_slow_roll import make_slow_roll, subtract_slow_roll
 
         if (made := make_slow_roll(vectors, trials, conventions, problems)) is not None:
             slow_roll, further = made

@@ -20,7 +20,7 @@ from rotorid.files.disk import is_workbook, read_bytes
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.headings import find_header
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
-from rotorid.files.problems import Problems, refusal
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.settings import Place
 
 NAMED = {"planes": "plane", "sensors": "sensor"}
@@ -28,8 +28,6 @@ NAMED = {"planes": "plane", "sensors": "sensor"}
 RESULTS = "results"
 """Sheets whose names begin so hold what a command has computed: they are not read."""
 SHEETS = (*TABLES, *NAMED, "settings", RESULTS)
-TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
-"""Columns of names, in which `1` is text."""
 
 
 def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
@@ -37,7 +35,7 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
     if not is_workbook(path):
         expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
         raise refusal(path, expected)
-    sheets = problems.need(read_workbook(path, problems))
+    sheets = read_workbook(path, problems)
     job = WrittenJob(path)
     titles = {title.strip().casefold(): title for title in reversed([*sheets]) if sheets[title]}
     for name, title in titles.items() if titles.keys() & {*SHEETS} else ():
@@ -56,10 +54,14 @@ def job_in_sheets(path: Path, problems: Problems) -> WrittenJob:
         )
         may_be_empty = name in WEIGHT_TABLES or name not in TABLES
         source, place = f"{path} (sheet {titles[name]!r})", header_place(rows, find)
-        grid = make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
-        if grid is not None and name in TABLES:
+        try:
+            grid = make_grid(source, rows, "", problems, place=place, may_be_empty=may_be_empty)
+        except InputError as error:
+            problems.extend(error.problems)
+            continue
+        if name in TABLES:
             job.tables[name] = grid
-        elif grid is not None:
+        else:
             _read_rows(grid, name, job, problems)
     if "runs" not in titles:
         shown = listing((repr(title) for title in sheets), "and")
@@ -177,11 +179,9 @@ def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
     """The workbook of a job without its results, with what openpyxl would change: comments, last digits."""
     import openpyxl
 
-    problems = Problems()
-    data = problems.need(read_bytes(path, problems))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about parts that are not kept
-        book = openpyxl.load_workbook(io.BytesIO(data))
+        book = openpyxl.load_workbook(io.BytesIO(read_bytes(path)))
     for sheet in book.worksheets:
         if sheet.title.strip().casefold().startswith(RESULTS):
             book.remove(sheet)

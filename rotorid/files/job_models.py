@@ -16,7 +16,7 @@ from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.columns import Source
 from rotorid.files.layout import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
-from rotorid.files.problems import Problems, refusal
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.settings import (
     Count,
     Date,
@@ -366,9 +366,10 @@ class JobSettings(Settings):
         "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
     )
-    angles: Literal[Angles, Rotation] | None = optional(
-        "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
-        "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
+    angles: Literal[Angles, Rotation, "with", "against"] | None = optional(
+        "how angles on the rotor count: with (rotation), against (rotation), or clockwise or "
+        "counter-clockwise with `rotation`; unstated: with rotation, named so where an angle other than "
+        "0° and 180° is written",
     )
     rotation: Rotation | None = optional("how the rotor turns, seen from the same end as the angles")
     view: View | None = optional("the end from which that is seen")
@@ -432,7 +433,10 @@ class WrittenJob:
         source = "" if self.path is None else str(self.path)
         if not self.tables and "runs" not in self.settings:
             raise refusal(source, 'a job, which names the runs table, runs = "runs.csv"', column="runs")
-        settings = problems.need(read_settings(JobSettings, self.settings, source, problems, self.where))
+        try:
+            settings = read_settings(JobSettings, self.settings, source, self.where)
+        except InputError as error:
+            raise InputError([*problems, *error.problems]) from None
         for name in filter(settings.has, self.tables):
             settings.complain(problems, name, f"the table in the sheet {name!r} of this workbook, not a file")
         return settings

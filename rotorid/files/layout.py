@@ -12,13 +12,14 @@ import re
 import warnings
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from balancing import Labels
-from rotorid.base.text import Angles, Phase, Rotation, listing
+from rotorid.base.text import SHORT_ANGLES, Angles, Phase, Rotation, listing
 from rotorid.files.cells import Cell, Grid, Row, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.headings import (
@@ -78,6 +79,8 @@ class Conventions:
         Planes in which material is taken away.
     rms
         Whether the job has limits in rms, so that mm/s alone are rms.
+    run
+        Name of the only run, for tables without a column of runs; empty: they need one.
 
     Raises
     ------
@@ -93,6 +96,7 @@ class Conventions:
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()
     rms: bool = False
+    run: str = ""
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
@@ -103,7 +107,7 @@ class Conventions:
 
 
 def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
-    """With or against the rotation, of clockwise too; `rotation` is seen from the same end.
+    """With or against the rotation, of clockwise and short forms too; `rotation` is seen from the same end.
 
     Raises
     ------
@@ -111,7 +115,7 @@ def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401
         For clockwise or counter-clockwise without a rotation.
     """
     if stated not in ROTATIONS:
-        angles: Angles = stated
+        angles: Angles = SHORT_ANGLES.get(stated, stated)
         return angles
     if rotation is None:
         raise ValueError(
@@ -161,10 +165,11 @@ def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
     directions = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
-        with warnings.catch_warnings():
+        header: Sequence[str] = ()
+        with warnings.catch_warnings(), suppress(InputError):
             warnings.simplefilter("ignore")  # of a file that is read once more
-            grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
-        for heading in read_headings(grid.header) if grid else ():
+            header = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True).header
+        for heading in read_headings(header):
             if heading.stem == "phase" and readable("phase", heading.unit):
                 directions.add(read_unit("phase", heading.unit)[1])
     return next((phase for phase in PHASES if directions - {""} == {phase}), None)
@@ -190,11 +195,10 @@ def read_runs_grids(
     files = source if isinstance(source, tuple) else files_of_runs(source)
     grids = list[Grid]()
     for file in files or (source,):
-        grid = read_grid(file, "runs", problems, first=first, find=find_header)
         run = file.stem if isinstance(file, Path) and files else ""
         try:
-            if grid is not None:
-                grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
+            grid = read_grid(file, "runs", problems, first=first, find=find_header)
+            grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
         except InputError as error:
             problems.extend(error.problems)
     return grids if len(grids) == len(files or (source,)) else None
@@ -245,7 +249,7 @@ def long_rows(
     columns = [column for h in headings for column in _columns(grid, h, headings, pair, conventions)]
     sensors = _by_name(grid, columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
-    stems, n = {column.stem for column in common}, len(grid.rows)
+    stems, n, run = {column.stem for column in common}, len(grid.rows), run or conventions.run
     if run and "run" not in stems:
         common.insert(0, _Column(Heading(0, "run"), "run", "", [run] * n))
     if key == "sensor" and "speed" not in stems and conventions.speed is not None:

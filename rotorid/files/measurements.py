@@ -150,7 +150,7 @@ def measurement_columns(data: Experiments, signals: Sequence[str]) -> dict[str, 
 
 def _grid(path: str | Path) -> tuple[Grid, Problems]:
     problems = Problems()
-    return problems.need(read_grid(path, "measurements", problems, first=True)), problems
+    return read_grid(path, "measurements", problems, first=True), problems
 
 
 def _unread(model: HarmonicModel) -> dict[str, Any]:
@@ -335,7 +335,7 @@ def read_record(
     for names, required in ((model.outputs, needed), (deviations.values(), False)):
         more = [name for name in names if name not in model.inputs]
         columns += [Column(name, ratio, (), required, blank=True) for name in more]
-    grid = problems.need(read_grid(path, "record", problems, first=True))
+    grid = read_grid(path, "record", problems, first=True)
     if allow_missing:
         rows = ((n, ("" if show(c).casefold() in MISSING else c for c in cells)) for n, cells in grid.rows)
         grid = replace(grid, rows=tuple((number, tuple(cells)) for number, cells in rows))

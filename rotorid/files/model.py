@@ -351,8 +351,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
 
 def _read(path: Path) -> ModelFile:
     """What stands in a model file, or of a small model its linear equations; raises its problems."""
-    problems = Problems()
-    data = problems.need(read_toml(path, problems))
+    problems, data = Problems(), read_toml(path)
     if is_small(data):
         data = small_equations(path)
     for name, value in data.items():
@@ -360,7 +359,7 @@ def _read(path: Path) -> ModelFile:
             expected = f"at most {MOST_NAMES:,} names; these are {len(value):,}"
             problems.add(expected, path, None, name)
     problems.stop()
-    return problems.need(read_settings(ModelFile, data, str(path), problems))
+    return read_settings(ModelFile, data, str(path))
 
 
 def _of_amplitudes(file: ModelFile) -> tuple[list[str], list[str]]:

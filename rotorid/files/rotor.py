@@ -241,11 +241,11 @@ def read_rotor(path: str | Path) -> Rotor:
     path, problems = Path(path), Problems()
     data: Mapping[str, Any] = {"shaft": "the table itself"}
     if is_file := path.suffix.lower() == ".toml":
-        data = problems.need(read_toml(path, problems))
+        data = read_toml(path)
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             raise refusal(path, expected, column="shaft")
-    file = problems.need(read_settings(RotorFile, data, str(path), problems))
+    file = read_settings(RotorFile, data, str(path))
     shaft, stations = path.parent / file.shaft if is_file else path, dict[str, int]()
     parts = _shaft(shaft, file.material)
     at = places(range(1, len(parts["length"]) + 2), stations)

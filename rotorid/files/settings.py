@@ -40,7 +40,7 @@ from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.disk import read_bytes
-from rotorid.files.problems import Problem, Problems
+from rotorid.files.problems import InputError, Problem, Problems, refusal
 from rotorid.files.units import Quantity, Unit
 
 MOST_BYTES = 2_000_000
@@ -326,10 +326,9 @@ def read_settings(
     model: type[_Model],
     data: Mapping[str, Any],
     source: str,
-    problems: Problems,
     where: Mapping[str, Place] | None = None,
-) -> _Model | None:
-    """Settings as a model; all that is wrong with them is noted.
+) -> _Model:
+    """Settings as a model.
 
     Parameters
     ----------
@@ -339,21 +338,19 @@ def read_settings(
         As `tomllib` gives it, or from the cells of a sheet.
     source
         The file, for messages.
-    problems
-        Collects them.
     where
         Sheet, row and column of each setting of a workbook, by its dotted name.
 
-    Returns
-    -------
-    The model, or None where there are problems.
+    Raises
+    ------
+    InputError
+        With all that is wrong with them.
     """
     tables = dict(data)
     try:
         return model.model_validate(tables, context=(source, where or {}, dict(_names(tables))))
     except ValidationError as error:
-        problems.extend(error.errors(include_url=False)[0]["ctx"]["error"].args)
-    return None
+        raise InputError(error.errors(include_url=False)[0]["ctx"]["error"].args) from None
 
 
 def _plain(value: object) -> object:
@@ -441,11 +438,9 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
     return {"$schema": DRAFT, **schema, "title": title}
 
 
-def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
-    """The content of a TOML file without its `schema_version`, or None and a problem."""
-    data = read_bytes(path, problems)
-    if data is None:
-        return None
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a TOML file without its `schema_version`; InputError where it is none."""
+    data, problems = read_bytes(path), Problems()
     try:
         if len(data) > MOST_BYTES:
             raise ValueError(f"at most {MOST_BYTES // 10**6} MB")
@@ -457,13 +452,12 @@ def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
         # A lone carriage return ends a line for no reader of TOML.
         settings = tomllib.loads(text.replace("\r\n", "\n"))
     except UnicodeDecodeError:
-        problems.add("a text file in UTF-8, as TOML demands", path)
+        raise refusal(path, "a text file in UTF-8, as TOML demands") from None
     except (ValueError, RecursionError) as error:
-        problems.add(f"a TOML file: {error}", path)
-    else:
-        problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
-        return settings
-    return None
+        raise refusal(path, f"a TOML file: {error}") from None
+    problems.refuse_newer(str(path), settings.pop("schema_version", SCHEMA_VERSION))
+    problems.stop()
+    return settings
 
 
 def toml_bytes(data: Mapping[str, Any], comments: Iterable[str] = ()) -> bytes:

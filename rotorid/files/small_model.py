@@ -27,7 +27,7 @@ from rotorid.files.attached import (
     support_tables,
     whole,
 )
-from rotorid.files.problems import Problems, TableWarning, refusal
+from rotorid.files.problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
@@ -100,7 +100,9 @@ def is_small(data: Mapping[str, Any]) -> bool:
 
 def is_small_model(path: Path) -> bool:
     """Whether a file is a small model."""
-    return path.suffix.lower() == ".toml" and is_small(read_toml(path, Problems()) or {})
+    with suppress(InputError):
+        return path.suffix.lower() == ".toml" and is_small(read_toml(path))
+    return False
 
 
 def read_small_model(path: str | Path) -> SmallModel:
@@ -122,9 +124,7 @@ def read_small_model(path: str | Path) -> SmallModel:
 def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     """A small model and its `[equations]`."""
     problems = Problems()
-    data = problems.need(read_toml(path, problems))
-    file = problems.need(read_settings(SmallModelFile, data, str(path), problems))
-    problems.stop()
+    file = read_settings(SmallModelFile, read_toml(path), str(path))
     at = places(file.nodes, {})
 
     def vector(item: UnbalanceKeys) -> tuple[int, complex]:

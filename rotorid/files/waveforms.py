@@ -165,15 +165,15 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     source, folder = str(settings or "the options"), (settings or Path()).parent
     data: dict[str, Any] = {"records": {path.stem: str(path) for path in paths}}
     if settings is not None:
-        data = dict(problems.need(read_toml(settings, problems)))
+        data = read_toml(settings)
     if len(paths) > (1 if settings else len(data["records"])):
         words = "records of different names, which are those of the runs; or one waveforms file alone"
         problems.add(words, source)
     options = {key: value for key, value in (stated or {}).items() if value is not None}
     if "speeds_rad_s" in options:
         data = {key: value for key, value in data.items() if not key.startswith("speeds_")}
-    file = problems.need(read_settings(WaveformsFile, data | options, source, problems))
     problems.stop()
+    file = read_settings(WaveformsFile, data | options, source)
     records, amplitude = list[WaveformRecord](), file.amplitude
     for run, name in file.records.items():
         try:

@@ -66,12 +66,12 @@ def read_weights(
         Collects the complaints.
     """
     find, before = partial(find_header, weights=True), len(problems)
-    grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
     try:
-        grid = None if grid is None else _one_weight_a_row(grid, conventions)
+        grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
+        grid = _one_weight_a_row(grid, conventions)
     except InputError as error:
         problems.extend(error.problems)
-    if grid is None or len(problems) > before:
+    if len(problems) > before:
         return None
     there = {name.partition("_")[0] for name in grid.header}
     columns = (

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, figures
@@ -27,8 +26,8 @@ _NO_REASON = "nothing that was tried makes it fit"
 class FleetFitOptions:
     """Options of `fleet fit`: where the result goes."""
 
-    to: ClassVar[Sequence[str]] = ("output", "table", "json")
-    outputs: ClassVar[Sequence[str]] = (".parquet", ".csv", ".xlsx")
+    to = ("output", "table", "json")
+    outputs = (".parquet", ".csv", ".xlsx")
 
 
 @command

@@ -22,7 +22,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
 from rotorid.files import InputError, read_job
 from rotorid.files.disk import each_file_once
-from rotorid.files.problems import Problem, Problems, printable
+from rotorid.files.problems import Problem, printable
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 
@@ -80,8 +80,7 @@ def _read_job(file: Path, path: str, machine_type: str) -> list[pd.DataFrame]:
     import pandas as pd
 
     with each_file_once(), warnings.catch_warnings(action="ignore"):
-        problems = Problems()
-        if not {"runs", "weights"}.intersection(problems.need(read_toml(file, problems))):
+        if not {"runs", "weights"}.intersection(read_toml(file)):
             return []
         job = read_job(file)
         measured = estimate_influence(job.trials)

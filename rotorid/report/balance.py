@@ -84,7 +84,7 @@ def balance_report(
         "balance.html",
         document,
         title=f"Balancing sheet: {', '.join(filter(None, names))}",
-        warnings=list(map(sentence, answer.warnings)),
+        warnings=list(map(sentence, (*answer.warnings, *answer.notes))),
         provenance=provenance,
         judgement=answer.judgement.splitlines(),
         head={key: getattr(head, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD},
@@ -129,12 +129,14 @@ def to_do(
         done = (_done(len(table.columns[0].values)),) if boxes else ()
         return html(replace(table, columns=(*table.columns, *done)))
 
+    free = replace(_weights(document, result, job), name="In place of these weights at any angle")
     left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
     part = "mounting" if left is None else "left_to_do"
     pieces = not plain and document[part]["holes"]
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
+        "free": html(free) if boxes and left is None and not plain else "",
         "trim": "" if left is None else shown(_trim(document, result.labels)),
         "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
         "stays": _if_run_stays(result) if plain else "",

@@ -74,7 +74,7 @@ class Outcome(Answered):
     """
 
     result: Any
-    sentences: tuple[str, ...]
+    sentences: tuple[str, ...] = ()
     keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
     provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()

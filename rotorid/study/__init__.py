@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class StudyOptions:
     scheduler: str | None = None
     results: Path | str | None = None
     panels: ClassVar[Mapping[str, str]] = {"Work": "workers scheduler results"}
-    to: ClassVar[Sequence[str]] = ("output", "table", "json")
+    to = ("output", "table", "json")
 
 
 @command

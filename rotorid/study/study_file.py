@@ -168,8 +168,7 @@ def read_study(path: str | Path) -> Study:
         With all problems of the study file, or of the rotor.
     """
     path, problems = Path(path), Problems()
-    data = problems.need(read_toml(path, problems))
-    keys = problems.need(read_settings(StudyKeys, data, str(path), problems))
+    keys = read_settings(StudyKeys, read_toml(path), str(path))
     file = path.parent / keys.rotor
     rotor = read_rotor(file)
 

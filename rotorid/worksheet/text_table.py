@@ -134,14 +134,14 @@ def content(column: str) -> str:
 
 def read_table(path: Path, key: str, data: bytes) -> Table:
     """The table that the job names by `key`; one of another form is read only."""
-    problems = Problems()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a guessed encoding; the calculation says so
-        text = decode(path.name, data, problems) or ""
     find = find_header if key in READINGS else None
-    grid = None if len(problems) else parse_text(path.name, text, problems, may_be_empty=True, find=find)
-    if grid is None:
-        return Table(path, read_only=str(InputError(problems)))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a guessed encoding; the calculation says so
+            text = decode(path.name, data)
+        grid = parse_text(path.name, text, Problems(), may_be_empty=True, find=find)
+    except InputError as error:
+        return Table(path, read_only=str(error))
     table, texts = shown(path, key, grid), re.split(r"\r\n|\n|\r", text)
     rows = {grid.header_row: Line(id="header")} | {line.number: line for line in table.lines}
     first = 0 if SEP_LINE.fullmatch(texts[0].strip(" \ufeff")) else 1

@@ -32,7 +32,8 @@ def test_a_terminal_shows_numbers_to_the_right_as_a_reader_sees_them():
     ]
 
 
-def test_csv_keeps_all_digits_and_no_cell_is_a_formula():
+def test_csv_keeps_the_digits_of_numbers_and_no_cell_is_a_formula():
+    assert csv(Table("", (Column("mass", [20.000000000000004]),))) == b"mass\n20.0\n"
     lines = csv(SPEEDS).decode().splitlines()
     assert lines[1:] == [
         "# without damping",

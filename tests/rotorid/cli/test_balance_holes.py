@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pandas as pd
 import pytest
 
@@ -55,3 +57,23 @@ def test_the_table_says_where_to_take_material_away(cli, tmp_path):
         turn = (line["angle_deg"] - line["equivalent_added_deg"]) % 360
         assert turn == pytest.approx(180.0 if row["action"] == "remove" else 0.0)
         assert line["equivalent_added_deg"] == pytest.approx(row["angle_deg"])
+
+
+@pytest.mark.parametrize("remove", [False, True])
+def test_a_split_says_how_sure_it_is_and_which_hole_is_the_first(cli, tmp_path, remove):
+    holes = f"holes = 12\navailable_g_mm = [150]\nremove = {str(remove).lower()}\n"
+    job = job_with(tmp_path, "".join(f"[planes.{p}]\n{holes}" for p in ("left", "middle", "right")))
+    sheet, table = tmp_path / "s.html", tmp_path / "pieces.csv"
+    outcome = cli("balance", job, "--split", "--angles", "against", "--report", sheet, "--output", table)
+    words, page = " ".join(outcome.out.split()), sheet.read_text("utf-8")
+    places = {False: 191.1, True: 11.1}  # 168.9° counted against the rotation, and opposite
+    for text in (
+        "Angles from the mark against the rotation: holes 1 at 0°, 2 at 30°.",
+        f"Weights at any angle: left 423.0 ± 32 at {places[remove]}° ± 5.8°, middle",
+    ):
+        assert text in words
+    most = float(re.search(r"rms 28.4 → (\S+) µm pp; a check run stays below (\S+) in 95 of 100", words)[2])
+    assert 1.0 < most / cli("balance", job, "--split", "--json").json["mounting"]["rms_after"] < 1.3
+    assert "In place of these weights at any angle" in page
+    assert re.search("<li>Errors between runs.*</li>", page)
+    assert set(pd.read_csv(table)["mass"]) <= {150.0, 300.0}

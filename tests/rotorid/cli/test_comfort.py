@@ -13,14 +13,13 @@ COLOURS = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "TERM", "CO
 def test_plain_terminals(monkeypatch):
     for name in COLOURS:
         monkeypatch.delenv(name, raising=False)
-    assert progress.markup_mode() == "rich"
     monkeypatch.setenv("NO_COLOR", "")  # as no-color.org has it: empty does not count
     assert not progress.plain()
     monkeypatch.setenv("NO_COLOR", "0")
     assert progress.plain()
     monkeypatch.delenv("NO_COLOR")
     monkeypatch.setenv("TERM", "dumb")
-    assert progress.markup_mode() is None
+    assert progress.plain()
 
 
 def test_a_terminal_gets_a_status_and_a_dumb_one_or_a_log_nothing(monkeypatch, capsys):

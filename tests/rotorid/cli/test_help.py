@@ -52,7 +52,7 @@ def test_every_option_has_a_panel_and_the_first_two_are_short(name):
 @pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain):
     monkeypatch.setenv("COLUMNS", str(COLUMNS))
-    monkeypatch.setattr(rotorid.cli, "markup_mode", lambda: None if plain else "rich")
+    monkeypatch.setattr(rotorid.cli, "plain", lambda: plain)
     text = cli(*name.split(), "--help").out
     assert max(map(len, text.splitlines())) <= COLUMNS
     if name:

@@ -58,13 +58,20 @@ def test_angle_from_phase_and_lag(weights):
     assert found["angle_reach_deg"] == pytest.approx(45)
     # the same shaft and sensor, all written the other way
     (other,) = weights(
-        *FORCE, "--reading-phase", "240", "--lag", "45", "--phase", "lag", "--angles", "against rotation"
+        *FORCE, "--reading-phase", "240", "--lag", "45", "--phase", "lag", "--angles", "against"
     )
     assert other["angle_deg"] == pytest.approx(15)
     (placed,) = weights(*FORCE, *ANGLE, "--sensor-angle", "30")
     assert placed["angle_deg"] == pytest.approx(15)
     (at,) = weights(*FORCE, "--reading-phase", "120", "--lag", "at")
     assert at["angle_deg"] == pytest.approx(30)
+
+
+def test_lead_is_not_assumed_without_a_word(cli):
+    words = "lead is assumed"
+    assert words in cli("trial-weight", *FORCE, *ANGLE).out
+    assert words not in cli("trial-weight", *FORCE, *ANGLE, "--phase", "lead").out
+    assert words not in cli("trial-weight", *FORCE).out
 
 
 def test_angle_and_expected_change_from_a_job(weights):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cases import each_of
-from tables_data import complaints, the_only
 
 CLOCKWISE = 'rotation = "clockwise"\nview = "drive end"\n'
 
@@ -22,21 +20,8 @@ def test_another_word_instead_of_that_of_the_job(job):
     assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "against rotation")
     read = job(CLOCKWISE, angles="counter-clockwise")
     assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "counter-clockwise")
+    read = job('angles = "against"\n')
+    assert (read.conventions.labels.angles, read.trials.labels.assumed) == ("against rotation", ("phase",))
+    assert job("", angles="with").conventions.labels.angles == "with rotation"
     with pytest.raises(ValueError, match="angles that count clockwise need the direction of rotation"):
         job("", angles="clockwise")
-
-
-BAD = [
-    ('angles = "clockwise"\n', "rotation", None, "how the rotor turns"),
-    ('view = "free end"\n', "rotation", None, "how the rotor turns"),
-    ('angles = "clockwize"\n' + CLOCKWISE, "angles", "clockwize", "did you mean 'clockwise'?"),
-    ('rotation = "with"\n', "rotation", "with", "'clockwise' or 'counter-clockwise'"),
-    ('rotation = "clockwise"\nview = "left"\n', "view", "left", "'drive end' or 'free end'"),
-    ("key_phasor = { angle_deg = 'x' }\n", "key_phasor.angle_deg", "x", "a number"),
-    ("key_phasor = { angle_deg = 3, speed = 2 }\n", "key_phasor.speed", "2", "a known key"),
-]
-
-
-@each_of("text, key, value, words", BAD)
-def test_what_cannot_be_understood(job, text, key, value, words):
-    the_only(complaints(job, text), "job.toml", None, key, value, words)

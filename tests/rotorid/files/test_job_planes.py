@@ -130,38 +130,6 @@ def test_a_limit_in_a_unit_of_its_own(job, folder):
     the_only(found, "job.toml", None, "sensors.A.limit_mm_s", "1", "limit_mm_s_rms, as the readings are")
 
 
-@each_of(
-    ("lines", "key", "value", "words"),
-    [
-        ("[planes.1]\nforbidden_deg = 20", "planes.1.forbidden_deg", "20", "pairs [from, to]"),
-        ("[planes.1]\nforbidden_deg = [0, 360]", "planes.1.forbidden_deg", "[0, 360]", "use = false leaves"),
-        ("[planes.1]\nuse = false\n[planes.2]\nuse = false", "planes", None, "without use = false"),
-        ("[planes.1]\ntrial_radius_mm = 2", "planes.1.trial_radius_mm", "2", "radius too, radius_mm"),
-        ("[sensors.A]\nlimit_mm_s_rms = 4", "sensors.A.limit_mm_s_rms", "4", "that converts to um_pp"),
-        ('[sensors.A]\nlimit = { "1500" = 3 }', "sensors.A.limit", None, "not 1500: there are 1000 rpm and"),
-        ("[sensors.A]\nweight = 0\n[sensors.B]\nweight = 0", "sensors", None, "at least one weight above 0"),
-    ],
-)
-def test_bad_planes_sensors_and_speeds(job, two_speeds, lines, key, value, words):
-    the_only(complaints(job, lines), "job.toml", None, key, value, words)
-
-
-@each_of(
-    ("lines", "key", "value", "words"),
-    [
-        ("holes = 4\nholes_deg = [0, 90]", "holes", "4", "either holes, equally spaced, or holes_deg"),
-        ("holes_deg = [0, 45, 45]", "holes_deg", "[0, 45, 45]", "holes 2 and 3 stand at the same angle"),
-        ("holes_deg = [90]\nforbidden_deg = [80, 200]", "holes_deg", "[90]", "holes outside forbidden_deg"),
-        ("available_g = [5]", "available_g", "[5]", "the holes of the plane too, holes = 12"),
-        ("holes = 4\navailable_g = 5\nstep_g = 1", "holes", "4", "either pieces or a smallest step"),
-        ('holes = 4\ntaken = { "5" = 1 }', "taken", None, "holes of the plane, 1 … 4, not '5'"),
-        ('holes = 1\ntaken = { "1" = 1 }', "holes", "1", "something is mounted in every hole"),
-    ],
-)
-def test_bad_holes(plane, lines, key, value, words):
-    the_only(complaints(plane, lines), "job.toml", None, f"planes.1.{key}", value, words)
-
-
 def test_limits_of_the_command_line(job, two_speeds):
     read = job(LIMITS)
     both = limited(read, "5g", ["B=3"])  # of the job the others stay

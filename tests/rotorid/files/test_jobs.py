@@ -95,6 +95,12 @@ def test_stored_coefficients(folder, stored, job):
     np.testing.assert_array_equal(read.limits.max_weight, [np.inf, 0.003])
 
 
+def test_coefficients_beside_a_job_stand_in_it(folder, job):
+    job()
+    found = complaints(job_from_files, [folder / "job.toml"], influence="w.csv")
+    the_only(found, "job.toml", None, "influence", None, 'influence = "w.csv" in the job')
+
+
 @each_of(
     ("row", "column", "value", "where", "words"),
     [
@@ -241,6 +247,9 @@ def test_check_runs(checked, folder):
     read = checked(CHECKED)
     assert (read.check.sensors, read.check.planes, read.check_mounted) == (("B", "A"), (), False)
     np.testing.assert_array_equal(read.check.speeds, read.trials.speeds)
+    alone = checked(CHECKED, [row[1:] for row in CHECK]).check  # the only run need not be named
+    assert alone.runs == ("check",)
+    np.testing.assert_array_equal(alone.readings, read.check.readings)
     nothing = checked(mounted=CHECK_WEIGHTS[:1]).check  # a weights table without rows says so
     assert (nothing.planes, nothing.weights.any()) == (("1", "2"), False)
     again = checked(check=replaced(CHECK, 1, "amplitude_um_pp", "amplitude_mm"))

@@ -19,6 +19,7 @@ SAMPLES = {
     for kind, key in (("job", "runs"), ("rotor", "shaft"), ("small", "masses_kg"))
 }
 ROTOR = 'shaft = "shaft.csv"\n'
+PLANE, TURNS = "[planes.1]\n", "rotation = 'clockwise'\n"
 
 
 @each_of(
@@ -42,6 +43,62 @@ ROTOR = 'shaft = "shaft.csv"\n'
         ("phase = 'lagg'", "phase", "lagg", "did you mean 'lag'?"),
         ("check = ' '", "check", " ", "a text in quotes"),
         ("colour = 'red'", "colour", "red", "a known key"),
+        ("[planes.1]\nforbidden_deg = 20", "planes.1.forbidden_deg", "20", "pairs [from, to]"),
+        ("[planes.1]\nforbidden_deg = [0, 360]", "planes.1.forbidden_deg", "[0, 360]", "use = false leaves"),
+        ("[planes.1]\nuse = false\n[planes.2]\nuse = false", "planes", None, "without use = false"),
+        ("[planes.1]\ntrial_radius_mm = 2", "planes.1.trial_radius_mm", "2", "radius too, radius_mm"),
+        ("[sensors.A]\nlimit_mm_s_rms = 4", "sensors.A.limit_mm_s_rms", "4", "that converts to um_pp"),
+        ('[sensors.A]\nlimit = { "1500" = 3 }', "sensors.A.limit", None, "not 1500: there are 1000 rpm"),
+        ("[sensors.A]\nweight = 0\n[sensors.B]\nweight = 0", "sensors", None, "at least one weight above 0"),
+        (
+            "[planes.1]\nholes = 4\nholes_deg = [0, 90]",
+            "planes.1.holes",
+            "4",
+            "either holes, equally spaced, or",
+        ),
+        (
+            "[planes.1]\nholes_deg = [0, 9, 9]",
+            "planes.1.holes_deg",
+            "[0, 9, 9]",
+            "holes 2 and 3 stand at the same",
+        ),
+        (
+            "[planes.1]\nholes_deg = [90]\nforbidden_deg = [80, 200]",
+            "planes.1.holes_deg",
+            "[90]",
+            "holes outside",
+        ),
+        (
+            "[planes.1]\navailable_g = [5]",
+            "planes.1.available_g",
+            "[5]",
+            "the holes of the plane too, holes = 12",
+        ),
+        (
+            "[planes.1]\nholes = 4\navailable_g = 5\nstep_g = 1",
+            "planes.1.holes",
+            "4",
+            "either pieces or a small",
+        ),
+        (
+            PLANE + 'holes = 4\ntaken = { "5" = 1 }',
+            "planes.1.taken",
+            None,
+            "holes of the plane, 1 … 4, not '5'",
+        ),
+        (
+            PLANE + 'holes = 1\ntaken = { "1" = 1 }',
+            "planes.1.holes",
+            "1",
+            "something is mounted in every hole",
+        ),
+        ("angles = 'clockwise'", "rotation", None, "how the rotor turns"),
+        ("view = 'free end'", "rotation", None, "how the rotor turns"),
+        (f"angles = 'clockwize'\n{TURNS}", "angles", "clockwize", "did you mean 'clockwise'?"),
+        ("rotation = 'with'", "rotation", "with", "'clockwise' or 'counter-clockwise'"),
+        (f"{TURNS}view = 'left'", "view", "left", "'drive end' or 'free end'"),
+        ("key_phasor = { angle_deg = 'x' }", "key_phasor.angle_deg", "x", "a number"),
+        ("key_phasor = { angle_deg = 3, speed = 2 }", "key_phasor.speed", "2", "a known key"),
     ],
 )
 def test_what_is_wrong_has_its_key_its_value_and_what_is_expected(job, lines, column, value, words):

@@ -52,6 +52,7 @@ def test_a_slow_run_is_a_runs_table_of_one_run(job, slow, folder):
     np.testing.assert_allclose(read.trials.readings, job(VECTORS).trials.readings, rtol=1e-12)
     other = slow(replaced(SLOW, 1, "amplitude_um_pp", "amplitude_um"))
     np.testing.assert_allclose(other.slow_roll, 2 * S, rtol=1e-12)
+    np.testing.assert_array_equal(slow([line[1:] for line in SLOW]).slow_roll, slow().slow_roll)
     (words,) = slow([SLOW[0], *([line[0], 600, *line[2:]] for line in SLOW[1:])]).trials.warnings
     assert words.startswith("the slow-roll vectors were read at 600 rpm, which is not slow against 1000 rpm")
 

@@ -89,7 +89,7 @@ def make_slow_roll(
         given, vectors = tuple(source), _stated(source, trials, conventions, problems)
     else:
         its = Problems()  # those of the job must not hide what is wrong here
-        runs = make_trials(source, None, conventions, None, its)
+        runs = make_trials(source, None, replace(conventions, run="slow roll"), None, its)
         problems.extend(its)
         if runs is None:
             return None
@@ -202,7 +202,7 @@ def check_runs(
 
     `sources` are tables of runs and weights.
     """
-    check = make_trials(*sources, conventions, errors, problems)
+    check = make_trials(*sources, replace(conventions, run="check"), errors, problems)
     if check is None:
         return None
     before, band, runs = len(problems), conventions.speed_tolerance_percent, source_name(sources[0])
