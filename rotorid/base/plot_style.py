@@ -15,7 +15,7 @@ from rotorid.base.text import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axes._base import _AxesBase
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 # Okabe and Ito: told apart by every eye.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -99,7 +99,7 @@ def legend_above(
     )
 
 
-def legend_below(figure: Figure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
+def legend_below(figure: Figure | SubFigure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
     """One legend for several axes, below all of them; what two of them name alike stands there once."""
     shown: dict[str, Any] = {}
     for ax in axes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,7 @@ from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
@@ -137,6 +138,11 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
+    def picture() -> Figure:
+        from balancing.plots import correction_figure
+
+        return correction_figure(result, mounted, check, left, _below(verdict, tolerance))
+
     plain = outcome_of(
         result,
         made,
@@ -144,7 +150,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
-        pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
+        pictures={"": picture},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),
     )
@@ -215,22 +221,13 @@ def _behind(answer: Answer) -> Answer:
     return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
 
 
-def _figure(
-    result: Correction,
-    pieces: Mounted | None,
-    check: CheckComparison | None,
-    verdict: Verdict | None,
-    tolerance: Tolerance | None,
-) -> Figure:
-    """The correction, or what was asked for beside it: discs with holes, tolerances."""
-    from balancing import plots
+def _below(verdict: Verdict | None, tolerance: Tolerance | None) -> Callable[[Axes], object] | None:
+    """Draws tolerances of planes where there are any."""
+    from balancing.plots import draw_verdict
 
-    if pieces is not None:
-        return plots.mounted_discs(pieces)
-    below = None
-    if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
-        below = partial(plots.draw_verdict, verdict, t=tolerance)
-    return plots.correction_figure(result, check, below)
+    if verdict is None or all(row.kind != "plane" for row in verdict.rows):
+        return None
+    return partial(draw_verdict, verdict, t=tolerance)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -20,6 +20,7 @@ COMMANDS = {
     "balance holes": "balance turbo_job/holes.toml --split",
     "balance left in": "balance left_in/job.toml",
     "balance limited": "balance turbo_job/job.toml --max-mass 430g_mm --limit 1",
+    "balance in part": "balance rk4/job.toml",
     "split": "split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2",
     "split two": "split 35g@120 --two 20g,30g",
     "split drill": "split 3g@120 --drill 8mm --radius 100mm",
@@ -70,7 +71,7 @@ def figures_of(name):
     made = outcome_of(COMMANDS[name])
     figures = {caption or "picture": draw() for caption, draw in made.pictures.items()}
     if name.startswith("balance"):
-        figures["readings"] = residual_figure(made.result, made.mounted, made.check)
+        figures["readings"] = residual_figure(made.result, made.mounted, made.check, made.left)
         for plane in made.result.planes:
             for where, zero in (("right", 1.0), ("top", 1j)):
                 figure = figures[f"plane {plane}, 0° {where}"] = new_figure(3.1, 3.4)
