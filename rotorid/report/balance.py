@@ -98,7 +98,9 @@ def balance_report(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        residual_figure=inline_svg(residual_figure(result, mounted, check, left), "Vibration before and after"),
+        residual_figure=inline_svg(
+            residual_figure(result, mounted, check, left), "Vibration before and after"
+        ),
         discs=[
             inline_svg(figure, f"What goes into plane {plane}")
             for plane, figure in _discs(result, job, mounted, left).items()
