@@ -33,7 +33,7 @@ _DOT: dict[str, Any] = {"marker": "o", "color": "black", "ms": 4.5}
 _HOLLOW: dict[str, Any] = {"marker": "o", "color": "0.45", "ms": 4.5, "mfc": "white"}
 _STAR: dict[str, Any] = {"marker": "*", "color": "black", "ms": 9, "mec": "white", "mew": 0.5}
 _PREDICTED = "predicted, with 95 % of a check run"
-_REGIONS = "95 % regions: closed lines, or smaller than the marks"
+_REGIONS = "95 % regions, or smaller than the marks"
 
 
 def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:

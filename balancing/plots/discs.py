@@ -89,7 +89,6 @@ def draw_disc(  # noqa: PLR0913
     ax.set_title(title, fontsize="medium", fontweight="bold", parse_math=False)
     ax.axis("off")
     ax.set(aspect="equal", xlim=(-_SIDE, _SIDE), ylim=(-_EDGE, _EDGE))
-    ax.text(-_SIDE, -0.95 * _EDGE, f"{turn_sign(labels)} rotation", fontsize=TEXT)
     _circle(ax, 0j, 1.0, fc="white")
     turned = float(np.degrees(np.angle(zero)))
     mark = 0.95 * zero
@@ -113,6 +112,7 @@ def draw_disc(  # noqa: PLR0913
         tip, look = size * zero * on_paper(labels, [vector]), _BROAD if "white" in name else {}
         arrows(ax, 0.0, tip, [name[-6:-1]], **look)
     lines = [f"like adding, {line}" if remove else line for line in lines]
+    lines = [f"{turn_sign(labels)} rotation", *lines]
     lines += ["hatched arcs: nothing goes there"] if forbidden else []
     lines += ["hatched circles: taken already"] if taken.any() else []
     bottom = -_EDGE - _LINE * len(lines)
