@@ -12,7 +12,7 @@ from balancing.plots.discs import ROW, disc_axes, draw_plane
 from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
 from balancing.regions import reach
 from balancing.tables import INVISIBLE
-from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_above, legend_below, new_figure, plain
+from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_below, new_figure, plain
 from rotorid.base.text import cut
 
 if TYPE_CHECKING:
@@ -34,19 +34,6 @@ _HOLLOW: dict[str, Any] = {"marker": "o", "color": "0.45", "ms": 4.5, "mfc": "wh
 _STAR: dict[str, Any] = {"marker": "*", "color": "black", "ms": 9, "mec": "white", "mew": 0.5}
 _PREDICTED = "predicted, with 95 % of a check run"
 _REGIONS = "95 % regions, or smaller than the marks"
-
-
-def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
-    """A new figure with all pictures; on polar axes the weights, on others the amplitudes."""
-    if ax is None:
-        return correction_figure(c)
-    polar = ax.name == "polar"
-    if polar:
-        weights(c, ax)
-    else:
-        amplitudes(c, [ax])
-    legend_above(ax, height=-0.08 if polar else -0.3, title=turning(c.labels), title_fontsize=TEXT)
-    return ax
 
 
 def correction_figure(
@@ -85,8 +72,7 @@ def correction_figure(
     else:
         below(axes := lower.add_subplot())
     words = (left or mounted or c).answer.judgement.splitlines()[0]
-    halves = 12 + len(words) // (1 + (len(words) > _LETTERS))
-    words = textwrap.fill(words, min(halves, _LETTERS), max_lines=2, placeholder=" …")
+    words = textwrap.fill(words, _LETTERS, max_lines=2, placeholder=" …")
     figure.suptitle(words, fontsize="medium", fontweight="bold", parse_math=False)
     title = turning(c.labels) if polar else None  # discs say it
     legend_below(figure, [*polar, *np.atleast_1d(axes)], title=title)
@@ -192,9 +178,8 @@ def amplitudes(
         plain(ax)
         ax.grid(visible=False, axis="x")
         ax.set(ylim=(0, None), ylabel=f"vibration{unit(labels)}")
-    if len(axes) > 1:
-        top = 1.08 * max(most, INVISIBLE * bars.max()) or 1.0
-        axes[1].set(ylim=(0, top), ylabel=f"what is left{unit(labels)}")
+    top = 1.08 * max(most, INVISIBLE * bars.max()) or 1.0
+    axes[1].set(ylim=(0, top), ylabel=f"what is left{unit(labels)}")
     axes[0].figure.align_ylabels(axes)
     names = [cut(name, 24) for name in at.sensors] * S if S * C <= _NAMED else []
     axes[-1].set_xticks(places[: len(names)], names, rotation=90, fontsize=TEXT, parse_math=False)

@@ -15,9 +15,7 @@ from rotorid.base.text import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axes._base import _AxesBase
-    from matplotlib.figure import Figure, SubFigure
-
-    from rotorid.base.arrays import FloatArray
+    from matplotlib.figure import Figure
 
 # Okabe and Ito: told apart by every eye.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -101,7 +99,7 @@ def legend_above(
     )
 
 
-def legend_below(figure: Figure | SubFigure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
+def legend_below(figure: Figure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
     """One legend for several axes, below all of them; what two of them name alike stands there once."""
     shown: dict[str, Any] = {}
     for ax in axes:
@@ -125,12 +123,6 @@ def plain_numbers(ax: _AxesBase) -> None:
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 500 * low else (1.0,)))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
-
-
-def unbroken(phase: FloatArray) -> FloatArray:
-    """Phases, degrees, without the line from one end of a turn to the other: NaN where it begins anew."""
-    anew = np.abs(np.diff(phase, prepend=phase[:1])) > 180
-    return np.where(anew, np.nan, phase)
 
 
 def second_scale(ax: Axes, unit: float = RPM, label: str = "speed, rad/s", side: str = "top") -> None:

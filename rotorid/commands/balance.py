@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +26,6 @@ from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
@@ -139,9 +138,12 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         return correction_equations(result)
 
     def picture() -> Figure:
-        from balancing.plots import correction_figure
+        from balancing.plots import correction_figure, draw_verdict
 
-        return correction_figure(result, mounted, check, left, _below(verdict, tolerance))
+        below = None
+        if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
+            below = partial(draw_verdict, verdict, t=tolerance)
+        return correction_figure(result, mounted, check, left, below)
 
     plain = outcome_of(
         result,
@@ -219,15 +221,6 @@ def _answer(
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
     return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
-
-
-def _below(verdict: Verdict | None, tolerance: Tolerance | None) -> Callable[[Axes], object] | None:
-    """Draws tolerances of planes where there are any."""
-    from balancing.plots import draw_verdict
-
-    if verdict is None or all(row.kind != "plane" for row in verdict.rows):
-        return None
-    return partial(draw_verdict, verdict, t=tolerance)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -18,7 +18,6 @@ from rotorid.base.plot_style import (
     look,
     new_figure,
     plain,
-    unbroken,
 )
 from rotorid.base.text import RPM, SPEEDS, Shown
 from rotorid.identify.amplitudes import real_matrices
@@ -135,7 +134,8 @@ def bode_plot(sweep: Readings, roll: ComplexArray, fit: FittedModes | None) -> F
         for z, style in lines:
             size, phase = labels.vibration(z - roll[c])
             above.plot(RPM * omega, size, **style)
-            below.plot(RPM * omega, unbroken(phase), **style)
+            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
+            below.plot(RPM * omega, phase, **style)
     above.set(ylabel=f"amplitude, {_unit(sweep)}", ylim=(0.0, None))
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees", yticks=range(0, 361, 90))
     if labels.phase == "lag":

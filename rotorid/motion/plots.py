@@ -20,7 +20,6 @@ from rotorid.base.plot_style import (
     note,
     plain,
     second_scale,
-    unbroken,
 )
 from rotorid.base.text import RPM, rpm_text
 from rotorid.motion.run import MotionRun
@@ -120,7 +119,8 @@ def bode_figure(motion: MotionRun) -> Figure:
             drawn = {"linestyle": style, "color": look(k)["color"], "label": label}
             above.plot(speed * RPM, 1e6 * np.abs(X[:, i]), **drawn)
             phase = (np.angle(X[:, i], deg=True) - _LOWEST_PHASE) % 360 + _LOWEST_PHASE
-            below.plot(speed * RPM, unbroken(phase), **drawn)
+            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
+            below.plot(speed * RPM, phase, **drawn)
     above.plot([], [], ":", color=DARK, label="dotted: steady, of the linear rotor")
     above.set(ylabel="1× of x, µm", ylim=(0, None))
     below.set(xlabel="speed, rpm", ylabel="phase lead, °", yticks=range(-270, 1, 90))
@@ -164,17 +164,12 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     """
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
-    whole = ax.inset_axes((1.05, 0.5, 0.4, 0.4), aspect="equal")
-    whole.set_title("the whole clearance", fontsize=TEXT)
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
-        whole.plot(path.real, path.imag, marker=".", **look(k))
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
-    for part in (ax, whole):
-        part.plot(*CIRCLE, color=DARK)
+    ax.plot(*CIRCLE, color=DARK, label="clearance")
     x, y = ((part.min() + part.max()) / 2 for part in (Z.real, Z.imag))
-    reach = 0.7 * max(np.ptp(Z.real), np.ptp(Z.imag), 0.05)  # the paths fill the axes, not the circle
+    reach = 0.7 * max(np.ptp(Z.real), np.ptp(Z.imag), 0.1)  # the paths fill the axes, not the circle
     ax.set(aspect="equal", xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
-    whole.axis("off")
     for end, shift, side in ((0, 7.0, "left"), (-1, -7.0, "right")):
         at = (Z[end, 0].real, Z[end, 0].imag)
         note(ax, rpm_text(resting[end].speed), at, (shift, 0.0), ha=side, va="center")
@@ -182,7 +177,7 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance")
     ax.set_title(f"{where}; rotation anticlockwise", fontsize=TEXT)
-    ax.legend(frameon=False, fontsize=TEXT, loc="upper left", bbox_to_anchor=(1.03, 0.4))
+    ax.legend(frameon=False, fontsize=TEXT, loc="upper left", bbox_to_anchor=(1.03, 1.0))
     plain(ax)
 
 

@@ -265,7 +265,7 @@ def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison
         if c.limits is not None and np.isfinite(c.limits.residual).any():
             limits = document["limits"]["amplitude"]
             more.append(Column("limit", limits, _FOUR, "limits.amplitude.*"))
-        more += _blank(c.before.size)
+        more += _blank(columns[0])
     return html(Table("", (*columns, *more)), LONG)
 
 
@@ -281,12 +281,14 @@ def _next_run(document: Mapping[str, Any], labels: Labels) -> Markup:
         "within": ("95 % within ±", _TWO),
     }
     columns = _speed(document, path, labels), *_columns(document, path, now)
-    return html(Table("", (*columns, *_blank(len(_at(document, path))))), LONG)
+    return html(Table("", (*columns, *_blank(columns[0]))), LONG)
 
 
-def _blank(count: int) -> list[Column]:
+def _blank(beside: Column) -> list[Column]:
     """Columns to fill in by hand."""
-    return [Column(name, ["\N{NO-BREAK SPACE}"] * count) for name in ("amplitude read", "phase read")]
+    return [
+        Column(name, ["\N{NO-BREAK SPACE}"] * len(beside.values)) for name in ("amplitude read", "phase read")
+    ]
 
 
 def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:

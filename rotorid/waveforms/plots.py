@@ -14,10 +14,8 @@ from rotorid.base.plot_style import (
     QUIET,
     VERMILION,
     legend_below,
-    look,
     new_figure,
     plain,
-    unbroken,
 )
 from rotorid.base.text import RPM, cut
 from rotorid.waveforms.record import Channel
@@ -30,8 +28,8 @@ if TYPE_CHECKING:
     from rotorid.waveforms.tacho import Tacho
     from rotorid.waveforms.vectors import Vectors
 
-TURNS, FEW = 4, 12
-"""Drawn of a tacho; vectors of a record that make no line."""
+TURNS = 4
+"""Drawn of a tacho."""
 
 
 def figure_vectors(each: Sequence[Vectors], labels: Labels, channel: Channel, rate: float) -> Figure:
@@ -39,20 +37,19 @@ def figure_vectors(each: Sequence[Vectors], labels: Labels, channel: Channel, ra
     figure = new_figure(7.0)
     *axes, tacho = figure.subplots(3, height_ratios=(6, 5, 2))
     draw_tacho(tacho, channel, rate, each[0].tacho)
-    steady, few = all(one.steady for one in each), all(len(one.times) < FEW for one in each)
+    steady = all(one.steady for one in each)
     curves = [(c, k) for k in range(len(each[0].orders)) for c in range(len(each[0].sensors))]
     for n, (c, k) in enumerate(curves[: len(COLORS)]):
-        style = look(n) | ({"linestyle": "", "marker": MARKERS[n]} if few else {})
         for run, one in enumerate(each):
             z = one.vectors[:, c, k]
-            size, phase = labels.vibration(z)
             x = np.full(z.shape, run + 0.05 * n) if steady else one.speeds * RPM
             errors = (
                 one.radial[:, c, k] * labels.vibration_scale,
                 np.degrees(one.tangential[:, c, k] / np.abs(z)),
             )
-            for ax, y, error in zip(axes, (size, phase if few else unbroken(phase)), errors, strict=True):
-                ax.errorbar(x, y, 2 * error, label=f"{one.sensors[c]}, {one.orders[k]}×", **style)
+            for ax, y, error in zip(axes, labels.vibration(z), errors, strict=True):
+                name = f"{one.sensors[c]}, {one.orders[k]}×"
+                ax.errorbar(x, y, 2 * error, fmt=MARKERS[n], color=COLORS[n], ms=4, label=name)
     axes[0].set(ylabel=f"amplitude, {labels.vibration_in or 'as recorded'}", ylim=(0, None))
     axes[1].set(ylabel=f"phase ({labels.phase}), °", ylim=(-10, 370), yticks=range(0, 361, 90))
     for ax in axes:
