@@ -15,12 +15,12 @@ import numpy as np
 from balancing.correction import Correction
 from balancing.influence import match_speeds
 from balancing.mount import Mounted
-from balancing.tables import rms, small, three_figures, weight_rows
+from balancing.tables import reading_columns, rms, small, three_figures, vector_columns, weight_rows
 from balancing.trials import Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, text
+from rotorid.base.tables import Column, records, text
 from rotorid.base.text import capital, figures
 
 WORTH = 0.9
@@ -43,6 +43,11 @@ class LeftToDo(Answered):
         The check run, planes, and what is mounted in it, (P,).
     trim
         What to add now, (P,); zero but for a trim.
+    check
+        The check runs.
+    before, after, within
+        Vibration of the bare rotor and with the trim at the readings of the check, (S, C), and the radius of
+        95 % of check runs, in the job's unit; NaN where errors are unknown.
     pieces
         The trim as pieces in holes; None: at any angle.
     """
@@ -54,10 +59,21 @@ class LeftToDo(Answered):
     planes: tuple[str, ...]
     there: ComplexArray
     trim: ComplexArray
+    check: Trials
+    before: ComplexArray
+    after: ComplexArray
+    within: FloatArray
     pieces: Mounted | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types, in the job's units."""
+        """As JSON types, in the job's units; readings as they were read, and predicted with the trim."""
+        labels, check = self.correction.labels, self.check
+        readings = (
+            *reading_columns(labels, check.speeds, check.sensors),
+            *vector_columns(labels, "achieved", check.mean[-1]),
+            *vector_columns(labels, "after", self.after),
+            Column("within", self.within.ravel()),
+        )
         return plain(
             {
                 "word": self.word,
@@ -66,6 +82,7 @@ class LeftToDo(Answered):
                 "mounted": weight_rows(self.correction.labels, self.planes, self.there),
                 "add": self.correction.work_rows(self.planes, self.trim),
                 "holes": [] if self.pieces is None else self.pieces.to_dict()["holes"],
+                "readings": records(readings) if self.word == "trim" else [],
             }
         )
 
@@ -130,7 +147,8 @@ def after_check_run(
     c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
     run, planes, there = c.mounted
     pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
-    now, before = rms(check.mean[-1]), rms(c.before[pick] if bare is None else bare)
+    bare = c.before[pick] if bare is None else bare
+    now, before = rms(check.mean[-1]), rms(bare)
     trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
     change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
@@ -166,6 +184,10 @@ def after_check_run(
         planes,
         there,
         trim if word == "trim" else 0 * trim,
+        check,
+        bare,
+        made.after[pick],
+        c.within[pick],
         pieces if word == "trim" else None,
     )
 

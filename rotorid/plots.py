@@ -16,8 +16,8 @@ def plot(result: object, ax: Any = None, **options: Any) -> Any:  # noqa: ANN401
     result
         Of `fem`, `balancing` or rotorid: modes, a Campbell diagram, a correction, a fit, …
     ax
-        Axes of matplotlib to draw on; None: those of a new figure. Identifications and fits take none:
-        they get a new figure with all pictures.
+        Axes of matplotlib to draw on; None: those of a new figure. Corrections, identifications and fits take
+        none: they get a new figure with all pictures.
     options
         For the function that draws: the picture of a response takes `nodes`.
 
@@ -55,7 +55,7 @@ def _balancing() -> Pictures:
     from balancing import plots
 
     return {
-        balancing.Correction: plots.draw_correction,
+        balancing.Correction: lambda result, ax: plots.correction_figure(result),
         balancing.Verdict: plots.draw_verdict,
         balancing.Tolerance: plots.draw_tolerance,
         balancing.Unbalance: plots.draw_unbalance,

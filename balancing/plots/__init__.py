@@ -1,20 +1,18 @@
 """Pictures of balancing: a table of contents. Nothing is shown or saved here."""
 
 from balancing.plots.along_shaft import draw_tolerance, draw_unbalance, draw_verdict
-from balancing.plots.correction import correction_figure, draw_correction, residual_figure
-from balancing.plots.discs import draw_disc, draw_plane, mounted_discs, weight_figure
+from balancing.plots.correction import correction_figure, residual_figure
+from balancing.plots.discs import draw_disc, draw_plane, weight_figure
 from balancing.plots.polar import draw_trial_weight, trial_figure
 
 __all__ = [
     "correction_figure",
-    "draw_correction",
     "draw_disc",
     "draw_plane",
     "draw_tolerance",
     "draw_trial_weight",
     "draw_unbalance",
     "draw_verdict",
-    "mounted_discs",
     "residual_figure",
     "trial_figure",
     "weight_figure",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.plots.discs import ROW, disc_axes, draw_plane
 from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
 from balancing.regions import reach
 from balancing.tables import INVISIBLE
-from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_above, legend_below, new_figure, plain
+from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_below, new_figure, plain
 from rotorid.base.text import cut
 
 if TYPE_CHECKING:
@@ -21,88 +22,106 @@ if TYPE_CHECKING:
     from balancing.check_run import CheckComparison
     from balancing.correction import Correction
     from balancing.mount import Mounted
+    from balancing.trials import Trials
+    from balancing.trim import LeftToDo
 
 _NAMED, _SPEEDS, _LETTERS = 40, 12, 70
 """Readings that have room for the names of their sensors; speeds that have; letters of a title's line."""
-_REGIONS = "95 % regions: closed lines, or smaller than the marks"
-
-
-def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
-    """A new figure with all pictures; on polar axes the weights, on others the amplitudes."""
-    if ax is None:
-        return correction_figure(c)
-    polar = ax.name == "polar"
-    if polar:
-        weights(c, ax)
-    else:
-        amplitudes(c, [ax])
-    legend_above(ax, height=-0.08 if polar else -0.3, title=turning(c.labels), title_fontsize=TEXT)
-    return ax
+_BESIDE = 0.3
+"""From one mark to the next, of a bar 0.8 wide."""
+_DOT: dict[str, Any] = {"marker": "o", "color": "black", "ms": 4.5}
+_HOLLOW: dict[str, Any] = {"marker": "o", "color": "0.45", "ms": 4.5, "mfc": "white"}
+_STAR: dict[str, Any] = {"marker": "*", "color": "black", "ms": 9, "mec": "white", "mew": 0.5}
+_PREDICTED = "predicted, with 95 % of a check run"
+_REGIONS = "95 % regions, or smaller than the marks"
 
 
 def correction_figure(
     c: Correction,
+    mounted: Mounted | None = None,
     check: CheckComparison | None = None,
+    left: LeftToDo | None = None,
     below: Callable[[Axes], object] | None = None,
 ) -> Figure:
     """A new figure: the weights, and all amplitudes before and after.
 
     Parameters
     ----------
-    c
-        The correction.
-    check
-        A check run: what was achieved (of several runs: in the last).
+    c, mounted
+        The correction, and pieces that make it: then discs with their holes.
+    check, left
+        A check run (of several the last), and what is left to do: what is mounted and the trim are drawn.
     below
         Draws something else than the amplitudes.
     """
-    figure = new_figure(8.6)
-    grid = figure.add_gridspec(2, height_ratios=[5, 6])
-    polar = weights(c, figure.add_subplot(grid[0], projection="polar"), check)
-    lower = figure.add_subfigure(grid[1])
+    pieces = mounted if left is None else left.pieces
+    high = 3.9 if pieces is None else ROW * -(-len(c.planes) // 2) + 0.5
+    figure = new_figure(high + 4.9)
+    grid = figure.add_gridspec(2, height_ratios=[high, 4.9])
+    upper, lower = (figure.add_subfigure(grid[k]) for k in range(2))
+    panels = [False, True][: 1 + (left is not None and left.word == "trim")] if pieces is None else []
+    polar = [
+        weights(c, upper.add_subplot(1, len(panels), k + 1, projection="polar"), left, trim=trim)
+        for k, trim in enumerate(panels)
+    ]
+    if pieces is not None:
+        for ax, plane in zip(disc_axes(upper, len(c.planes), c.labels), c.planes, strict=True):
+            draw_plane(ax, pieces.correction, plane, pieces)
     if below is None:
-        amplitudes(c, axes := lower.subplots(2, sharex=True), check)
+        amplitudes(c, axes := lower.subplots(2, sharex=True), check, mounted, left)
     else:
         below(axes := lower.add_subplot())
-    words = c.sentence() if check is None else check.headline
-    figure.suptitle(textwrap.fill(words, _LETTERS), fontsize="medium", fontweight="bold", parse_math=False)
-    legend_below(figure, [polar, *np.atleast_1d(axes)], title=turning(c.labels))
+    words = (left or mounted or c).answer.judgement.splitlines()[0]
+    words = textwrap.fill(words, _LETTERS, max_lines=2, placeholder=" …")
+    figure.suptitle(words, fontsize="medium", fontweight="bold", parse_math=False)
+    title = turning(c.labels) if polar else None  # discs say it
+    legend_below(figure, [*polar, *np.atleast_1d(axes)], title=title)
     return figure
 
 
 def residual_figure(
-    result: Correction, mounted: Mounted | None = None, check: CheckComparison | None = None
+    result: Correction,
+    mounted: Mounted | None = None,
+    check: CheckComparison | None = None,
+    left: LeftToDo | None = None,
 ) -> Figure:
     """A new figure of readings before and after (with pieces, in a check run), and what is left by itself."""
     figure = new_figure(4.2, 5.8)
-    amplitudes(result, axes := figure.subplots(2, sharex=True), check, mounted)
+    amplitudes(result, axes := figure.subplots(2, sharex=True), check, mounted, left)
     legend_below(figure, axes)
     return figure
 
 
-def weights(c: Correction, ax: Axes | None = None, check: CheckComparison | None = None) -> Axes:
+def weights(
+    c: Correction, ax: Axes | None = None, left: LeftToDo | None = None, *, trim: bool = False
+) -> Axes:
     """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs.
 
-    With check runs what was mounted in the last of them, too.
+    After a check run of what is mounted with its limits, or of the trim with its regions.
     """
-    labels, shown, limits = c.labels, c.labels.weight, c.limits
-    polar = polar_axes(ax, labels.angles_on_paper, f"Weights on the bare rotor, {labels.weight_in}")
-    largest = np.abs(c.weights).max()
+    title, word, planes, vectors = "Weights on the bare rotor", "", c.planes, c.weights
+    if left is not None:
+        c, planes, vectors = left.correction, left.planes, left.trim if trim else left.there
+        title, word = (
+            ("Trim: to add now", "add ") if trim else (f"Mounted in {cut(left.run, 16)!r}", "mounted ")
+        )
+    labels, shown, limits = c.labels, c.labels.weight, None if trim else c.limits
+    polar = polar_axes(ax, labels.angles_on_paper, f"{title}, {labels.weight_in}")
+    largest = np.abs(vectors).max()
     styles: dict[str, tuple[str, float]] = {}
-    for p, (plane, place) in enumerate(zip(c.planes, c.places(c.planes, c.weights), strict=True)):
-        name = f"{cut(plane, 24)}: {labels.weight_at(c.weights[p])}"
+    for p, (plane, place) in enumerate(zip(planes, c.places(planes, vectors), strict=True)):
+        name = f"{cut(plane, 24)}: {word}{labels.weight_at(vectors[p])}"
         name += f", or remove at {place:.1f}°" if plane in c.remove else ""
-        draw_line(polar, shown, [0, c.weights[p]], lw=2, label=name, **of_plane(p))
+        draw_line(polar, shown, [0, vectors[p]], lw=2, label=name, **of_plane(p))
         lines = []
-        if c.region_known:
-            lines.append((c.region([p]).edge(181), STYLES[p % 4], 1.2, _REGIONS))
-        if check is not None and plane in check.planes:
-            there = check.weights[-1, check.planes.index(plane)]
-            draw_line(polar, shown, [there], "o", mfc="white", ms=9, mew=1.5, color=of_plane(p)["color"])
-        if limits is not None:
-            arcs = [(limits.max_weight[p], 0.0, 2 * np.pi, "--", 0.9, "dashed circles: largest weights")]
+        if c.region_known and plane in c.planes and (trim or left is None):
+            edge = c.region([c.planes.index(plane)]).edge(181) - (0 if left is None else left.there[p])
+            lines.append((edge, STYLES[p % 4], 1.2, _REGIONS))
+        if limits is not None and plane in c.planes:
+            k = c.planes.index(plane)
+            arcs = [(limits.max_weight[k], 0.0, 2 * np.pi, "--", 0.9, "dashed circles: largest weights")]
             arcs += [
-                (largest, *arc, "-", 5, "thick arcs: nothing can be mounted") for arc in limits.forbidden[p]
+                (largest, *arc, "-", 5, "thick arcs: nothing can be mounted") for arc in limits.forbidden[k]
             ]
             lines += [
                 (size * np.exp(1j * np.linspace(start, start + width, 181)), *look)
@@ -114,11 +133,8 @@ def weights(c: Correction, ax: Axes | None = None, check: CheckComparison | None
             styles[words] = style, thick
     for words, (style, thick) in styles.items():
         polar.plot([], [], style, lw=thick, color=QUIET, label=words)
-    if check is not None:
-        words = f"circles: mounted in run {cut(check.runs[-1], 24)!r}"
-        polar.plot([], [], "o", mfc="white", color=QUIET, label=words)
     # a region far larger than the weights would hide them: it may leave the picture
-    from_zero(polar, shown, c.weights, 4 * largest * labels.weight_scale or 1.0)
+    from_zero(polar, shown, vectors, 4 * largest * labels.weight_scale or 1.0)
     return polar
 
 
@@ -127,43 +143,48 @@ def amplitudes(
     axes: Sequence[Axes],
     check: CheckComparison | None = None,
     mounted: Mounted | None = None,
+    left: LeftToDo | None = None,
 ) -> None:
     """Amplitudes before and after for every speed and sensor, with 95 % of a check run where known.
 
-    With a check run (of several: the last) those before, predicted with what was mounted, and achieved. On a
-    second one of the axes again, in the scale of what is left.
+    With a check run (of several: the last) those before, predicted with what was mounted, achieved, and
+    predicted with the trim. On a second one of the axes again, in the scale of what is left.
     """
     labels, result = c.labels, mounted or c
-    vectors = [c.before, result.after, np.full_like(c.before, np.nan)]
-    covariance, sensors, speeds = c.after_covariance, c.sensors, c.speeds
-    if check is not None:
-        vectors = [check.before, check.predicted[-1], check.achieved[-1]]
-        covariance, sensors, speeds = check.covariance[-1], check.sensors, check.speeds
-    before, after, achieved = (np.abs(z).ravel() * labels.vibration_scale for z in vectors)
-    within = reach(np.nan_to_num(covariance)).ravel() * labels.vibration_scale
-    S, C = len(speeds), len(sensors)
-    places = np.arange(S * C) + np.repeat(np.arange(S), C) * 0.8
-    beside = places - 0.17 * (check is not None)  # dots and stars hide each other otherwise
-    for ax in axes:
-        ax.bar(places, before, color="0.86", edgecolor="0.5", label="before")
-        ax.vlines(beside, (after - within).clip(min=0.0), after + within, color="black")
-        label = f"predicted{', with 95 % of a check run' if within.any() else ''}"
-        ax.plot(beside, after, "o", color="black", ms=4.5, label=label)
+    # place beside the middle of the bar, vectors, radii of 95 %, look, name
+    at: Correction | Trials = c
+    before, marks = c.before, [(0.0, result.after, c.within, _DOT, _PREDICTED)]
+    if left is not None:
+        at, before, unknown = left.check, left.before, np.zeros(left.before.shape)
+        marks = [(0.0, at.mean[-1], unknown, _STAR, "achieved")]
         if check is not None:
-            ax.plot(places + 0.2, achieved, "*", color="black", ms=9, mec="white", mew=0.5, label="achieved")
-        elif c.limits is not None and np.isfinite(c.limits.residual).any():
+            within = reach(np.nan_to_num(check.covariance[-1])) * labels.vibration_scale
+            marks.append((-_BESIDE, check.predicted[-1], within, _HOLLOW, _PREDICTED))
+        if left.word == "trim":
+            marks.append((_BESIDE, left.after, left.within, _DOT, "predicted with the trim, with 95 %"))
+    S, C = len(at.speeds), len(at.sensors)
+    places = np.arange(S * C) + np.repeat(np.arange(S), C) * 0.8
+    bars, most = np.abs(before).ravel() * labels.vibration_scale, 0.0
+    for ax in axes:
+        ax.bar(places, bars, color="0.86", edgecolor="0.5", label="before")
+        for aside, vectors, circle, look, name in marks:
+            sizes, radii = np.abs(vectors).ravel() * labels.vibration_scale, np.nan_to_num(circle).ravel()
+            ax.vlines(places + aside, (sizes - radii).clip(min=0.0), sizes + radii, look["color"])
+            ax.plot(places + aside, sizes, linestyle="", label=name, **look)
+            most = max(most, *(sizes + radii))
+        if left is None and c.limits is not None and np.isfinite(c.limits.residual).any():
             limit = c.limits.residual.ravel() * labels.vibration_scale
             ax.hlines(limit, places - 0.45, places + 0.45, color="black", lw=2.2, label="limit")
         plain(ax)
         ax.grid(visible=False, axis="x")
         ax.set(ylim=(0, None), ylabel=f"vibration{unit(labels)}")
-    if len(axes) > 1:
-        left = max(np.nanmax([*after + within, *achieved]), INVISIBLE * before.max()) or 1.0
-        axes[1].set(ylim=(0, 1.08 * left), ylabel=f"what is left{unit(labels)}")
-    names = [cut(name, 24) for name in sensors] * S if S * C <= _NAMED else []
+    top = 1.08 * max(most, INVISIBLE * bars.max()) or 1.0
+    axes[1].set(ylim=(0, top), ylabel=f"what is left{unit(labels)}")
+    axes[0].figure.align_ylabels(axes)
+    names = [cut(name, 24) for name in at.sensors] * S if S * C <= _NAMED else []
     axes[-1].set_xticks(places[: len(names)], names, rotation=90, fontsize=TEXT, parse_math=False)
     every = slice(None, None, -(-S // _SPEEDS))
     upper = axes[0].secondary_xaxis("top")
-    numbers = list(map(labels.speed_number, speeds[every]))
+    numbers = list(map(labels.speed_number, at.speeds[every]))
     upper.set_xticks(places.reshape(S, C).mean(axis=1)[every], numbers, fontsize=TEXT)
     upper.set_xlabel(f"speed, {labels.speed_in}", fontsize=TEXT)

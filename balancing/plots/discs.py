@@ -22,7 +22,7 @@ from rotorid.base.text import cut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from balancing.correction import Correction
     from balancing.mount import Mounted
@@ -31,6 +31,10 @@ _HOLES, _NUMBERS, _TEXTS, _ARROW, _SIDE, _EDGE = 0.84, 0.63, 1.08, 0.46, 1.95, 1
 """Radii of holes, their numbers, what stands around the disc and the longest arrow; half of the picture."""
 _LINE, _NUMBERED = 0.22, 16
 """Height of a line of text below; holes that all have their numbers."""
+_BROAD = {"width": 0.018, "headwidth": 2.2, "headlength": 2.2, "headaxislength": 2.2}
+"""An arrow that is seen behind another one."""
+ROW = 3.6
+"""Inches, of a row of discs."""
 
 
 def draw_disc(  # noqa: PLR0913
@@ -80,12 +84,11 @@ def draw_disc(  # noqa: PLR0913
             texts.append(f"{holes.names[h]}: {minus}{content(holes, mounting, h, labels.weight_scale)}")
     at = sign * zero * on_paper(labels, weights)
     scale = min(0.1, _HOLES * np.pi / len(taken)) / np.sqrt(max([*np.abs(at), *taken]) or 1.0)
-    what = "nothing" if mounting is not None and not weights else labels.weight_in
-    title = f"{cut(plane, 20)}: {'take away' if remove else 'add'}, {what}"
+    what = f"{'take away' if remove else 'add'}, {labels.weight_in}"
+    title = f"{cut(plane, 20)}: {'nothing' if mounting is not None and not weights else what}"
     ax.set_title(title, fontsize="medium", fontweight="bold", parse_math=False)
     ax.axis("off")
     ax.set(aspect="equal", xlim=(-_SIDE, _SIDE), ylim=(-_EDGE, _EDGE))
-    ax.text(-_SIDE, -0.95 * _EDGE, f"{turn_sign(labels)} rotation", fontsize=TEXT)
     _circle(ax, 0j, 1.0, fc="white")
     turned = float(np.degrees(np.angle(zero)))
     mark = 0.95 * zero
@@ -105,9 +108,13 @@ def draw_disc(  # noqa: PLR0913
     shown = {name: vector for name, vector in vectors.items() if vector}
     lines = [f"{name}: {labels.weight_at(vector)}" for name, vector in shown.items()]
     size = _ARROW / (np.abs([*vectors.values()]).max() or 1.0)
-    arrows(ax, 0.0, size * zero * on_paper(labels, [*shown.values()]), [name[-6:-1] for name in shown])
+    for name, vector in shown.items():  # where both point the same way the white one is seen around the other
+        tip, look = size * zero * on_paper(labels, [vector]), _BROAD if "white" in name else {}
+        arrows(ax, 0.0, tip, [name[-6:-1]], **look)
     lines = [f"like adding, {line}" if remove else line for line in lines]
+    lines = [f"{turn_sign(labels)} rotation", *lines]
     lines += ["hatched arcs: nothing goes there"] if forbidden else []
+    lines += ["hatched circles: taken already"] if taken.any() else []
     bottom = -_EDGE - _LINE * len(lines)
     ax.set_ylim(bottom, _EDGE)
     ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)
@@ -152,15 +159,6 @@ def draw_plane(
     return draw_disc(ax, plane, holes, mounting, c.labels, **look)
 
 
-def mounted_discs(m: Mounted) -> Figure:
-    """A new figure of all planes and their holes; planes without show the weight where it stands."""
-    c = m.correction
-    figure, axes = _discs(len(c.planes), c.labels)
-    for ax, plane in zip(axes, c.planes, strict=True):
-        draw_plane(ax, c, plane, m)
-    return figure
-
-
 def weight_figure(
     labels: Labels,
     weight: complex,
@@ -171,24 +169,25 @@ def weight_figure(
 ) -> Figure:
     """A new figure with a disc for each of several ways to place one weight; see `draw_disc`."""
     several = ways or ((),)
-    figure, axes = _discs(len(several), labels)
+    rows, columns = -(-len(several) // 2), min(len(several), 2)
+    figure = new_figure(ROW * rows + 0.5, 3.5 * max(columns, 1.3))
+    axes = disc_axes(figure, len(several), labels)
     for k, (ax, loose) in enumerate(zip(axes, several, strict=True), start=1):
         title = f"solution {k}" if len(several) > 1 else "weight"
         draw_disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose)
     return figure
 
 
-def _discs(count: int, labels: Labels) -> tuple[Figure, list[Axes]]:
-    """A new figure with axes for so many discs, two in a row, under what holds for all."""
+def disc_axes(figure: Figure | SubFigure, count: int, labels: Labels) -> list[Axes]:
+    """Axes for so many discs, two in a row, under what holds for all; a row wants `ROW` inches."""
     columns, rows = min(count, 2), -(-count // 2)
-    figure = new_figure(3.75 * rows + 0.5, 3.5 * max(columns, 1.3))
     way = "clockwise" if labels.drawn_sign < 0 else "counter-clockwise"
     words = (
         f"Seen from the end from which the rotor turns {way};\n"
         f"angles from the mark (triangle) {labels.side} the rotation"
     )
     figure.suptitle(words, fontsize=TEXT)
-    return figure, [figure.add_subplot(rows, columns, k + 1) for k in range(count)]
+    return [figure.add_subplot(rows, columns, k + 1, anchor="N") for k in range(count)]
 
 
 def _circle(ax: Axes, centre: complex, radius: float, **look: Any) -> None:  # noqa: ANN401

@@ -69,9 +69,9 @@ def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = 
     polar.set_rlim(0, min(1.05 * polar.get_rmax(), most), auto=True)
 
 
-def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike) -> None:
+def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike, **shape: float) -> None:
     """Arrows with black edges from places of the horizontal axis, in the scale of the vertical one."""
-    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009}
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009} | shape
     x = np.broadcast_to(at, tips.shape)
     ax.quiver(x, 0 * x, tips.real, tips.imag, color=colors, edgecolor="black", linewidth=0.8, **look)
 
@@ -93,8 +93,8 @@ def on_paper(labels: Labels, vectors: ArrayLike) -> ComplexArray:
 
 
 def unit(labels: Labels) -> str:
-    """Unit of the readings, as it stands behind the name of an axis."""
-    return f", {labels.vibration_in}" if labels.vibration_in else ""
+    """Unit of the readings, as it stands under the name of an axis, for short axes too."""
+    return f",\n{labels.vibration_in}" if labels.vibration_in else ""
 
 
 def trial_figure(weights: Sequence[TrialWeight]) -> Figure:

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem.campbell import HEAVY
 from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
-    ABOVE_SCALE,
-    BOX,
     COLORS,
     QUIET,
     VERMILION,
-    WIDTH,
     legend_above,
     look,
     new_axes,
@@ -37,7 +35,6 @@ if TYPE_CHECKING:
 
 _HIGHEST = 3.0  # logarithmic decrements above it are not drawn to scale
 _PALE = 0.35
-_WARNING = "#8a3d00"
 _STYLES: dict[float, dict[str, Any]] = {
     1.0: {"linestyle": "-", "marker": "^", "fillstyle": "full"},
     -1.0: {"linestyle": "--", "marker": "v", "fillstyle": "none"},
@@ -45,12 +42,10 @@ _STYLES: dict[float, dict[str, Any]] = {
 }
 
 
-def shade_unstable(
-    ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
-) -> None:
-    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
+def shade_unstable(ax: Axes, ranges: Iterable[tuple[float, float]]) -> None:
+    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm."""
     for k, (first, last) in enumerate(ranges):
-        band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
+        band = ax.axvspan(first * RPM, last * RPM, label="" if k else "unstable: no steady state", alpha=0.14)
         band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
 
 
@@ -58,7 +53,7 @@ def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
     """Shade the range of operating speeds, rad/s, if there is one, on axes in rpm."""
     if operating is not None:
         first, last = operating
-        ax.axvspan(first * RPM, last * RPM, color="#000000", alpha=0.1, linewidth=0, label="operating range")
+        ax.axvspan(first * RPM, last * RPM, color="black", alpha=0.1, label="operating range")
 
 
 def campbell_figure(campbell: Campbell, operating: tuple[float, float] | None = None) -> Figure:
@@ -79,26 +74,24 @@ def draw_campbell(
     triangles that point down, neither (a straight line) a dotted one: told apart in black and white too.
     Where a mode is heavily damped its line is pale. The range of operating speeds, rad/s, is shaded.
     """
-    ax = ax or new_axes((WIDTH, 4.8))
+    ax = ax or new_axes()
     speeds, frequencies = campbell.speeds * RPM, campbell.frequencies * RPM
     top = 1.15 * float(np.nanmax(frequencies, initial=1e-9))
     end = min(speeds.max(), top)
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
-    note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top", fontsize=11)
-    if campbell.criticals:
-        _mark_criticals(ax, campbell.criticals, top)
+    note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top")
+    _mark_criticals(ax, campbell.criticals, top)
     for way in np.unique(campbell.direction[np.isfinite(frequencies)]):
         ax.plot([], [], color=QUIET, label=f"{DIRECTION_NAMES[way]} whirl", **_STYLES[way])
     if (campbell.log_decrements > campbell.heavy).any():
         ax.plot([], [], color=QUIET, alpha=_PALE, label=f"pale: decrement above {campbell.heavy:g}")
     shade_operating(ax, operating)
-    shade_unstable(ax, [(window.first, window.last) for window in campbell.windows], "unstable")
+    shade_unstable(ax, [(window.first, window.last) for window in campbell.windows])
     plain(ax)
-    second_scale(ax)
     second_scale(ax, 60.0, "whirl frequency, Hz", "right")
-    legend_above(ax, borderaxespad=ABOVE_SCALE)
+    legend_above(ax)
     return ax
 
 
@@ -114,7 +107,7 @@ def draw_log_decrements(campbell: Campbell, ax: Axes, operating: tuple[float, fl
     ax.set(ylim=(low, high), xlabel="speed, rpm", ylabel="logarithmic decrement")
     ax.axhline(0.0, color="black", linewidth=1.1)
     ax.axhspan(low, 0.0, color=VERMILION, alpha=0.10, hatch="///", linewidth=0)
-    note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=_WARNING)
+    note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=VERMILION)
     plain(ax)
     shade_operating(ax, operating)
     return ax
@@ -127,15 +120,19 @@ def draw_speed_map(
 
     Speeds that are not positive are left out; the range of operating speeds, rad/s, is shaded.
     """
-    ax = ax or new_axes((WIDTH, 5))
+    ax = ax or new_axes()
     for mode, curve in enumerate(chart.speeds.T):
         speeds = np.where(curve > 0, curve * RPM, np.nan)
         ax.plot(chart.stiffness, speeds, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
-    ax.set(xscale="log", yscale="log")
     if operating:
         first, last = operating
-        ax.axhspan(first * RPM, last * RPM, color="black", alpha=0.07, linewidth=0, label="operating range")
-    ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm (both log)")
+        ax.axhspan(first * RPM, last * RPM, color="black", alpha=0.07, label="operating range")
+    ax.set(
+        xscale="log",
+        yscale="log",
+        xlabel="stiffness of each support, N/m",
+        ylabel="critical speed, rpm (log)",
+    )
     plain(ax)
     second_scale(ax, RPM, "critical speed, rad/s", "right")
     for scale in (ax, *ax.child_axes):
@@ -162,15 +159,23 @@ def _draw_curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
 
 
 def _mark_criticals(ax: Axes, criticals: Sequence[tuple[float, float]], top: float) -> None:
-    """Circles with speed, rpm, and logarithmic decrement: below the 1× line in its first part, then above."""
-    speeds = [speed * RPM for speed, _ in criticals]
-    ax.plot(speeds, speeds, "o", color="black", markerfacecolor="#F0E442", markersize=9, zorder=6,
-            label="damped critical speed")  # fmt: skip
-    middle = np.mean(ax.get_xlim())
+    """Circles, hollow without a peak; their words stand below the 1× line in its first part, then above."""
+    from matplotlib.patheffects import withStroke
+
+    for heavy, label in enumerate(("damped critical speed", f"no peak: δ > {HEAVY}")):
+        these = [speed * RPM for speed, delta in criticals if (delta > HEAVY) == heavy]
+        if these:
+            face = "none" if heavy else "#F0E442"
+            ax.plot(these, these, "o", color="black", mfc=face, ms=9, zorder=6, label=label)
+    middle, gap, white = np.mean(ax.get_xlim()), 0.05 * top, [withStroke(linewidth=2.5, foreground="white")]
     for side, ha, va in ((-1, "left", "top"), (1, "right", "bottom")):
-        height = -np.inf
-        for speed, (_, decrement) in sorted(zip(speeds, criticals, strict=True))[::side]:
-            if side * (speed - middle) >= 0:
-                height = max(side * speed, height + 0.05 * top)  # away from the last one's words
-                words, at = f"{speed:.0f} rpm, δ = {decrement:z.2f}", (speed, side * height)
-                note(ax, words, at, (-9 * side, 5 * side), ha=ha, va=va, bbox=BOX, zorder=7)
+        used: list[float] = []
+        for own, delta in sorted(((side * RPM * speed, delta) for speed, delta in criticals), reverse=True):
+            if own >= side * middle:
+                height = own
+                while any(abs(other - height) < gap for other in used):
+                    height += gap / 4  # clear of the curves of other modes, and of other words
+                used += [own, height]
+                words = f"{side * own:.0f} rpm, δ = {delta:z.2f}"
+                at = side * own, side * height
+                note(ax, words, at, (-9 * side, 5 * side), ha=ha, va=va, zorder=7, path_effects=white)

@@ -34,7 +34,7 @@ from rotorid.base.plot_style import (
     plain,
     second_scale,
 )
-from rotorid.base.text import RPM, Shown
+from rotorid.base.text import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from fem.peaks import Peaks
     from fem.response import InfluenceCoefficients, Response
     from fem.rotor import Rotor
-
-MICROMETRES = Shown("µm peak", 1e6)
 
 
 def draw_response(
@@ -131,8 +129,6 @@ def draw_polar(
     *,
     marks: int = 6,
     windows: Sequence[Window] = (),
-    unit: Shown = MICROMETRES,
-    lag: bool = False,
 ) -> Axes:
     """Draw readings as curves in the plane (Nyquist): distance is amplitude, angle is phase lead.
 
@@ -150,13 +146,9 @@ def draw_polar(
         About how many speeds to write along each curve.
     windows
         Ranges without a steady response, which are left out.
-    unit
-        Of the amplitudes.
-    lag
-        Whether angles are written as lags, which grow against the rotation, clockwise.
     """
     ax = new_axes((WIDTH, 6.6), projection="polar") if ax is None else ax
-    omega, Z = np.asarray(speeds, float), unit.scale * np.asarray(readings, complex)
+    omega, Z = np.asarray(speeds, float), 1e6 * np.asarray(readings, complex)
     Z = np.where(within(windows, omega)[:, None], np.nan, Z)
     room, marked = 0.08 * np.nanmax(np.abs(Z)), np.zeros(0)
     for k, (reading, name) in enumerate(zip(Z.T, labels, strict=True)):
@@ -172,11 +164,7 @@ def draw_polar(
             words = f"{omega[i] * RPM:.0f}"
             note(ax, words, (angle, abs(z)), outwards, ha="center", va="center", color=color, bbox=BOX)
     ax.grid(color="#d0d5dc", linewidth=0.8)
-    way_round = "phase lag, degrees, against the rotation" if lag else "phase lead, degrees"
-    ax.set_title(f"amplitude, {unit.word}, over {way_round}; marks: speed, rpm", fontsize=TEXT)
-    if lag:
-        leads = range(0, 360, 45)
-        ax.set_xticks(np.radians(leads), [f"{-angle % 360}°" for angle in leads])
+    ax.set_title("amplitude, µm peak, over phase lead, degrees; marks: speed, rpm", fontsize=TEXT)
     legend_above(ax, height=-0.08)
     return ax
 

@@ -144,6 +144,14 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
+    def picture() -> Figure:
+        from balancing.plots import correction_figure, draw_verdict
+
+        below = None
+        if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
+            below = partial(draw_verdict, verdict, t=tolerance)
+        return correction_figure(result, mounted, check, left, below)
+
     outcome = Balance(
         result=result,
         provenance=made,
@@ -151,7 +159,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
-        pictures={"": lambda: _figure(result, pieces, check, verdict, tolerance)},
+        pictures={"": picture},
         solved=solved_equations,
         lines=LINES + 6 * bool(mounted or pieces),
         influence=influence,
@@ -215,24 +223,6 @@ def _answer(
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
     return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
-
-
-def _figure(
-    result: Correction,
-    pieces: Mounted | None,
-    check: CheckComparison | None,
-    verdict: Verdict | None,
-    tolerance: Tolerance | None,
-) -> Figure:
-    """The correction, or what was asked for beside it: discs with holes, tolerances."""
-    from balancing import plots
-
-    if pieces is not None:
-        return plots.mounted_discs(pieces)
-    below = None
-    if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
-        below = partial(plots.draw_verdict, verdict, t=tolerance)
-    return plots.correction_figure(result, check, below)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from balancing import Influence, Trials
     from rotorid.files import Job
 
-NEEDS_TRIAL = "the calibrated model does not explain the data it was calibrated with"
-"""Why its coefficients alone are not enough."""
 KINDS = ("measured", "computed", "combined")
 MODEL_ERROR = 20.0
 """Percent of a computed coefficient, one standard deviation, unless its rotor is calibrated."""
@@ -131,19 +129,3 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         labels=labels,
     )
     return computed if job.rotor.calibration is None else calibrated(computed, job, places)
-
-
-def counted_before(job: Job) -> bool:
-    """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
-    from rotorid.files.disk import sha256
-
-    calibration = None if job.rotor is None else job.rotor.calibration
-    job_and_runs = job.files[:2]  # the job, then its runs
-    return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
-
-
-def needs_trial_run(job: Job, influence: Influence) -> bool:
-    """Whether these coefficients are those of a model alone that contradicts its own data."""
-    calibration = None if job.rotor is None else job.rotor.calibration
-    alone = influence is not job.influence and not job.trials.weights.any()
-    return calibration is not None and calibration.needs_trial_run and alone

@@ -124,7 +124,7 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
     power = 2 if options.excitation == "unbalance" else 0
     unit = next((table.units[name] for name in points if name in table.units), None)
     labels = Labels(
-        vibration_unit=unit.word if unit else "model unit",
+        vibration_unit=unit.word if unit else "unit of the data",
         vibration_scale=unit.scale if unit else 1.0,
         speed_unit=table.axis.word.rpartition(", ")[2].replace("/", "_"),
     )

@@ -71,7 +71,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         For records without turns, and options that cannot be.
     """
     from rotorid.files.waveforms import find_each, read_waveforms, vectors_table
-    from rotorid.waveforms.plots import figure_tacho
+    from rotorid.waveforms.plots import figure_vectors
 
     options = options or VectorsOptions()
     given = {
@@ -126,7 +126,11 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         tables=(table.only(printed),),
         file=table,
         keys=dict(plain(document)),
-        pictures={"The tacho of the first record.": lambda: figure_tacho(signal, first.rate, tachos[0])},
+        pictures={
+            "Vectors, over the tacho of the first record.": lambda: figure_vectors(
+                each, labels, signal, first.rate
+            )
+        },
         warnings=tuple(words),
         title="Vectors",
         provenance=provenance(waveforms.files, options),

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 POINTS, CURVES, NAMES = 1000, len(COLORS), 12
 """Of a curve; most curves of a sweep, outputs in a legend."""
-MODEL_UNIT = Shown("model unit")
+MODEL_UNIT = Shown("unit of the data")
 """Of amplitudes whose columns name no unit."""
 
 
@@ -59,7 +59,7 @@ def figure_identification(result: Identification) -> Figure:
         ax.set_ylabel(f"amplitude, {unit.word}")
     for ax in axes:
         plain(ax)
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(bottom=-0.04 * ax.get_ylim()[1])  # a mark at 0 stands above the axis
     phases.set(xlabel=data.axis.word, ylabel="phase lead, °", ylim=(-205, 205), yticks=range(-180, 181, 90))
     figure.align_ylabels(axes)
     words = f"points: measured{' ± 2σ' if data.stated else ''}; crosses and lines: model"
@@ -133,8 +133,8 @@ def bode_plot(sweep: Readings, roll: ComplexArray, fit: FittedModes | None) -> F
             lines.append((fit.curve(omega)[:, c], {"label": f"fit, run {sweep.run}", **dots}))
         for z, style in lines:
             size, phase = labels.vibration(z - roll[c])
-            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
             above.plot(RPM * omega, size, **style)
+            phase[1:][np.abs(np.diff(phase)) > 180] = np.nan  # where it begins anew
             below.plot(RPM * omega, phase, **style)
     above.set(ylabel=f"amplitude, {_unit(sweep)}", ylim=(0.0, None))
     below.set(xlabel="speed, rpm", ylabel=f"phase ({labels.phase}), degrees", yticks=range(0, 361, 90))

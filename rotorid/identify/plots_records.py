@@ -131,7 +131,7 @@ def _styles(result: Fit, k: int) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _finish(axes: Axes, name: str) -> None:
     """Name with its unit, and powers of ten but no offsets."""
-    axes.set_ylabel(f"{name}, \nmodel unit", fontsize=TEXT)
+    axes.set_ylabel(f"{name}, \nas recorded", fontsize=TEXT)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True, useOffset=False)
     axes.tick_params(labelsize=TEXT)
     plain(axes)

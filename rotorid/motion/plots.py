@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     from rotorid.motion.branches import Branch
     from rotorid.motion.equilibrium import Equilibrium
 
-_PANELS, _TURNS, _ORDERS = 4, 12, 4.0
+_PANELS, _TURNS, _ORDERS = 6, 12, 4.0
 """Nodes that are drawn, turns of an orbit, orders of a spectrum."""
+_NOTHING = 1e-6
+"""µm, and all below is rounding: an axis that holds nothing more goes to 1 µm."""
 CIRCLE = np.array([part(np.linspace(0, 2 * np.pi, 181)) for part in (np.cos, np.sin)])
 _LOWEST_PHASE = -315.0
 """Degrees; phases stand from here on through a whole turn."""
@@ -43,7 +45,7 @@ _LOWEST_PHASE = -315.0
 def motion_figure(motion: MotionRun) -> Figure:
     """Of each node x and y over time, and at a constant speed the spectrum of the second half beside them."""
     shown, turn = _shown(motion), motion.speeds[0] / (2 * np.pi)
-    figure, widths = new_figure(1.2 + 1.9 * len(shown)), [3, 2][: 1 + (motion.speeds[0] == motion.speeds[1])]
+    figure, widths = new_figure(1.2 + 1.7 * len(shown)), [3, 2][: 1 + (motion.speeds[0] == motion.speeds[1])]
     axes = figure.subplots(len(shown), len(widths), sharex="col", width_ratios=widths, squeeze=False)
     for i, row in zip(shown, axes, strict=True):
         for k, (name, values) in enumerate((("x", motion.z[:, i].real), ("y", motion.z[:, i].imag))):
@@ -58,10 +60,12 @@ def motion_figure(motion: MotionRun) -> Figure:
             ax.set(ylabel="amplitude, µm", ylim=(0, None), xlim=(-_ORDERS, _ORDERS) if turn else None)
         for ax in row:
             plain(ax)
+            if np.abs(ax.get_ylim()).max() < _NOTHING:
+                ax.set_ylim(-1.0, 1.0)
     against = f"{'cycles a turn' if turn else 'Hz'}, backward < 0"
     for ax, label in zip(axes[-1], ("time, s", against), strict=False):
         ax.set_xlabel(label)
-    legend_below(figure, [axes[0, 0]])
+    legend_below(figure, [axes[0, 0]], title=_left_out(motion))
     return figure
 
 
@@ -86,7 +90,7 @@ def orbits_figure(motion: MotionRun) -> Figure:
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
         plain(ax)
-    legend_below(figure, figure.axes)
+    legend_below(figure, figure.axes, title=_left_out(motion))
     return figure
 
 
@@ -122,7 +126,7 @@ def bode_figure(motion: MotionRun) -> Figure:
     below.set(xlabel="speed, rpm", ylabel="phase lead, °", yticks=range(-270, 1, 90))
     for ax in (above, below):
         plain(ax)
-    legend_below(figure, [above])
+    legend_below(figure, [above], 3, title=_left_out(motion))
     return figure
 
 
@@ -140,6 +144,12 @@ def _shown(motion: MotionRun) -> list[int]:
     return sorted(sorted(range(len(motion.nodes)), key=lambda i: i not in bearings)[:_PANELS])
 
 
+def _left_out(motion: MotionRun) -> str | None:
+    """That not every node is drawn; None where every one is."""
+    count = len(motion.nodes)
+    return f"{_PANELS} of {count} nodes, those of bearings first" if count > _PANELS else None
+
+
 def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
     """Draw the path of each journal in its clearance circle over speed, with load and rotation.
 
@@ -152,19 +162,22 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     ax
         Drawn into.
     """
-    ax.plot(*CIRCLE, color=DARK)
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
+    ax.plot(*CIRCLE, color=DARK, label="clearance")
+    x, y = ((part.min() + part.max()) / 2 for part in (Z.real, Z.imag))
+    reach = 0.7 * max(np.ptp(Z.real), np.ptp(Z.imag), 0.1)  # the paths fill the axes, not the circle
+    ax.set(aspect="equal", xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
     for end, shift, side in ((0, 7.0, "left"), (-1, -7.0, "right")):
         at = (Z[end, 0].real, Z[end, 0].imag)
         note(ax, rpm_text(resting[end].speed), at, (shift, 0.0), ha=side, va="center")
     load = resting[-1].load.sum()
     where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
-    ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
+    ax.set(xlabel="x by clearance", ylabel="y by clearance")
     ax.set_title(f"{where}; rotation anticlockwise", fontsize=TEXT)
-    ax.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
+    ax.legend(frameon=False, fontsize=TEXT, loc="upper left", bbox_to_anchor=(1.03, 1.0))
     plain(ax)
 
 

@@ -98,7 +98,9 @@ def balance_report(
             conventions_explained.phase_figure(labels),
             f"A reading over time with a phase of 60° ({labels.phase})",
         ),
-        residual_figure=inline_svg(residual_figure(result, mounted, check), "Vibration before and after"),
+        residual_figure=inline_svg(
+            residual_figure(result, mounted, check, left), "Vibration before and after"
+        ),
         discs=[
             inline_svg(figure, f"What goes into plane {plane}")
             for plane, figure in _discs(result, job, mounted, left).items()
@@ -106,6 +108,7 @@ def balance_report(
         unsplit=[plane for plane in result.planes if plain and plane in job.holes],
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
+        next_run=_next_run(document, labels) if left is not None and left.word == "trim" else "",
         verdict=""
         if verdict is None
         else block("\n\n".join([verdict.answer.numbers, *verdict.answer.tables])),
@@ -264,9 +267,30 @@ def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison
         if c.limits is not None and np.isfinite(c.limits.residual).any():
             limits = document["limits"]["amplitude"]
             more.append(Column("limit", limits, _FOUR, "limits.amplitude.*"))
-        blank = ["\N{NO-BREAK SPACE}"] * c.before.size
-        more += [Column("amplitude read", blank), Column("phase read", blank)]
+        more += _blank(columns[0])
     return html(Table("", (*columns, *more)), LONG)
+
+
+def _next_run(document: Mapping[str, Any], labels: Labels) -> Markup:
+    """Readings now and predicted with the trim, with room for those of the next run."""
+    path = "left_to_do.readings"
+    now: Headings = {
+        "sensor": ("sensor", str),
+        "achieved": ("now", _THREE),
+        "achieved_phase_deg": ("at", degrees),
+        "after": ("predicted", _THREE),
+        "after_phase_deg": ("at ", degrees),
+        "within": ("95 % within ±", _TWO),
+    }
+    columns = _speed(document, path, labels), *_columns(document, path, now)
+    return html(Table("", (*columns, *_blank(columns[0]))), LONG)
+
+
+def _blank(beside: Column) -> list[Column]:
+    """Columns to fill in by hand."""
+    return [
+        Column(name, ["\N{NO-BREAK SPACE}"] * len(beside.values)) for name in ("amplitude read", "phase read")
+    ]
 
 
 def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:

@@ -64,8 +64,8 @@ class Tacho:
         Of the pulses that count, s, and the turn that each begins (a fraction within a turn), (P,).
     missing, double
         Turns of pulses that are not there, and times of those that are too many.
-    level, hysteresis
-        In the numbers of the record: edges are at the level, and count beyond the band around it.
+    level
+        Of the edges, in the numbers of the record.
     jitter_deg
         Standard deviation of a pulse, degrees of a turn (median over the record).
     offset_s
@@ -87,7 +87,6 @@ class Tacho:
     missing: FloatArray
     double: FloatArray
     level: float
-    hysteresis: float
     jitter_deg: float
     offset_s: float
     warnings: tuple[str, ...]
@@ -188,7 +187,6 @@ def read_tacho(channel: Channel, rate: float, settings: TachoSettings) -> Tacho:
         missing=lost / pulses - begin,
         double=double,
         level=level,
-        hysteresis=band,
         jitter_deg=360 * jitter,
         offset_s=float(np.hypot(unseen, np.sqrt(fit.worn / len(times)) / np.median(speed))),
         warnings=tuple(words),

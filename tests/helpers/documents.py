@@ -117,4 +117,4 @@ def _check_names(ax, unitless):
 
 
 def _has_unit(name, unitless):
-    return ", " in name or name in unitless or bool(re.search(r"[%°]", name))
+    return bool(re.search(r",\s", name)) or name in unitless or bool(re.search(r"[%°]", name))

@@ -20,6 +20,7 @@ COMMANDS = {
     "balance holes": "balance turbo_job/holes.toml --split",
     "balance left in": "balance left_in/job.toml",
     "balance limited": "balance turbo_job/job.toml --max-mass 430g_mm --limit 1",
+    "balance in part": "balance rk4/job.toml",
     "split": "split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2",
     "split two": "split 35g@120 --two 20g,30g",
     "split drill": "split 3g@120 --drill 8mm --radius 100mm",
@@ -27,7 +28,16 @@ COMMANDS = {
     "tolerance": "tolerance --mass 500kg --speed 3000rpm --grade G2.5 --planes left=100mm,right=600mm "
     "--bearings 0mm,700mm --centre 320mm",
     "unbalance": "unbalance model_job/job.toml --stations 6,12,19",
-    "vectors": "vectors waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm",
+    "vectors": "vectors waveforms/run_up.wav --tacho 1 --unit um --phase lag",
+    "vectors two": "vectors waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm",
+    "vectors runs": "vectors waveforms/waveforms.toml --orders 1,2",
+    "bearings": "bearings motion/rotor.toml --speeds 1000:9000:500rpm",
+    "bearings unloaded": "bearings motion/damper.toml --speeds 1000:3000:500rpm",
+    "motion": "motion motion/rotor.toml --speed 4000rpm --time 0.02s --rate 500 --sensors 2,5,8,12,15,18,22",
+    "motion orbits": "motion motion/unbalanced.toml --speed 3000rpm --time 0.1s --view orbits",
+    "motion bode": "motion motion/unbalanced.toml --run-up 600:6200rpm --time 2s --view bode",
+    "periodic": "periodic motion/damper.toml --speeds 1000:5000rpm",
+    "modes": "modes modes/amplitudes.csv --excitation force --bands 24:28",
     "runup": "runup waveforms/run_up.wav --tacho 1 --unit um --phase lag",
     "critical": "critical rotor23.csv -n 3",
     "critical map": "critical compressor/rotor.toml -n 3 --map",
@@ -40,6 +50,7 @@ COMMANDS = {
     "--sensors probe_DE:45,probe_NDE:45 --speeds 4000:6000:1000rpm",
     "reduce": "reduce rotor23.csv --nodes 7,12,18 --modes 2",
     "reduce rank": "reduce rotor23.csv --place compromise",
+    "campbell rk4": "campbell rk4/calibrated.toml --speeds 200:6000:100rpm",
     "identify": "identify identify/task_5_1/model.toml identify/task_5_1/data.csv --errors 2,1",
     "fit": "fit fit/run_down/model.toml fit/run_down/record.csv",
 }
@@ -70,7 +81,7 @@ def figures_of(name):
     made = outcome_of(COMMANDS[name])
     figures = {caption or "picture": draw() for caption, draw in made.pictures.items()}
     if name.startswith("balance"):
-        figures["readings"] = residual_figure(made.result, made.mounted, made.check)
+        figures["readings"] = residual_figure(made.result, made.mounted, made.check, made.left)
         for plane in made.result.planes:
             for where, zero in (("right", 1.0), ("top", 1j)):
                 figure = figures[f"plane {plane}, 0° {where}"] = new_figure(3.1, 3.4)

@@ -67,7 +67,7 @@ def whirl(criticals=()):
 
 
 def test_a_campbell_diagram_tells_directions_apart_without_colour():
-    figure = campbell_figure(whirl([(380.95, 0.3), (421.05, 0.19)]), operating=(600, 700))
+    figure = campbell_figure(whirl([(380.95, 0.3), (421.05, 0.19), (800, 2.0)]), operating=(600, 700))
     above, below = figure.axes[:2]
     lines = above.get_lines()
     looks = [(line.get_linestyle(), line.get_marker(), line.get_fillstyle()) for line in lines[:4]]
@@ -76,10 +76,12 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     ]  # fmt: skip
     np.testing.assert_allclose(lines[0].get_ydata(), RPM * whirl().frequencies[:, 0])
     np.testing.assert_allclose(np.diff(lines[4].get_data(), axis=0), 0.0)
-    marks = next(line for line in lines if line.get_linestyle() == "None")
+    marks, hollow = [line for line in lines if line.get_linestyle() == "None"]
     np.testing.assert_allclose(marks.get_xdata(), RPM * np.array([380.95, 421.05]))
+    assert (hollow.get_markerfacecolor(), *hollow.get_xdata()) == ("none", RPM * 800)
     words = sorted((text for text in above.texts if "δ" in text.get_text()), key=lambda text: text.xy)
-    assert [text.get_text() for text in words] == ["3638 rpm, δ = 0.30", "4021 rpm, δ = 0.19"]
+    texts = [text.get_text() for text in words]
+    assert texts == ["3638 rpm, δ = 0.30", "4021 rpm, δ = 0.19", "7639 rpm, δ = 2.00"]
     np.testing.assert_allclose(below.get_lines()[1].get_ydata(), whirl().log_decrements[:, 1])
     assert below.get_ylim()[0] < -0.1
     for ax in (above, below):

@@ -34,7 +34,7 @@ def test_corrections_before_and_after_have_one_legend_and_units_in_words(turbo):
     found, figure = turbo
     check_hygiene(figure)
     *_, before, closer = figure.axes
-    assert before.get_ylabel() == "vibration, µm pp"
+    assert before.get_ylabel() == "vibration,\nµm pp"
     # linear: what is left needs a scale of its own, and has it
     for ax in (before, closer):
         assert ax.get_yscale() == "linear"
@@ -53,18 +53,22 @@ def test_corrections_before_and_after_have_one_legend_and_units_in_words(turbo):
         assert band.max() < ax.get_ylim()[1], "the whole band is in the picture"
 
 
-def test_a_checked_job_draws_what_was_mounted_and_achieved(checked):
+def test_a_checked_job_draws_what_is_mounted_the_trim_and_what_it_leaves(checked):
     found, figure = checked
     check_hygiene(figure)
-    circles = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
-    places = [line.get_xydata()[0] for line in circles if len(line.get_xdata())]
-    drawn = [size * np.exp(1j * angle) for angle, size in places]
-    assert drawn == pytest.approx(found.check.weights[-1] * found.result.labels.weight_scale)
-    check = found.check
-    for ax in figure.axes[1:]:
-        stars = named(ax, "achieved")
-        dots = named(ax, "predicted, with 95 % of a check run")
-        assert stars.get_marker() == "*"
-        assert stars.get_ydata() == pytest.approx(np.abs(check.achieved).ravel() * 2e6)
-        assert dots.get_ydata() == pytest.approx(np.abs(check.predicted).ravel() * 2e6)
-        assert (stars.get_xdata() - dots.get_xdata()).min() > 0.3, "one does not hide the other"
+    left, scale = found.left, found.result.labels.weight_scale
+    for polar, weights in zip(figure.axes, (left.there, left.trim), strict=False):
+        ends = [line.get_xydata()[-1] for line in polar.lines if line.get_linewidth() == 2]
+        assert [size * np.exp(1j * angle) for angle, size in ends] == pytest.approx(weights * scale)
+    shown = {
+        "predicted, with 95 % of a check run": found.check.predicted[-1],
+        "achieved": found.check.achieved[-1],
+        "predicted with the trim, with 95 %": left.after,
+    }
+    for ax in figure.axes[2:]:
+        marks = [named(ax, label) for label in shown]
+        for line, vectors in zip(marks, shown.values(), strict=True):
+            assert line.get_ydata() == pytest.approx(np.abs(vectors).ravel() * 2e6)
+        assert np.diff([line.get_xdata() for line in marks], axis=0).min() > 0.25, "one hides another"
+    again = left.correction.influence
+    assert left.after == pytest.approx(again.baseline + again.W @ (left.there + left.trim))
