@@ -46,7 +46,8 @@ from balancing.trials import Limits, Placement, ReadingErrors, RunScatter, Trial
 from balancing.trim import LeftToDo, after_check_run
 from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
-from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
+from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction, verdict_of_readings
+from balancing.what_if import WhatIf, what_if
 
 __all__ = [
     "GRADES",
@@ -79,6 +80,7 @@ __all__ = [
     "Unbalance",
     "UndeterminedError",
     "Verdict",
+    "WhatIf",
     "after_check_run",
     "change_of_run",
     "check_runs",
@@ -110,6 +112,8 @@ __all__ = [
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",
+    "verdict_of_readings",
+    "what_if",
     "with_check_runs",
     "with_parameters",
 ]

@@ -340,6 +340,13 @@ def verdict_of_check(
     return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 
+def verdict_of_readings(
+    of: Influence, readings: ComplexArray, covariance: FloatArray, limits: Limits
+) -> Verdict:
+    """Judge predicted readings (S, C) of covariance (S, C, 2, 2), in the order of the coefficients."""
+    return _verdict(_readings(of, readings, covariance, limits.residual), "prediction", of.labels)
+
+
 def _readings(
     of: Influence, readings: ComplexArray, covariance: FloatArray, limit: FloatArray
 ) -> list[Judgement]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.answer import LINES, Answer, together
+from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
 from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
@@ -59,8 +60,11 @@ class Balance(Outcome):
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
+        from balancing import Correction
         from rotorid.report.balance import balance_report
 
+        if not isinstance(self.result, Correction):
+            return super().sheet()
         made = self.result, self.mounted, self.check, self.left, self.verdict
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
@@ -93,6 +97,8 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
+    if options.weights is not None:
+        return _what_if(read, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -161,6 +167,32 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     return outcome
 
 
+def _what_if(job: Job, options: BalanceOptions) -> Balance:
+    """What given weights would leave."""
+    from rotorid.commands.what_if import predicted
+
+    result, verdict, of_type = predicted(job, options)
+    verdicts = {} if verdict is None else {"verdict": verdict.to_dict()}
+    plain = outcome_of(
+        result,
+        provenance(job.files if of_type is None else of_type.files, options),
+        answer=together([result.answer, *([verdict.answer] if verdict else [])]),
+        keys=lambda: result.to_dict() | verdicts,
+        file=Table("weights", result.columns()),
+        title="What these weights would leave",
+    )
+    return Balance(
+        **vars(plain),
+        influence=result.influence,
+        job=job,
+        mounted=None,
+        check=None,
+        left=None,
+        verdict=verdict,
+        of_type=of_type,
+    )
+
+
 def _check(options: BalanceOptions) -> None:
     """Refuse options that are not known or do not go together, before anything is read."""
     check_choices(options, choices())
@@ -201,11 +233,13 @@ def _answer(
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
         elif not (job.check_mounted or job.check_of_weights):
             first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
+        first += result.decision.elsewhere
         tables = [_behind(part.answer) for part in (mounted, result) if part]
         every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
         return replace(every, judgement=" ".join(first))
     if mounted:
-        weights = replace(_behind(weights), judgement="" if sound else weights.judgement)
+        elsewhere = "\n".join(result.decision.elsewhere)
+        weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
     judged = [*limits, *([mounted.answer] if mounted else [])]
     return together([*judged, weights] if sound else [weights, *judged])
 

@@ -32,7 +32,11 @@ Weights = Amount | Mapping[str, Amount]
 """One of all planes, or by plane, in SI as the weights of the job are: kg or kg·m."""
 Amplitudes = str | Sequence[str] | Mapping[str, Amount]
 """`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
+Mounted = str | Sequence[str] | Mapping[str, str | complex]
+"""As `mounted_weights` reads them, or kg or kg·m by plane."""
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
+_AND = re.compile(r"(?<![0-9.][eE])\+(?=\s*[0-9.])")
+_PLACED = re.compile(r"(.+?)\s*(?:@\s*(?P<angle>[^@#]+?)\s*[°º]?|#\s*(?P<hole>.+?))")
 
 
 def read_with_unit(text: str, what: str, unit: UnitReader, example: str) -> tuple[float, Unit]:
@@ -167,6 +171,47 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
     turned = [radians(degrees(tail.removesuffix("°"), what)) for *_, tail in parts]
     sizes = [unit.to_si(value) for value, unit in each]
     return labels, [complex(labels.weight_from(*one)) for one in zip(sizes, turned, strict=True)]
+
+
+def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[str, complex]:
+    """Read "left=5g@120; right=10g#3+4@90": at angles as the job counts them, or in its holes.
+
+    Without a unit in that of the job's weights. Where material is removed it is the place to remove it from.
+
+    Raises
+    ------
+    ValueError
+        Naming the option and what is wrong with it.
+    """
+    labels, example = job.trials.labels, "left=5g@120; right=10g#3"
+
+    def one(plane: str, text: str) -> complex:
+        match, sign = _PLACED.fullmatch(text.strip()), -1.0 if job.planes[plane].remove else 1.0
+        if match is None:
+            raise ValueError(f"{what} {text.strip()!r}: a weight at an angle or in a hole, such as {example}")
+        value, unit = read_with_unit(
+            match[1], what, lambda word: units.weight(word or labels.weight_unit), example
+        )
+        size = units.in_job_units(Quantity(what, value, unit), labels.weight_unit, job.planes[plane].radius)
+        if size is None or value < 0:
+            raise ValueError(
+                f"{what} {text.strip()!r}: a weight of 0 or more in {labels.weight_in}, or in what converts "
+                f"to that with radius_mm in [planes.{plane}]"
+            )
+        if match["hole"] is None:
+            at = degrees(match["angle"], what)
+        elif holes := job.conventions.holes.get(plane):
+            at = holes[one_of(match["hole"], f"{what} {plane}", tuple(holes))]
+        else:
+            raise ValueError(f"{what} {text.strip()!r}: [planes.{plane}] of the job has no holes")
+        return sign * complex(labels.weight_from(size[0], radians(at)))
+
+    def read(plane: str, text: str) -> complex:
+        one_of(plane, what, tuple(job.planes))
+        return sum((one(plane, part) for part in _AND.split(text)), 0j)
+
+    several = given.split(";" if ";" in given else ",") if isinstance(given, str) else given
+    return pairs(several, what, read, example)
 
 
 def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -> dict[str, Quantity]:
