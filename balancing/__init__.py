@@ -48,6 +48,7 @@ from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
 from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction, verdict_of_readings
 from balancing.what_if import WhatIf, what_if
+from balancing.zones import Zones, zones_of
 
 __all__ = [
     "GRADES",
@@ -81,6 +82,7 @@ __all__ = [
     "UndeterminedError",
     "Verdict",
     "WhatIf",
+    "Zones",
     "after_check_run",
     "change_of_run",
     "check_runs",
@@ -116,6 +118,7 @@ __all__ = [
     "what_if",
     "with_check_runs",
     "with_parameters",
+    "zones_of",
 ]
 
 

@@ -105,11 +105,12 @@ class WhatIf(Outlook, Answered):
         few = self.before.size <= FEW
         return Answer(
             "\n".join((first, *self.worse)),
-            f"{on}\n\n{table if few else f'Largest{largest}'}",
+            f"{on}\n{table if few else f'Largest{largest}'}",
             remarks.warnings,
             remarks.notes,
             () if few else (table,),
             "every reading",
+            to_mount=True,
         )
 
     def columns(self) -> tuple[Column, ...]:

@@ -29,7 +29,7 @@ from rotorid.report.outcome import Outcome, command, outcome_of, provenance, tab
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
+    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict, Zones
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
@@ -45,9 +45,9 @@ class Balance(Outcome):
     ----------
     influence, job
         What it is made of.
-    mounted, check, left, verdict, of_type
+    mounted, check, left, verdict, of_type, zones
         Pieces in holes, check runs beside their prediction, what is left to do after them, what limits and
-        tolerances say, where the coefficients are those of a type; None where there is nothing.
+        tolerances say, where the coefficients are those of a type, zones; None where there is nothing.
     """
 
     influence: Influence
@@ -57,6 +57,7 @@ class Balance(Outcome):
     left: LeftToDo | None
     verdict: Verdict | None
     of_type: TypeKnowledge | None
+    zones: Zones | None = None
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -65,7 +66,7 @@ class Balance(Outcome):
 
         if not isinstance(self.result, Correction):
             return super().sheet()
-        made = self.result, self.mounted, self.check, self.left, self.verdict
+        made = self.result, self.mounted, self.check, self.left, self.verdict, self.zones
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
 
@@ -92,7 +93,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
-    from balancing import compare_check, mount
+    from balancing import compare_check, mount, zones_of
 
     options = options or BalanceOptions()
     _check(options)
@@ -121,9 +122,18 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
+    after = None if mounted is None else mounted.after
+    zones = zones_of(result, read.zones, after, read.check) if read.zones else None
     of_type = solved.of_type
     made = provenance(read.files if of_type is None else of_type.files, options)
-    beside = {"mounting": mounted, "check": check, "left_to_do": left, "verdict": verdict, "of_type": of_type}
+    beside = {
+        "mounting": mounted,
+        "check": check,
+        "left_to_do": left,
+        "verdict": verdict,
+        "of_type": of_type,
+        "zones": zones,
+    }
     pieces = mounted if left is None else left.pieces
 
     def workbook(_: Path) -> Written:
@@ -146,7 +156,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     plain = outcome_of(
         result,
         made,
-        answer=_answer(result, mounted, check, left, verdict, read, influence),
+        answer=_answer(result, mounted, check, left, verdict, read, influence, zones),
         keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
@@ -163,21 +173,24 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         left=left,
         verdict=verdict,
         of_type=of_type,
+        zones=zones,
     )
     return outcome
 
 
 def _what_if(job: Job, options: BalanceOptions) -> Balance:
     """What given weights would leave."""
+    from balancing import zones_of
     from rotorid.commands.what_if import predicted
 
     result, verdict, of_type = predicted(job, options)
-    verdicts = {} if verdict is None else {"verdict": verdict.to_dict()}
+    zones = zones_of(result, job.zones) if job.zones else None
+    beside = {key: part for key, part in (("verdict", verdict), ("zones", zones)) if part}
     plain = outcome_of(
         result,
         provenance(job.files if of_type is None else of_type.files, options),
-        answer=together([result.answer, *([verdict.answer] if verdict else [])]),
-        keys=lambda: result.to_dict() | verdicts,
+        answer=together([result.answer, *(part.answer for part in beside.values())]),
+        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items()},
         file=Table("weights", result.columns()),
         title="What these weights would leave",
     )
@@ -190,6 +203,7 @@ def _what_if(job: Job, options: BalanceOptions) -> Balance:
         left=None,
         verdict=verdict,
         of_type=of_type,
+        zones=zones,
     )
 
 
@@ -216,6 +230,7 @@ def _answer(
     verdict: Verdict | None,
     job: Job,
     influence: Influence,
+    zones: Zones | None,
 ) -> Answer:
     """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
     from rotorid.commands.one_shot import NEEDS_TRIAL, needs_trial_run
@@ -223,7 +238,7 @@ def _answer(
     weights, sound = result.answer, result.sound
     if needs_trial_run(job, influence):
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-    limits = [] if verdict is None else [verdict.answer]
+    limits, zone = ([] if part is None else [part.answer] for part in (verdict, zones))
     if left is not None:  # the weights of the bare rotor are tables
         first = [one.judgement for one in (left.answer, *limits)]
         if check is not None:
@@ -233,15 +248,15 @@ def _answer(
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
         elif not (job.check_mounted or job.check_of_weights):
             first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
-        first += result.decision.elsewhere
+        first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
         tables = [_behind(part.answer) for part in (mounted, result) if part]
-        every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
+        every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
         return replace(every, judgement=" ".join(first))
     if mounted:
         elsewhere = "\n".join(result.decision.elsewhere)
         weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
     judged = [*limits, *([mounted.answer] if mounted else [])]
-    return together([*judged, weights] if sound else [weights, *judged])
+    return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
 
 
 def _behind(answer: Answer) -> Answer:

@@ -32,7 +32,7 @@ Weights = Amount | Mapping[str, Amount]
 """One of all planes, or by plane, in SI as the weights of the job are: kg or kg·m."""
 Amplitudes = str | Sequence[str] | Mapping[str, Amount]
 """`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
-Mounted = str | Sequence[str] | Mapping[str, str | complex]
+Mounted = str | Sequence[str] | Mapping[str, complex]
 """As `mounted_weights` reads them, or kg or kg·m by plane."""
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
 _AND = re.compile(r"(?<![0-9.][eE])\+(?=\s*[0-9.])")

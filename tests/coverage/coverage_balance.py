@@ -41,11 +41,12 @@ TIMES = (0.5, 1.0, 1.5, 2.5)
 
 
 class Job(NamedTuple):
-    """Runs, the truth (P,), and how many real readings the runs have more than unknowns."""
+    """Runs, the truth (P,), how many real readings the runs have more than unknowns, true coefficients."""
 
     trials: Trials
     D: ComplexArray
     redundant: int
+    W: ComplexArray
 
 
 class Outcome(NamedTuple):
@@ -117,7 +118,7 @@ def draw(
         errors=ReadingErrors(reading / told, reading / told) if stated else None,
         run_errors=scatter if between else None,
     )
-    return Job(trials, D, 2 * (S * C * (spare + 1) - P))
+    return Job(trials, D, 2 * (S * C * (spare + 1) - P), W)
 
 
 def outcome(job: Job, method: str | None = None) -> Outcome:
