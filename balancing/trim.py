@@ -133,6 +133,7 @@ def after_check_run(
     now, before = rms(check.mean[-1]), rms(c.before[pick] if bare is None else bare)
     trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
+    present = f"rms {three_figures(now * scale)} {unit}".rstrip()
     change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
     change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
     left = after if bound is None or judged == "fail" else bound
@@ -151,7 +152,9 @@ def after_check_run(
         why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
         why += f"; {stop or 'check what was mounted, and where'}"
     elif settled and _within_its_error(c):
-        word, why = "done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})"
+        word = "done"
+        why = "a trim would be within its own error"
+        why += f", but would reach {change}: {_in_words(c, planes, trim)}" if worth else f" ({present})"
     elif settled and not worth:
         word = "done"
     elif blocked or (worth and c.decision.word == "do not mount" and pieces is None):
@@ -167,6 +170,16 @@ def after_check_run(
         there,
         trim if word == "trim" else 0 * trim,
         pieces if word == "trim" else None,
+    )
+
+
+def _in_words(c: Correction, planes: tuple[str, ...], trim: ComplexArray) -> str:
+    """What would be added to each plane, or taken away from it."""
+    each = zip(planes, trim, c.places(planes, trim), strict=True)
+    return ", ".join(
+        f"{plane} {'less ' * (plane in c.remove)}{c.labels.weight_words(abs(w))} at {at:.0f}°"
+        for plane, w, at in each
+        if w
     )
 
 
