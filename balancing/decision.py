@@ -196,7 +196,9 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         cause = result.combination or unclear.removesuffix(REMEDY)
         if cause and some:
             made = replace(made, word="determined in part", cause=cause, instead=remedies(case))
-        elsewhere = _elsewhere(result, case)
+        chosen = [case.today.planes.index(plane) for plane in case.names]
+        today = case.today.part(range(len(case.today.speeds)), None, chosen)
+        elsewhere = worse_elsewhere(today, D, result.speeds)
         warnings = (*made.warnings, *(() if elsewhere else _rising(result, case.today, limits)))
         return replace(made, warnings=warnings, notes=coarse(case.today), elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
@@ -331,16 +333,6 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
         f"bow or nonlinearity (the ± allow for it), or larger errors than stated (± up to {ratio:.2g} times "
         "larger)",
     )
-
-
-def _elsewhere(result: Correction, case: Case) -> tuple[str, ...]:
-    """Where the weights make it worse that they were not made for: speeds left out, readings of weight 0."""
-    today, (S, C) = case.today, result.before.shape
-    other, D = np.ones(today.baseline.shape, dtype=bool), np.zeros(len(today.planes), dtype=complex)
-    counts = np.ones(S * C) if case.row_weights is None else case.row_weights
-    other[np.isin(today.speeds, result.speeds)] = counts.reshape(S, C) == 0
-    D[[today.planes.index(plane) for plane in result.planes]] = result.weights
-    return worse_elsewhere(today, D, other)
 
 
 def _rising(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:

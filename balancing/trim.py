@@ -133,7 +133,6 @@ def after_check_run(
     now, before = rms(check.mean[-1]), rms(c.before[pick] if bare is None else bare)
     trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
-    present = f"rms {three_figures(now * scale)} {unit}".rstrip()
     change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
     change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
     left = after if bound is None or judged == "fail" else bound
@@ -153,8 +152,8 @@ def after_check_run(
         why += f"; {stop or 'check what was mounted, and where'}"
     elif settled and _within_its_error(c):
         word = "done"
-        why = "a trim would be within its own error"
-        why += f", but would reach {change}: {_in_words(c, planes, trim)}" if worth else f" ({present})"
+        why = f"a trim would be within its own error ({change})"
+        why += f", and may be worth it: {_in_words(c, planes, trim)}" if worth else ""
     elif settled and not worth:
         word = "done"
     elif blocked or (worth and c.decision.word == "do not mount" and pieces is None):

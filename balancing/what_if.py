@@ -30,7 +30,7 @@ from rotorid.base.tables import Column, records, text
 from rotorid.base.text import capital, figures
 
 if TYPE_CHECKING:
-    from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+    from rotorid.base.arrays import ComplexArray, FloatArray
 
 DRAWS = 400
 BETTER = 0.9
@@ -158,9 +158,7 @@ def what_if(
     D = np.zeros(len(today.planes), dtype=complex)
     if weights:
         D[plane_indices(today, list(weights))] = list(weights.values())
-    used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
-    counts = np.zeros(today.baseline.shape, dtype=bool)
-    counts[used] = True
+    used = range(len(today.speeds)) if speeds is None else match_speeds(speeds, today.speeds)
     part = today.part(used)
     off = check_readings(part, D)
     after, before = part.baseline + part.W @ D, rms(part.baseline)
@@ -172,8 +170,10 @@ def what_if(
         word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
         width = float(half_width(sizes - rms(after)))
     removed = tuple(plane for plane in today.planes if plane in remove)
-    worse = worse_elsewhere(today, D, ~counts)
-    return WhatIf(part, D, _covariance(off), float(bound), width, word, worse, remove=removed)
+    parts, n = real_parts(off[..., None]), len(off)
+    V = np.einsum("nsci,nscj->scij", parts, parts) / n if n else np.full((*after.shape, 2, 2), np.nan)
+    worse = worse_elsewhere(today, D, part.speeds)
+    return WhatIf(part, D, V, float(bound), width, word, worse, remove=removed)
 
 
 def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
@@ -184,32 +184,31 @@ def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
     return np.concatenate([np.zeros((0, *after.shape), dtype=complex), *off])
 
 
-def worse_elsewhere(today: Influence, weights: ComplexArray, other: BoolArray) -> tuple[str, ...]:
-    """Readings that weights (P,) were not made for, and clearly make worse: a sentence, or none.
+def worse_elsewhere(today: Influence, weights: ComplexArray, used: FloatArray) -> tuple[str, ...]:
+    """A sentence about what weights clearly make worse at a speed they were not made for, or none.
 
     Parameters
     ----------
     today
-        At all speeds and sensors, with the vibration of the bare rotor.
+        At all speeds, with the vibration of the bare rotor.
     weights
-        On the bare rotor.
-    other
-        Which readings (S, C) they were not made for.
+        On the bare rotor, (P,).
+    used
+        Speeds that they were made for, rad/s.
     """
-    N = np.count_nonzero(other)
+    other = ~np.isin(today.speeds, used)
+    N = np.count_nonzero(other) * len(today.sensors)
     if not (N and weights.any() and today.known_errors):
         return ()
+    changes = np.append(1, 0 * weights), np.append(1, weights)
     old, new = np.abs(today.baseline), np.abs(today.baseline + today.W @ weights)
-    each = [np.stack((Y, Y + W @ weights)) for Y, W in today.draws(DRAWS)]
-    off = (
-        np.concatenate(each, axis=1) - np.stack((today.baseline, today.baseline + today.W @ weights))[:, None]
-    )
-    before, after = reach(np.array([_covariance(one) for one in off]))
+    noises = (today.errors.noise.changed(change[None]) for change in changes)
+    before, after = (reach(noise.covariance(today.errors.sizes)) for noise in noises)
     of_all = np.sqrt(np.log((1 - LEVEL) / N) / np.log(1 - LEVEL))
-    rises = other & (new - of_all * after > old + of_all * before) & (new - old > RISES * old.max())
-    if not rises.any():
+    rise = np.where(other[:, None] & (new - old > of_all * (before + after)), new - old, 0.0)
+    s, c = divmod(int(np.argmax(rise)), len(today.sensors))
+    if rise[s, c] <= RISES * old.max():
         return ()
-    s, c = divmod(int(np.argmax(np.where(rises, new - old, 0.0))), new.shape[1])
     labels, scale = today.labels, today.labels.vibration_scale
     low, high = three_figures(old[s, c] * scale), three_figures(new[s, c] * scale)
     change = f"{low} → {high} ± {figures(after[s, c] * scale, 2)} {labels.vibration_in}".rstrip()
@@ -217,11 +216,3 @@ def worse_elsewhere(today: Influence, weights: ComplexArray, other: BoolArray) -
         f"But at {labels.speed_words(today.speeds[s])} these weights, which were not made for that, make it "
         f"worse: {today.sensors[c]} {change}.",
     )
-
-
-def _covariance(errors: ComplexArray) -> FloatArray:
-    """Mean square (…, 2, 2) of drawn errors (n, …); NaN for n = 0."""
-    parts = real_parts(errors[..., None])
-    if not len(parts):
-        return np.full((*parts.shape[1:], 2), np.nan)
-    return np.asarray(np.einsum("n...i,n...j->...ij", parts, parts) / len(parts))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.influence import SPEED_TOLERANCE
 from balancing.tables import reading_columns
 from balancing.verdict import largest
 from rotorid.base.answer import Answer, Answered
@@ -24,49 +23,45 @@ if TYPE_CHECKING:
     from balancing.trials import Trials
     from rotorid.base.arrays import ComplexArray, FloatArray
 
-ZONES = "ABCD"
+ZONES = np.array([*"ABCD"])
+HEADS = ("now", "predicted", "predicted_95", "check")
 
 
 @dataclass(frozen=True, eq=False)
 class Zones(Answered):
-    """Zone of each of N readings that has boundaries.
+    """Zone of each reading that has boundaries.
 
     Attributes
     ----------
     places
         Columns speed and sensor.
-    now, predicted, bound, check
-        Letters, (N,): of the bare rotor; of the prediction, and of the largest amplitude in its 95 % region,
-        "" where errors are unknown; of the last check run, "" where it has no such reading.
+    letters
+        Of the bare rotor ("now"), "predicted", of the largest amplitude in the 95 % region of that
+        ("predicted_95") and in the last "check" run; "" where that is not known.
     """
 
     places: tuple[Column, ...]
-    now: tuple[str, ...]
-    predicted: tuple[str, ...]
-    bound: tuple[str, ...]
-    check: tuple[str, ...]
+    letters: Mapping[str, tuple[str, ...]]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the worst of all readings, and each."""
-        columns = self._columns()
-        worst = {column.heading: max(column.values) or None for column in columns[2:]}
-        return {"worst": worst, "readings": records(columns)}
+        worst = {name: max(each) or None for name, each in self.letters.items()}
+        return {"worst": worst, "readings": records(self._columns())}
 
     @property
     def answer(self) -> Answer:
         """The worst zone now and then, in a sentence; then that of each reading."""
-        now, predicted, bound, check = map(max, (self.now, self.predicted, self.bound, self.check))
-        words = [f"{now} now", f"{predicted} predicted" + (f" (95 %: {bound})" if bound > predicted else "")]
-        words += [f"{check} in the check run"] if check else []
+        now, predicted, bound, check = map(max, self.letters.values())
+        words = f"{now} now, {predicted} predicted" + (f" (95 %: {bound})" if bound > predicted else "")
+        words += f", {check} in the check run" if check else ""
         return Answer(
-            f"Zone {', '.join(words)}: the worst of {counted(len(self.now), 'reading')}, at 1× alone.",
+            f"Zone {words}: the worst of {counted(len(self.letters['now']), 'reading')}, at 1× alone.",
             tables=(f"Zones:\n{text(self._columns(), left=2)}",),
             more="zones",
         )
 
     def _columns(self) -> tuple[Column, ...]:
-        each = {"now": self.now, "predicted": self.predicted, "predicted_95": self.bound, "check": self.check}
-        return (*self.places, *(Column(name, letters) for name, letters in each.items() if any(letters)))
+        return (*self.places, *(Column(name, each) for name, each in self.letters.items() if any(each)))
 
 
 def zones_of(
@@ -86,28 +81,23 @@ def zones_of(
     after
         Predicted readings (S, C) in place of those of the outlook, as with pieces.
     check
-        Check runs, of which the last counts.
+        Check runs at speeds of the outlook, of which the last counts.
     """
-    predicted = outlook.after if after is None else after
-    most = (
-        largest(predicted, outlook.after_covariance)
-        if outlook.errors_known
-        else np.full(predicted.shape, np.nan)
-    )
-    read = np.full(predicted.shape, np.nan)
-    if check is not None:
-        for speed, each in zip(check.speeds, check.mean[-1], strict=True):
-            same = np.abs(outlook.speeds - speed) <= SPEED_TOLERANCE * outlook.speeds
-            for name, reading in zip(check.sensors, each, strict=True):
-                read[np.ix_(same, [sensor == name for sensor in outlook.sensors])] = abs(reading)
-    judged = [name in boundaries for name in outlook.sensors]
+    predicted, most = outlook.after if after is None else after, np.full(outlook.before.shape, np.nan)
+    if outlook.errors_known:
+        most = largest(predicted, outlook.after_covariance)
+    read = np.full(most.shape, np.nan)
+    for speed, readings in () if check is None else zip(check.speeds, np.abs(check.mean[-1]), strict=True):
+        for name, size in zip(check.sensors, readings, strict=True) if check else ():
+            read[np.ix_(outlook.speeds == speed, np.array(outlook.sensors) == name)] = size
     names = [name for name in outlook.sensors if name in boundaries]
     limits = np.array([boundaries[name] for name in names])
 
     def letters(readings: ComplexArray | FloatArray) -> tuple[str, ...]:
-        sizes = np.abs(readings[:, judged])
+        sizes = np.abs(readings[:, [outlook.sensors.index(name) for name in names]])
         above = np.count_nonzero(sizes[..., None] > limits, axis=-1)
-        return tuple(np.where(np.isnan(sizes), "", np.array([*ZONES])[above]).ravel().tolist())
+        return tuple(np.where(np.isnan(sizes), "", ZONES[above]).ravel().tolist())
 
+    each = zip(HEADS, (outlook.before, predicted, most, read), strict=True)
     places = reading_columns(outlook.labels, outlook.speeds, names)
-    return Zones(places, *map(letters, (outlook.before, predicted, most, read)))
+    return Zones(places, {head: letters(readings) for head, readings in each})

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.answer import LINES, Answer, together
-from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
 from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
@@ -52,11 +51,11 @@ class Balance(Outcome):
 
     influence: Influence
     job: Job
-    mounted: Mounted | None
-    check: CheckComparison | None
-    left: LeftToDo | None
-    verdict: Verdict | None
-    of_type: TypeKnowledge | None
+    mounted: Mounted | None = None
+    check: CheckComparison | None = None
+    left: LeftToDo | None = None
+    verdict: Verdict | None = None
+    of_type: TypeKnowledge | None = None
     zones: Zones | None = None
 
     def sheet(self) -> bytes:
@@ -99,7 +98,9 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     _check(options)
     read, files, again = job_of(job, options)
     if options.weights is not None:
-        return _what_if(read, options)
+        from rotorid.commands.what_if import predicted
+
+        return Balance(**predicted(read, options))
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -176,35 +177,6 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         zones=zones,
     )
     return outcome
-
-
-def _what_if(job: Job, options: BalanceOptions) -> Balance:
-    """What given weights would leave."""
-    from balancing import zones_of
-    from rotorid.commands.what_if import predicted
-
-    result, verdict, of_type = predicted(job, options)
-    zones = zones_of(result, job.zones) if job.zones else None
-    beside = {key: part for key, part in (("verdict", verdict), ("zones", zones)) if part}
-    plain = outcome_of(
-        result,
-        provenance(job.files if of_type is None else of_type.files, options),
-        answer=together([result.answer, *(part.answer for part in beside.values())]),
-        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items()},
-        file=Table("weights", result.columns()),
-        title="What these weights would leave",
-    )
-    return Balance(
-        **vars(plain),
-        influence=result.influence,
-        job=job,
-        mounted=None,
-        check=None,
-        left=None,
-        verdict=verdict,
-        of_type=of_type,
-        zones=zones,
-    )
 
 
 def _check(options: BalanceOptions) -> None:

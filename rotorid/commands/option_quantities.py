@@ -36,7 +36,7 @@ Mounted = str | Sequence[str] | Mapping[str, complex]
 """As `mounted_weights` reads them, or kg or kg·m by plane."""
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
 _AND = re.compile(r"(?<![0-9.][eE])\+(?=\s*[0-9.])")
-_PLACED = re.compile(r"(.+?)\s*(?:@\s*(?P<angle>[^@#]+?)\s*[°º]?|#\s*(?P<hole>.+?))")
+_PLACED = re.compile(r"([^@#]+?)\s*([@#])\s*([^@#]+?)\s*[°º]?")
 
 
 def read_with_unit(text: str, what: str, unit: UnitReader, example: str) -> tuple[float, Unit]:
@@ -127,8 +127,8 @@ def weight(
     converted = units.in_job_units(Quantity(what, *amount), unit, radius)
     if converted is None:
         raise ValueError(
-            f"{what}: the weight to be split is in {unit}, to which {amount[1].name} converts only with "
-            "--radius"
+            f"{what}: weights are in {unit} here, to which {amount[1].name} converts only with a radius, "
+            "--radius or radius_mm of the plane"
         )
     return converted[0]
 
@@ -186,25 +186,18 @@ def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[s
     labels, example = job.trials.labels, "left=5g@120; right=10g#3"
 
     def one(plane: str, text: str) -> complex:
-        match, sign = _PLACED.fullmatch(text.strip()), -1.0 if job.planes[plane].remove else 1.0
+        match, holes = _PLACED.fullmatch(text.strip()), job.conventions.holes.get(plane, {})
         if match is None:
             raise ValueError(f"{what} {text.strip()!r}: a weight at an angle or in a hole, such as {example}")
-        value, unit = read_with_unit(
-            match[1], what, lambda word: units.weight(word or labels.weight_unit), example
-        )
-        size = units.in_job_units(Quantity(what, value, unit), labels.weight_unit, job.planes[plane].radius)
-        if size is None or value < 0:
-            raise ValueError(
-                f"{what} {text.strip()!r}: a weight of 0 or more in {labels.weight_in}, or in what converts "
-                f"to that with radius_mm in [planes.{plane}]"
-            )
-        if match["hole"] is None:
-            at = degrees(match["angle"], what)
-        elif holes := job.conventions.holes.get(plane):
-            at = holes[one_of(match["hole"], f"{what} {plane}", tuple(holes))]
+        size, sign, place = match.groups()
+        size += labels.weight_unit * (not any(map(str.isalpha, size)))
+        mass = weight(size, what, labels, job.planes[plane].radius)
+        if sign == "#":
+            at = holes[one_of(place, f"{what}: hole of {plane}", tuple(holes) or ("none in the job",))]
         else:
-            raise ValueError(f"{what} {text.strip()!r}: [planes.{plane}] of the job has no holes")
-        return sign * complex(labels.weight_from(size[0], radians(at)))
+            at = degrees(place, what)
+        removed = -1 if job.planes[plane].remove else 1
+        return removed * complex(labels.weight_from(mass, radians(at)))
 
     def read(plane: str, text: str) -> complex:
         one_of(plane, what, tuple(job.planes))

@@ -131,14 +131,11 @@ def make_zones(settings: JobSettings, trials: Trials, problems: Problems) -> dic
     """Boundaries of zones of each sensor that has some, as amplitudes of its readings inside."""
     boundaries = dict[str, tuple[float, ...]]()
     for name in trials.sensors:
-        sensor = settings.sensors.get(name)
-        if sensor is not None and sensor.zones is not None:
-            unit = _of_readings(sensor, "zones", sensor.zones, trials.labels, problems)
-            boundaries[name] = tuple(map(unit.to_si, sensor.zones.value))
-        elif settings.zones is not None:
-            stated = settings.zones.boundaries
-            unit = _of_readings(settings.zones, "boundaries", stated, trials.labels, problems)
-            boundaries[name] = tuple(map(unit.to_si, stated.value))
+        each = (settings.sensors.get(name), "zones"), (settings.zones, "boundaries")
+        for part, field in each:
+            if name not in boundaries and part is not None and (stated := getattr(part, field)):
+                unit = _of_readings(part, field, stated, trials.labels, problems)
+                boundaries[name] = tuple(map(unit.to_si, stated.value))
     return boundaries
 
 
