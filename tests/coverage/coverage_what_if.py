@@ -1,17 +1,14 @@
 """Does what is predicted for given weights hold? Drawn jobs whose truth is known, each with a check run.
 
-Run `python tests/coverage/coverage_what_if.py [jobs]`, jobs in all (1000).
+Run `python tests/coverage/coverage_what_if.py [jobs]`, jobs of each source of errors (200).
 The jobs are those of `coverage_balance`. The weights are the true correction, each off by 0.1–1 of its size
 in any direction. The check run has the errors of every other run. Corrections that may make it worse are
 those of the first speed; at the others there is unbalance outside the planes, 0.3–3 times what these hold.
 """
 
-from __future__ import annotations
-
 import sys
-from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
 
 import coverage_balance as balance
 import numpy as np
@@ -19,104 +16,62 @@ import numpy as np
 from balancing import UndeterminedError, correct, estimate_influence, what_if
 from balancing.errors import rms
 
-
-class Outcome(NamedTuple):
-    """Of one job: which readings are within ±, whether the rms is, and below its bound.
-
-    `truly`: whether the word is that of the truth, None for "hardly different".
-    `rises`: whether a correction makes a reading worse at other speeds, by a tenth of the largest and more;
-    whether it says so, and wrongly, of a reading that does not rise. None: it has all speeds.
-    """
-
-    readings: Sequence[bool]
-    width: bool
-    below: bool
-    truly: bool | None
-    rises: tuple[bool, bool, bool] | None
+HEADS = ("readings", "rms", "below", "rises said", "wrongly")
 
 
-def outcome(rng: np.random.Generator, source: str, kind: str) -> Outcome | None:
-    """Predict a check run, and read it; None where coefficients are refused."""
+def check_run(rng, source, kind):
+    """Whether readings are within ±, their rms, and that below its bound, of a check run; as `rises`."""
     errors = balance.ordinary(rng)
     job = balance.draw(rng, source, kind, errors)
-    trials, D, W = job.trials, job.D, job.W
-    try:
-        influence = estimate_influence(trials)
-    except UndeterminedError:
-        return None
-    P = len(D)
-    off = np.exp(rng.uniform(np.log(0.1), 0.0)) * balance.normal(rng, P) / np.sqrt(2)
-    M = D * (1 + off)
-    made = what_if(influence, dict(zip(trials.planes, M, strict=True)))
-    true = W @ (M - D)
-    effect = W * np.sqrt(np.mean(np.abs(D) ** 2))
+    influence = estimate_influence(job.trials)
+    W, D, sizes = job.W, job.D, np.exp(rng.uniform(np.log(0.1), 0.0, 2))
+    weights = D * (1 + sizes[0] * balance.normal(rng, len(D)) / np.sqrt(2))
+    made = what_if(influence, dict(zip(influence.planes, weights, strict=True)))
+    true, effect = W @ (weights - D), W * np.sqrt(np.mean(np.abs(D) ** 2))
     read = true + errors[1] * balance.between_runs(rng, kind, true[None], effect)[0]
-    a, b = errors[0] * rng.standard_normal((2, *read.shape))
-    read = read * (1 + a) * np.exp(1j * b)
-    inside = np.abs(read - made.after) * made.labels.vibration_scale <= made.within
-    size, before = rms(read), rms(W @ D)
-    truly = {"better": rms(true) < before, "worse": rms(true) > before}.get(made.word)
-    return Outcome(
-        inside.ravel().tolist(),
-        bool(abs(size - rms(made.after)) <= made.rms_within),
-        bool(size <= made.check_rms),
-        truly,
-        rises(rng, job),
+    along, across = errors[0] * rng.standard_normal((2, *read.shape))
+    read = read * (1 + along) * np.exp(1j * across)
+    within = np.abs(read - made.after) <= made.within / made.labels.vibration_scale
+    off = abs(rms(read) - rms(made.after)) <= made.rms_within
+    return within.ravel(), [off], [rms(read) <= made.check_rms], *rises(job, 10 * sizes[1] ** 2 * D, rng)
+
+
+def rises(job, scale, rng):
+    """Of a correction of the first speed: whether it is said to make another worse where it does; wrongly."""
+    trials, W, D = job.trials, job.W, job.D
+    if len(W) < 2 or W.shape[1] < len(D):
+        return [], []
+    further = balance.normal(rng, *W.shape[:2]) * 0.3 * rms(W @ scale) * (trials.speeds > 100.0)[:, None]
+    made = correct(
+        estimate_influence(replace(trials, readings=trials.readings + further)), speeds=trials.speeds[:1]
     )
-
-
-def rises(rng: np.random.Generator, job: balance.Job) -> tuple[bool, bool, bool] | None:
-    """As of `Outcome`."""
-    trials, D, W = job.trials, job.D, job.W
-    S, C, P = W.shape
-    if S < 2 or C < P:
-        return None
-    further = balance.normal(rng, S, C) * np.exp(rng.uniform(np.log(0.3), np.log(3.0))) * rms(W @ D)
-    further[0] = 0
-    try:
-        influence = estimate_influence(replace(trials, readings=trials.readings + further))
-        made = correct(influence, speeds=trials.speeds[:1])
-    except UndeterminedError:
-        return None
     old, new = np.abs(further - W @ D), np.abs(further + W @ (made.weights - D))
-    said = " ".join(made.decision.elsewhere)
-    at = [f"at {made.labels.speed_words(speed)} " in said for speed in trials.speeds]
-    named = np.array([[here and f": {name} " in said for name in trials.sensors] for here in at])
-    return bool((new[1:] - old[1:]).max() > 0.1 * old.max()), bool(said), bool((named & (new < old)).any())
+    said = "".join(made.decision.elsewhere)
+    named = [
+        f"at {made.labels.speed_words(v)} " in said and f"worse: {s} " in said
+        for v in trials.speeds
+        for s in trials.sensors
+    ]
+    much = (new - old)[1:].max() > 0.1 * old.max()
+    return [bool(said)] * bool(much), [bool((new < old).ravel()[named].any())]
 
 
-def simulate(jobs: int, source: str, seed: int = 3) -> list[Outcome]:
-    """So many jobs of a source of errors, of all kinds in turn."""
-    rng = np.random.default_rng([seed, balance.SOURCES.index(source)])
-    kinds = [balance.KINDS[k % len(balance.KINDS)] for k in range(jobs)]
-    return [one for kind in kinds if (one := outcome(rng, source, kind)) is not None]
+def simulate(jobs, source):
+    """Of so many jobs, of all kinds of errors in turn, that are not refused: what `check_run` gives."""
+    rng, found = np.random.default_rng([3, balance.SOURCES.index(source)]), []
+    for k in range(jobs):
+        with suppress(UndeterminedError):
+            found.append(check_run(rng, source, balance.KINDS[k % len(balance.KINDS)]))
+    return [np.concatenate(each) for each in zip(*found, strict=True)]
 
 
-def line(name: str, found: Sequence[Outcome]) -> str:
-    """Shares of what holds, per cent."""
-    truly = [one.truly for one in found if one.truly is not None]
-    rising = np.array([one.rises for one in found if one.rises is not None]).T
-    cells = (
-        [inside for one in found for inside in one.readings],
-        [one.width for one in found],
-        [one.below for one in found],
-        truly,
-        rising[1][rising[0]],
-        rising[2],
-    )
-    return f"{name:<24}" + "".join(f"{balance.percent(cell):>10}" for cell in cells) + f"{len(found):8d}"
-
-
-def main(jobs: int = 1000) -> None:
+def main(jobs=200):
     """Print the table."""
-    heads = ("reading ±", "rms ±", "rms below", "word true", "rise seen", "wrongly")
-    print(" " * 24 + "".join(f"{head:>10}" for head in heads) + f"{'jobs':>8}")
-    every: list[Outcome] = []
-    for source in balance.SOURCES:
-        found = simulate(jobs // len(balance.SOURCES), source)
-        every += found
-        print(line(source, found))
-    print(line("all", every))
+    print(" " * 24 + "".join(f"{head:>12}" for head in HEADS))
+    every = {source: simulate(jobs, source) for source in balance.SOURCES}
+    every["all"] = [np.concatenate(each) for each in zip(*every.values(), strict=True)]
+    for name, found in every.items():
+        print(f"{name:<24}" + "".join(f"{balance.percent(each):>12}" for each in found))
 
 
 if __name__ == "__main__":
