@@ -181,8 +181,6 @@ def main(jobs: int = 2500) -> None:
     print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
     each = -(-jobs // (len(SOURCES) * len(KINDS)))
     cells = {(source, kind): simulate(each, source, kind) for source in SOURCES for kind in KINDS}
-    for (source, kind), found in cells.items():
-        print(line(f"{source}: {kind}", found))
     for place, names in enumerate((SOURCES, KINDS)):
         for name in names:
             print(line(f"all: {name}", [one for key in cells if key[place] == name for one in cells[key]]))
