@@ -513,6 +513,7 @@ STORED = (
     "turbo-limit-minmax",
     "turbo-output",
     "turbo-stored",
+    "turbo-weights",
     "type",
     "type-foreign",
     "type-refined",
