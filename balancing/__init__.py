@@ -46,7 +46,9 @@ from balancing.trials import Limits, Placement, ReadingErrors, RunScatter, Trial
 from balancing.trim import LeftToDo, after_check_run
 from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
-from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
+from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction, verdict_of_readings
+from balancing.what_if import WhatIf, what_if
+from balancing.zones import Zones, zones_of
 
 __all__ = [
     "GRADES",
@@ -79,6 +81,8 @@ __all__ = [
     "Unbalance",
     "UndeterminedError",
     "Verdict",
+    "WhatIf",
+    "Zones",
     "after_check_run",
     "change_of_run",
     "check_runs",
@@ -110,8 +114,11 @@ __all__ = [
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",
+    "verdict_of_readings",
+    "what_if",
     "with_check_runs",
     "with_parameters",
+    "zones_of",
 ]
 
 

@@ -78,6 +78,8 @@ class MountDecision:
         Fewer planes, the one with the smallest expected vibration first; those that keep the limits.
     warnings, notes
         What is not determined, what contradicts, what to do; what the user may want to know.
+    elsewhere
+        Where the weights make it worse that they were not made for, in sentences.
     """
 
     word: Literal["mount", "determined in part", "do not mount", "measure again"] = "mount"
@@ -88,6 +90,7 @@ class MountDecision:
     choices: tuple[Choice, ...] = ()
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types, in the job's units."""
@@ -107,6 +110,7 @@ class MountDecision:
                 }
                 for c in self.choices
             ],
+            **({"worse_elsewhere": list(self.elsewhere)} if self.elsewhere else {}),
         }
 
     def lines(self) -> tuple[str, ...]:
@@ -269,6 +273,7 @@ class Correction(Prediction, Answered):
             first += self.decision.lines()
             if self.decision.word == "determined in part":
                 first.insert(len(self.contradictions) + 1, f"With these weights: {self._left()}.")
+                first += self.decision.elsewhere
             return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
@@ -276,7 +281,7 @@ class Correction(Prediction, Answered):
         if self.others:
             ways = {"phase": f"phases {labels.phase}", "angles": f"angles count {labels.angle_words}"}
             what += f", if {' and '.join(ways[name] for name in labels.assumed)} as assumed"
-        return f"{what}: {self._left()}."
+        return "\n".join((f"{what}: {self._left()}.", *self.decision.elsewhere))
 
     @property
     def answer(self) -> Answer:

@@ -26,6 +26,7 @@ import numpy as np
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.tables import reading_names, rms
+from balancing.what_if import worse_elsewhere
 from rotorid.base.text import capital, figures, listing
 from rotorid.regression import solution
 
@@ -195,8 +196,11 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         cause = result.combination or unclear.removesuffix(REMEDY)
         if cause and some:
             made = replace(made, word="determined in part", cause=cause, instead=remedies(case))
-        warnings = (*made.warnings, *_rising(result, case.today, limits))
-        return replace(made, warnings=warnings, notes=coarse(case.today))
+        chosen = [case.today.planes.index(plane) for plane in case.names]
+        today = case.today.part(range(len(case.today.speeds)), None, chosen)
+        elsewhere = worse_elsewhere(today, D, result.speeds)
+        warnings = (*made.warnings, *(() if elsewhere else _rising(result, case.today, limits)))
+        return replace(made, warnings=warnings, notes=coarse(case.today), elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
         f"with the weights, expect rms {case.shown(whole.expected)} rather than {promised}; without them "

@@ -45,6 +45,7 @@ from balancing.conditioning import chance
 from balancing.regions import real_parts
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, turned
+from rotorid.base.text import percent
 from rotorid.regression import gain
 
 Source = Literal[
@@ -466,10 +467,13 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
     if trials.run_errors is None and size < NOTICEABLE:
         return ()
     stated = "" if trials.run_errors is None else ", more than stated"
+    worst = int(np.argmax(left))
+    typed = worst == R - 1 and levels[worst] < levels[0] / 2 and not trials.weights[worst].any()
+    hint = '; a check run goes into a table of its own, check = "check.csv"' if typed else ""
     return (
-        f"the runs disagree by {100 * size:.2g} % of the readings{stated}, most of all in run "
-        f"{trials.runs[int(np.argmax(left))]!r}: the rotor does not repeat itself or is not "
-        "linear, or a row is missing in the weights table",
+        f"the runs disagree by {percent(size)} % of the readings{stated}, most of all in run "
+        f"{trials.runs[worst]!r}: the rotor does not repeat itself or is not linear, or a row is missing in "
+        f"the weights table{hint}",
     )
 
 

@@ -35,7 +35,7 @@ from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
-from rotorid.base.text import RPM, rpm_text
+from rotorid.base.text import RPM, percent, rpm_text
 from rotorid.regression import gain
 
 SPEED_TOLERANCE = 0.005
@@ -270,7 +270,7 @@ class Influence:
         contradictions = self.remarks.contradictions
         if apart > NOTICEABLE:
             words = (
-                f"runs imply vibrations of the bare rotor that differ by {100 * apart:.2g} % of the largest "
+                f"runs imply vibrations of the bare rotor that differ by {percent(apart)} % of the largest "
                 "one"
             )
             if not weights.any():

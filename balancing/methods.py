@@ -353,7 +353,7 @@ class _Errors(NamedTuple):
             state = self.at(D)
             step = solution(state.rows, state.r)
             Q, before = float(state.r @ state.r), Q
-            if Q > before * (1 + 1e-12):
+            if before * (1 + 1e-12) < Q:
                 break
             if np.sum((state.rows @ step) ** 2) <= 1e-16 * (1 + Q):
                 return D
@@ -427,6 +427,17 @@ class _Errors(NamedTuple):
         return Q, D
 
 
+def _explaining_share(chi_square: Callable[[float], float], dof: int) -> float:
+    """At which χ², falling from above, is dof: by secants, since 1/χ² is nearly linear in the share."""
+    before, share = 0.0, chi_square(0.0) / dof - 1
+    for _ in range(50):
+        slope = (1 / chi_square(share) - 1 / chi_square(before)) / (share - before)
+        before, share = share, max(share - (1 / chi_square(share) - 1 / dof) / slope, 0.0)
+        if abs(share - before) <= 1e-8 * share:
+            break
+    return share
+
+
 def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solution:
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
     if not len(start):
@@ -461,13 +472,9 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
         unexplained = not job.explained(D)
     elif unexplained:
         unexplained = chdtrc(dof, wider(0.0).chi_square(D, common, measured=True)) < 1 - UNEXPLAINED
-    if unexplained:  # 1/χ² is nearly linear in the share
-        D, before, share = start, 0.0, chi / dof - 1
-        for _ in range(50):
-            slope = (1 / least(share) - 1 / least(before)) / (share - before)
-            before, share = share, max(share - (1 / least(share) - 1 / dof) / slope, 0.0)
-            if abs(share - before) <= 1e-8 * share:
-                break
+    if unexplained:
+        D = start
+        share = _explaining_share(least, dof)
         D = wider(share).minimum(D)
     wide = wider(share)
     if not within(bounds, D):

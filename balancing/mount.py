@@ -33,6 +33,7 @@ from balancing.tables import (
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
+from balancing.what_if import check_readings
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
@@ -251,10 +252,8 @@ def mount(
 
 def _bound(c: Correction) -> Callable[[ComplexArray], float]:
     """Root mean square that 95 of 100 check runs stay below around a prediction (S, C)."""
-    influence, after = c.influence, c.after
-    each = zip(influence.draws(), influence.further(after, c.weights), strict=False)
-    drawn = [Y + W @ c.weights + more - after for (Y, W), more in each]
-    errors = np.concatenate(drawn) if drawn else np.zeros((1, *after.shape))
+    drawn = check_readings(c.influence, c.weights)
+    errors = drawn if len(drawn) else np.zeros((1, *c.after.shape))
     return lambda left: float(np.quantile(np.sqrt(np.mean(np.abs(left + errors) ** 2, axis=(1, 2))), LEVEL))
 
 

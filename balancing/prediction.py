@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import compress
 from typing import Any
@@ -39,21 +39,14 @@ STATIC = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
-    """Weights to mount, and the vibration they should leave. Its fields: `balancing.Correction`."""
+class Outlook:
+    """Weights, and the vibration they should leave. Its fields: `balancing.Correction`."""
 
     influence: Influence
     weights: ComplexArray
-    draws: ComplexArray
     after_covariance: FloatArray
     check_rms: float
-    mounted: Mounted
-    conditioning: Conditioning
-    fitted: Solution
-    method: str
-    row_weights: FloatArray | None = None
-    limits: Limits | None = None
-    remove: tuple[str, ...] = ()
+    remove: tuple[str, ...] = field(default=(), kw_only=True)
 
     @property
     def speeds(self) -> FloatArray:
@@ -89,6 +82,64 @@ class Prediction:
     def errors_known(self) -> bool:
         """Whether it is known how far a check run may be from its prediction."""
         return bool(np.isfinite(self.check_rms))
+
+    def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
+        """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
+        turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
+        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
+
+    @property
+    def within(self) -> FloatArray:
+        """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""
+        if not self.errors_known:
+            return np.full(self.before.shape, np.nan)
+        return reach(self.after_covariance) * self.labels.vibration_scale
+
+    def vibration_columns(
+        self, rounding: float = INVISIBLE, after: ComplexArray | None = None
+    ) -> tuple[Column, ...]:
+        """Speed, sensor, vibration before and after, one row a reading.
+
+        Parameters
+        ----------
+        rounding
+            Amplitudes after, up to this share of the largest one before, are nothing.
+        after
+            In place of the prediction, (S, C).
+        """
+        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
+        return (
+            *reading_columns(self.labels, self.speeds, self.sensors),
+            *vector_columns(self.labels, "before", self.before),
+            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
+        )
+
+    def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
+        """Weights of planes as JSON types, and where to take material away from some."""
+        columns = self.work_columns(planes, weights)
+        return records(columns if self.remove else columns[:-2])
+
+    def work_columns(self, planes: Sequence[str], weights: ComplexArray) -> tuple[Column, ...]:
+        """Weights of planes, and where to take material away from some."""
+        gone = [plane in self.remove for plane in planes]
+        return (
+            *weight_columns(self.labels, planes, weights),
+            Column("action", ["remove" if away else "add" for away in gone]),
+            Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction(Outlook):
+    """What a method gives, and how its weights err. Its fields: `balancing.Correction`."""
+
+    draws: ComplexArray
+    mounted: Mounted
+    conditioning: Conditioning
+    fitted: Solution
+    method: str
+    row_weights: FloatArray | None = None
+    limits: Limits | None = None
 
     @property
     def region_known(self) -> bool:
@@ -179,18 +230,6 @@ class Prediction:
         planes = [total.get(plane, 0.0) for plane in self.mounted.planes]
         return np.array(planes, dtype=complex) - self.mounted.weights
 
-    def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
-        """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
-        turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
-        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
-
-    @property
-    def within(self) -> FloatArray:
-        """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""
-        if not self.errors_known:
-            return np.full(self.before.shape, np.nan)
-        return reach(self.after_covariance) * self.labels.vibration_scale
-
     @property
     def active(self) -> tuple[str, ...]:
         """Limits that bind, in words."""
@@ -224,30 +263,6 @@ class Prediction:
         """What the method makes small, a sentence."""
         return method_words(self.method, weighted=self.row_weights is not None)
 
-    def vibration_columns(
-        self, rounding: float = INVISIBLE, after: ComplexArray | None = None
-    ) -> tuple[Column, ...]:
-        """Speed, sensor, vibration before and after, one row a reading.
-
-        Parameters
-        ----------
-        rounding
-            Amplitudes after, up to this share of the largest one before, are nothing.
-        after
-            In place of the prediction, (S, C).
-        """
-        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
-        return (
-            *reading_columns(self.labels, self.speeds, self.sensors),
-            *vector_columns(self.labels, "before", self.before),
-            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
-        )
-
-    def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
-        """Weights of planes as JSON types, and where to take material away from some."""
-        columns = self.work_columns(planes, weights)
-        return records(columns if self.remove else columns[:-2])
-
     def limits_document(self) -> dict[str, Any] | None:
         """Of weights and angles, where to work, and of readings in the order of `residuals`; None: no limits.
 
@@ -266,13 +281,4 @@ class Prediction:
                 "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
                 "forbidden_deg": {plane: each for plane, each in arcs.items() if each},
             }
-        )
-
-    def work_columns(self, planes: Sequence[str], weights: ComplexArray) -> tuple[Column, ...]:
-        """Weights of planes, and where to take material away from some."""
-        gone = [plane in self.remove for plane in planes]
-        return (
-            *weight_columns(self.labels, planes, weights),
-            Column("action", ["remove" if away else "add" for away in gone]),
-            Column("remove_at_deg", np.where(gone, self.places(planes, weights), np.nan)),
         )

@@ -139,6 +139,11 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
     sizes = zip(run.typical, what, strict=True)
     between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)
+    if run.origin == "stated":  # as it was, whatever share of it is common
+        whole = float(np.linalg.norm(run.typical))
+        relative, floor = whole * np.sqrt(1 - run.evenly), whole * np.sqrt(run.evenly) * run.level
+        each = (f"{100 * relative:.2g} %", relative), (labels.amplitude_words(floor), floor)
+        between = ", ".join(words for words, size in each if size)
     out += f"; from run to run: {between} ({run.origin})" if between else ""
     return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 

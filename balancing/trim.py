@@ -169,7 +169,9 @@ def after_check_run(
         why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
         why += f"; {stop or 'check what was mounted, and where'}"
     elif settled and _within_its_error(c):
-        word, why = "done", f"a trim would be within its own error (rms {three_figures(now * scale)} {unit})"
+        word = "done"
+        why = f"a trim would be within its own error ({change})"
+        why += f", and may be worth it: {_in_words(c, planes, trim)}" if worth else ""
     elif settled and not worth:
         word = "done"
     elif blocked or (worth and c.decision.word == "do not mount" and pieces is None):
@@ -189,6 +191,16 @@ def after_check_run(
         made.after[pick],
         c.within[pick],
         pieces if word == "trim" else None,
+    )
+
+
+def _in_words(c: Correction, planes: tuple[str, ...], trim: ComplexArray) -> str:
+    """What would be added to each plane, or taken away from it."""
+    each = zip(planes, trim, c.places(planes, trim), strict=True)
+    return ", ".join(
+        f"{plane} {'less ' * (plane in c.remove)}{c.labels.weight_words(abs(w))} at {at:.0f}°"
+        for plane, w, at in each
+        if w
     )
 
 

@@ -340,6 +340,28 @@ def verdict_of_check(
     return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 
+def verdict_of_readings(
+    of: Influence, readings: ComplexArray, covariance: FloatArray, limits: Limits
+) -> Verdict:
+    """Judge predicted readings.
+
+    Parameters
+    ----------
+    of
+        Coefficients, whose speeds and sensors they are.
+    readings, covariance
+        Predicted, (S, C), and how a check run scatters around them, (S, C, 2, 2); NaN: errors unknown.
+    limits
+        Of these readings.
+
+    Raises
+    ------
+    ValueError
+        Where no reading has a limit.
+    """
+    return _verdict(_readings(of, readings, covariance, limits.residual), "prediction", of.labels)
+
+
 def _readings(
     of: Influence, readings: ComplexArray, covariance: FloatArray, limit: FloatArray
 ) -> list[Judgement]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import LINES, Answer, together
 from rotorid.base.text import sentence
@@ -27,8 +27,8 @@ from rotorid.report.outcome import Outcome, command, provenance, table_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict
-    from rotorid.commands.balance_solution import JobGiven
+    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict, Zones
+    from rotorid.commands.balance_solution import JobGiven, Solved
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.equations import Equations
@@ -43,37 +43,45 @@ class Balance(Outcome):
     ----------
     influence, job
         What it is made of.
-    mounted, check, left, verdict, of_type
+    mounted, check, left, verdict, of_type, zones
         Pieces in holes, check runs beside their prediction, what is left to do after them, what limits and
-        tolerances say, where the coefficients are those of a type; None where there is nothing.
-    make_answer
-        Makes the answer, which JSON does without.
+        tolerances say, where the coefficients are those of a type, zones; None where there is nothing.
     """
 
     influence: Influence
     job: Job
-    mounted: Mounted | None
-    check: CheckComparison | None
-    left: LeftToDo | None
-    verdict: Verdict | None
-    of_type: TypeKnowledge | None
-    make_answer: Callable[[], Answer]
+    mounted: Mounted | None = None
+    check: CheckComparison | None = None
+    left: LeftToDo | None = None
+    verdict: Verdict | None = None
+    of_type: TypeKnowledge | None = None
+    zones: Zones | None = None
 
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-        return self.make_answer()
+        return _answer(self)
+
+    def beside(self) -> dict[str, Any]:
+        """Keys of the document beside those of the correction."""
+        names = {"mounting": "mounted", "check": "check", "left_to_do": "left", "verdict": "verdict"}
+        names |= {"of_type": "of_type", "zones": "zones"}
+        parts = {key: getattr(self, name) for key, name in names.items()}
+        return {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
+        from balancing import Correction
         from rotorid.report.balance import balance_report
 
-        made = self.result, self.mounted, self.check, self.left, self.verdict
+        if not isinstance(self.result, Correction):
+            return super().sheet()
+        made = self.result, self.mounted, self.check, self.left, self.verdict, self.zones
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
 
 @command
-def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balance:
+def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcome:
     """Correction weights from trial runs or a rotor model, with ± and what will be left.
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
@@ -95,11 +103,25 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
-    from balancing import compare_check, mount
-
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
+    if options.weights is not None:
+        from rotorid.commands.what_if import predicted
+
+        return predicted(read, options)
+    return corrected(read, options, files, again)
+
+
+def corrected(
+    read: Job, options: BalanceOptions, files: Sequence[Path] = (), again: Callable[..., Job] | None = None
+) -> Balance:
+    """The correction of a job, its pieces and check runs.
+
+    `files` make the workbook, `again` reads the job under other conventions.
+    """
+    from balancing import compare_check, zones_of
+
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -110,11 +132,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
-    mounted, check, left = None, None, None
-    if options.split and read.check_pieces is not None and not options.refine:
-        mounted = read.check_pieces
-    elif options.split and (read.holes or read.check_pieces is None):
-        mounted = mount(result, influence, runs, read.holes, on_top=options.refine)
+    mounted, check, left = _pieces(read, result, solved, options), None, None
     if read.check is not None and not options.refine:
         check = replace(compare_check(result, read.check, influence, runs), as_proposed=not stated)
     tolerance = _tolerance(result.planes, options)
@@ -122,10 +140,10 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
-    of_type = solved.of_type
-    made = provenance(read.files if of_type is None else of_type.files, options)
-    beside = {"mounting": mounted, "check": check, "left_to_do": left, "verdict": verdict, "of_type": of_type}
-    pieces = mounted if left is None else left.pieces
+    zones = None
+    if read.zones:
+        zones = zones_of(result, read.zones, None if mounted is None else mounted.after, read.check)
+    made = provenance(read.files if solved.of_type is None else solved.of_type.files, options)
 
     def workbook(_: Path) -> Written:
         from rotorid.files.job_excel import job_workbook_bytes
@@ -144,31 +162,23 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
 
         return correction_equations(result)
 
-    def picture() -> Figure:
-        from balancing.plots import correction_figure, draw_verdict
-
-        below = None
-        if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
-            below = partial(draw_verdict, verdict, t=tolerance)
-        return correction_figure(result, mounted, check, left, below)
-
     outcome = Balance(
         result=result,
         provenance=made,
-        make_answer=lambda: _answer(result, mounted, check, left, verdict, read, influence),
-        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items() if part},
+        keys=lambda: result.to_dict() | outcome.beside(),
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
-        pictures={"": picture},
+        pictures={"": lambda: _picture(outcome, tolerance)},
         solved=solved_equations,
-        lines=LINES + 6 * bool(mounted or pieces),
+        lines=LINES + 6 * bool(mounted or (left and left.pieces)),
         influence=influence,
         job=read,
         mounted=mounted,
         check=check,
         left=left,
         verdict=verdict,
-        of_type=of_type,
+        of_type=solved.of_type,
+        zones=zones,
     )
     return outcome
 
@@ -188,20 +198,25 @@ def _check(options: BalanceOptions) -> None:
         )
 
 
-def _answer(
-    result: Correction,
-    mounted: Mounted | None,
-    check: CheckComparison | None,
-    left: LeftToDo | None,
-    verdict: Verdict | None,
-    job: Job,
-    influence: Influence,
-) -> Answer:
+def _pieces(job: Job, result: Correction, solved: Solved, options: BalanceOptions) -> Mounted | None:
+    """Pieces in holes: those that a check run had, or that are to be mounted; None: not asked for."""
+    from balancing import mount
+
+    if options.split and job.check_pieces is not None and not options.refine:
+        return job.check_pieces
+    if options.split and (job.holes or job.check_pieces is None):
+        influence, runs = solved.coefficients
+        return mount(result, influence, runs, job.holes, on_top=options.refine)
+    return None
+
+
+def _answer(made: Balance) -> Answer:
     """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+    result, mounted, check, left, job = made.result, made.mounted, made.check, made.left, made.job
     weights, sound = result.answer, result.sound
-    if needs_trial_run(job, influence):
+    if needs_trial_run(job, made.influence):
         weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-    limits = [] if verdict is None else [verdict.answer]
+    limits, zone = ([] if part is None else [part.answer] for part in (made.verdict, made.zones))
     if left is not None:  # the weights of the bare rotor are tables
         first = [one.judgement for one in (left.answer, *limits)]
         if check is not None:
@@ -211,18 +226,30 @@ def _answer(
             first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
         elif not (job.check_mounted or job.check_of_weights):
             first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
+        first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
         tables = [_behind(part.answer) for part in (mounted, result) if part]
-        every = together([left.answer, *limits, *([check.answer] if check else []), *tables])
+        every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
         return replace(every, judgement=" ".join(first))
     if mounted:
-        weights = replace(_behind(weights), judgement="" if sound else weights.judgement)
+        elsewhere = "\n".join(result.decision.elsewhere)
+        weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
     judged = [*limits, *([mounted.answer] if mounted else [])]
-    return together([*judged, weights] if sound else [weights, *judged])
+    return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
 
 
 def _behind(answer: Answer) -> Answer:
     """An answer whose tables come after all others'."""
     return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
+
+
+def _picture(made: Balance, tolerance: Tolerance | None) -> Figure:
+    """The correction or what is mounted, the check run and the trim; below, what a tolerance says."""
+    from balancing.plots import correction_figure, draw_verdict
+
+    below, verdict = None, made.verdict
+    if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
+        below = partial(draw_verdict, verdict, t=tolerance)
+    return correction_figure(made.result, made.mounted, made.check, made.left, below)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -21,7 +21,7 @@ from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
     from rotorid.base.choices import Method
-    from rotorid.commands.option_quantities import Amount, Amplitudes, Weights
+    from rotorid.commands.option_quantities import Amount, Amplitudes, Mounted, Weights
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
 
@@ -62,6 +62,8 @@ class BalanceOptions:
         Use these speeds only, as in the runs, or 20Hz,25Hz.
     max_mass : MASS
         Largest weight of every plane, 5g; or left=5g,right=3g.
+    weights : PLANE=MASS@DEG;…
+        What these would leave, without balancing: left=5g@120; right=10g#3 (a hole).
     limit : SENSOR=VALUE
         Largest amplitude of a sensor, or VALUE of all; repeatable.
     ridge : STRENGTH
@@ -90,6 +92,7 @@ class BalanceOptions:
     planes: Names | None = None
     speeds: Speeds | None = None
     max_mass: Weights | None = None
+    weights: Mounted | None = None
     limit: Amplitudes = ()
     ridge: float | None = None
     split: bool = False
@@ -101,7 +104,7 @@ class BalanceOptions:
     panels: ClassVar[Mapping[str, str]] = {
         "Input and conventions": "phase angles errors",
         "Method": "method planes speeds coefficients machine_type influence ridge",
-        "Limits, mounting, check run": "max_mass limit split refine grade rotor_mass service_speed",
+        "Limits, mounting, check run": "weights max_mass limit split refine grade rotor_mass service_speed",
         "Output": "template",
     }
     to = (*WITH_REPORT, *EQUATIONS)
@@ -198,15 +201,20 @@ def _test(job: Job) -> ConventionTest:
     return convention_test(runs)
 
 
-def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
-    of_type = None
+def coefficients_of(
+    job: Job, options: BalanceOptions
+) -> tuple[tuple[Influence, Trials | None], TypeKnowledge | None]:
+    """Coefficients, the runs that give the vibration (None: theirs), and the type that they are from."""
     if options.machine_type is None:
-        coefficients = choose(job, options.coefficients, refined=options.refine)
-    else:
-        from rotorid.fleet.machine_type import type_coefficients
+        return choose(job, options.coefficients, refined=options.refine), None
+    from rotorid.fleet.machine_type import type_coefficients
 
-        of_type = type_coefficients(job, options.machine_type, refined=options.refine)
-        coefficients = of_type.influence, None
+    of_type = type_coefficients(job, options.machine_type, refined=options.refine)
+    return (of_type.influence, None), of_type
+
+
+def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
+    coefficients, of_type = coefficients_of(job, options)
     planes = planes or names(options.planes) or used_planes(job, coefficients[0])
     result = correct_job(job, coefficients, planes, options)
     return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)

@@ -32,7 +32,11 @@ Weights = Amount | Mapping[str, Amount]
 """One of all planes, or by plane, in SI as the weights of the job are: kg or kg·m."""
 Amplitudes = str | Sequence[str] | Mapping[str, Amount]
 """`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
+Mounted = str | Sequence[str] | Mapping[str, complex]
+"""As `mounted_weights` reads them, or kg or kg·m by plane."""
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
+_AND = re.compile(r"(?<![0-9.][eE])\+(?=\s*[0-9.])")
+_PLACED = re.compile(r"([^@#]+?)\s*([@#])\s*([^@#]+?)\s*[°º]?")
 
 
 def read_with_unit(text: str, what: str, unit: UnitReader, example: str) -> tuple[float, Unit]:
@@ -123,8 +127,8 @@ def weight(
     converted = units.in_job_units(Quantity(what, *amount), unit, radius)
     if converted is None:
         raise ValueError(
-            f"{what}: the weight to be split is in {unit}, to which {amount[1].name} converts only with "
-            "--radius"
+            f"{what}: weights are in {unit} here, to which {amount[1].name} converts only with a radius, "
+            "--radius or radius_mm of the plane"
         )
     return converted[0]
 
@@ -167,6 +171,40 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
     turned = [radians(degrees(tail.removesuffix("°"), what)) for *_, tail in parts]
     sizes = [unit.to_si(value) for value, unit in each]
     return labels, [complex(labels.weight_from(*one)) for one in zip(sizes, turned, strict=True)]
+
+
+def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[str, complex]:
+    """Read "left=5g@120; right=10g#3+4@90": at angles as the job counts them, or in its holes.
+
+    Without a unit in that of the job's weights. Where material is removed it is the place to remove it from.
+
+    Raises
+    ------
+    ValueError
+        Naming the option and what is wrong with it.
+    """
+    labels, example = job.trials.labels, "left=5g@120; right=10g#3"
+
+    def one(plane: str, text: str) -> complex:
+        match, holes = _PLACED.fullmatch(text.strip()), job.conventions.holes.get(plane, {})
+        if match is None:
+            raise ValueError(f"{what} {text.strip()!r}: a weight at an angle or in a hole, such as {example}")
+        size, sign, place = match.groups()
+        size += labels.weight_unit * (not any(map(str.isalpha, size)))
+        mass = weight(size, what, labels, job.planes[plane].radius)
+        if sign == "#":
+            at = holes[one_of(place, f"{what}: hole of {plane}", tuple(holes) or ("none in the job",))]
+        else:
+            at = degrees(place, what)
+        removed = -1 if job.planes[plane].remove else 1
+        return removed * complex(labels.weight_from(mass, radians(at)))
+
+    def read(plane: str, text: str) -> complex:
+        one_of(plane, what, tuple(job.planes))
+        return sum((one(plane, part) for part in _AND.split(text)), 0j)
+
+    several = given.split(";" if ";" in given else ",") if isinstance(given, str) else given
+    return pairs(several, what, read, example)
 
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:

@@ -24,7 +24,15 @@ from rotorid.files.job_models import (
     WrittenJob,
     named_tables,
 )
-from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
+from rotorid.files.job_planes import (
+    in_model,
+    make_holes,
+    make_limits,
+    make_zones,
+    planes_of,
+    row_weights,
+    with_taken,
+)
 from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
 from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.runs import make_trials
@@ -57,6 +65,8 @@ class Job:
         The same for each sensor of the readings (C).
     limits
         In SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`; None: none.
+    zones
+        Boundaries A/B, B/C and C/D of each sensor that has some, amplitudes as those of `trials`.
     row_weights
         Of each reading in the fit, shape (S, C): the speed's times the sensor's; None where all are 1.
     check
@@ -86,6 +96,7 @@ class Job:
     planes: dict[str, Plane] = field(default_factory=dict)
     sensors: dict[str, Sensor] = field(default_factory=dict)
     limits: Limits | None = None
+    zones: Mapping[str, Sequence[float]] = field(default_factory=dict)
     row_weights: FloatArray | None = None
     check: Trials | None = None
     check_mounted: bool = False
@@ -246,6 +257,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     trials, influence, conventions, slow_roll = problems.need(readings)
     trials, planes = planes_of(settings, trials, influence, rotor, problems)
     limits = make_limits(settings, planes, trials, problems)
+    zones = make_zones(settings, trials, problems)
     weights = row_weights(settings, trials, problems)
     holes = make_holes(planes, trials.labels, limits, problems)
     check, mounted = None, tables.get("check_weights")
@@ -275,6 +287,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         planes=planes,
         sensors=sensors,
         limits=limits,
+        zones=zones,
         row_weights=weights,
         check=None if check is None else replace(check, labels=labels),
         check_mounted=mounted is not None,
@@ -382,7 +395,8 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = Non
         view=settings.view if rotation else None,
         clock=settings.angles in ROTATIONS,
     )
-    speed, limits = settings.speed, [one.limit for one in settings.sensors.values()]
+    speed, limits = settings.speed, [one.limit or one.zones for one in settings.sensors.values()]
+    limits += [] if settings.zones is None else [settings.zones.boundaries]
     return Conventions(
         labels,
         settings.speed_tolerance_percent,

@@ -87,6 +87,12 @@ def _different(arcs: tuple[Pair, ...]) -> tuple[Pair, ...]:
     return arcs
 
 
+def _rising(boundaries: tuple[float, ...]) -> tuple[float, ...]:
+    if len(boundaries) != 3 or not boundaries[0] < boundaries[1] < boundaries[2]:
+        raise ValueError("three boundaries in rising order, A/B, B/C and C/D")
+    return boundaries
+
+
 def _or_one(value: object) -> object:
     """A number for all speeds, at the speed ""."""
     return value if isinstance(value, dict) or ":" in str(value) else {"": value}
@@ -106,6 +112,7 @@ Limits: Any = Annotated[
     by_name(Positive),
     BeforeValidator(_or_one, json_schema_input_type=Positive | by_name(Positive)),
 ]
+Boundaries = Annotated[Quantity, of(listed(Positive, _rising))]
 Weight = Annotated[Quantity, of(Positive)]
 File = Annotated[Text, AfterValidator(_printable)]
 
@@ -243,6 +250,12 @@ class Sensor(_Placed):
         units=units.VIBRATION,
         example='{ "3000" = 20, "4500" = 30 }',
     )
+    zones: Boundaries | None = optional(
+        "its own boundaries in place of those of `[zones]`",
+        "zones zones_um zones_mm_s zones_m_s2",
+        units=units.VIBRATION,
+        example="zones_um_pp = [90, 120, 180]",
+    )
     weight: NotNegative = key(
         "weight in the fit, default 1; 0: the sensor counts only for its limit", default=1.0
     )
@@ -314,6 +327,18 @@ class Vector(Settings):
     phase: Turn = key(
         "the phase at slow speed, counted as the readings count it",
         "phase_deg",
+    )
+
+
+class Zones(Settings):
+    """`[zones]`."""
+
+    boundaries: Boundaries = key(
+        "the boundaries A/B, B/C and C/D of the machine's class, as ISO 20816 prints them, in the unit of "
+        "the readings or with their own",
+        "boundaries boundaries_um boundaries_mm_s boundaries_m_s2",
+        units=units.VIBRATION,
+        example="boundaries_mm_s_rms = [2.3, 4.5, 7.1]",
     )
 
 
@@ -391,6 +416,7 @@ class JobSettings(Settings):
     )
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
+    zones: Zones | None = optional("zones by which readings are judged, see below")
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
     machine_type: Label = key("its type, for `rotorid fleet`", default="")
     date: Date | None = optional("when it was balanced", example="2026-03-17")

@@ -112,7 +112,7 @@ def make_limits(
     settings: JobSettings, planes: Mapping[str, Plane], trials: Trials, problems: Problems
 ) -> Limits | None:
     """In the order of speeds, sensors and planes; None: nothing limited."""
-    labels, vibration = trials.labels, units.vibration(trials.labels.vibration_unit)
+    labels = trials.labels
     most = [(*_sizes(plane, "max_weight", labels, problems), np.inf)[0] for plane in planes.values()]
     arcs = tuple(tuple(_arc(plane, labels, *pair) for pair in plane.forbidden) for plane in planes.values())
     residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
@@ -120,17 +120,38 @@ def make_limits(
         sensor = settings.sensors.get(name)
         if sensor is None or sensor.limit is None:
             continue
-        unit = sensor.limit.unit if sensor.limit.unit.name else vibration
-        if unit.kind != vibration.kind:
-            expected = f"an amplitude in a unit that converts to {vibration.name}, as the readings have"
-            sensor.complain(problems, "limit", expected)
-        elif unit.name in units.VELOCITY and vibration.name.endswith("_rms"):
-            expected = f"limit_{unit.name}_rms, as the readings are, or limit_{unit.name}_pp"
-            sensor.complain(problems, "limit", expected)
+        unit = _of_readings(sensor, "limit", sensor.limit, labels, problems)
         rows = _at_speeds(sensor, "limit", sensor.limit.value, trials, settings, math.inf, problems)
         residual[:, k] = rows / unit.scale
     limits = Limits(np.array(most), residual, arcs)
     return limits if limits.any else None
+
+
+def make_zones(settings: JobSettings, trials: Trials, problems: Problems) -> dict[str, tuple[float, ...]]:
+    """Boundaries of zones of each sensor that has some, as amplitudes of its readings inside."""
+    boundaries = dict[str, tuple[float, ...]]()
+    for name in trials.sensors:
+        each = (settings.sensors.get(name), "zones"), (settings.zones, "boundaries")
+        for part, field in each:
+            if name not in boundaries and part is not None and (stated := getattr(part, field)):
+                unit = _of_readings(part, field, stated, trials.labels, problems)
+                boundaries[name] = tuple(map(unit.to_si, stated.value))
+    return boundaries
+
+
+def _of_readings(
+    part: Settings, field: str, stated: Quantity, labels: Labels, problems: Problems
+) -> units.Unit:
+    """The unit of amplitudes that are stated; a problem where readings do not convert to it."""
+    vibration = units.vibration(labels.vibration_unit)
+    unit = stated.unit if stated.unit.name else vibration
+    if unit.kind != vibration.kind:
+        expected = f"an amplitude in a unit that converts to {vibration.name}, as the readings have"
+        part.complain(problems, field, expected)
+    elif unit.name in units.VELOCITY and vibration.name.endswith("_rms"):
+        expected = f"{field}_{unit.name}_rms, as the readings are, or {field}_{unit.name}_pp"
+        part.complain(problems, field, expected)
+    return unit
 
 
 def _sizes(plane: Plane, field: str, labels: Labels, problems: Problems) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict
+    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict, Zones
     from rotorid.base.answer import Answer
     from rotorid.files import Job
 
@@ -44,7 +44,9 @@ LONG = 10**6
 
 def balance_report(
     document: Mapping[str, Any],
-    made: tuple[Correction, Mounted | None, CheckComparison | None, LeftToDo | None, Verdict | None],
+    made: tuple[
+        Correction, Mounted | None, CheckComparison | None, LeftToDo | None, Verdict | None, Zones | None
+    ],
     job: Job,
     provenance: Mapping[str, Any],
     answer: Answer,
@@ -57,7 +59,7 @@ def balance_report(
         What `rotorid balance --json` prints, without its provenance; the sheet holds it.
     made
         What it is made of: the correction, pieces in holes, check runs, what is left to do after these, what
-        limits say.
+        limits say, zones.
     job
         Of the correction.
     provenance
@@ -72,13 +74,15 @@ def balance_report(
     """
     from balancing.plots import residual_figure
 
-    result, mounted, check, left, verdict = made
+    result, mounted, check, left, verdict, zones = made
     labels = result.labels
     angles = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
     first = Path(job.files[0]).resolve()
     names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
+    answers = [part.answer for part in (verdict, zones) if part]
+    judged = [words for one in answers for words in (one.numbers, *one.tables) if words]
     plain, head = left is None and mounted is None, job.settings.sheet
     return render_report(
         "balance.html",
@@ -109,9 +113,7 @@ def balance_report(
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
         next_run=_next_run(document, labels) if left is not None and left.word == "trim" else "",
-        verdict=""
-        if verdict is None
-        else block("\n\n".join([verdict.answer.numbers, *verdict.answer.tables])),
+        verdict=block("\n\n".join(judged)) if judged else "",
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
         there=_mounted_in_runs(job),

@@ -94,17 +94,19 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]
     It is balanced once for each version of its files.
     """
     from rotorid.base.answer import kinds
-    from rotorid.commands.balance import BalanceOptions, balance
+    from rotorid.commands.balance import BalanceOptions, corrected
+    from rotorid.commands.balance_solution import job_of
 
     source = Path(job) if checked else _without_check(Path(job))
     refused = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made = balance(source, BalanceOptions())
-        split, refine = bool(made.job.holes), made.job.check is not None
+        read, files, again = job_of(source, BalanceOptions())
+        made = corrected(read, BalanceOptions(), files, again)
+        split, refine = bool(read.holes), read.check is not None
         if split or refine:
             try:
-                made = balance(source, BalanceOptions(split=split, refine=refine))
+                made = corrected(read, BalanceOptions(split=split, refine=refine), files, again)
             except (ValueError, OSError, ArithmeticError) as error:
                 refused = [f"no {'trim' if refine else 'pieces'}: {error}"]
     return made, kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)) + refused

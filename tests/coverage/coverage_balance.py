@@ -41,11 +41,12 @@ TIMES = (0.5, 1.0, 1.5, 2.5)
 
 
 class Job(NamedTuple):
-    """Runs, the truth (P,), and how many real readings the runs have more than unknowns."""
+    """Runs, the truth (P,), how many real readings the runs have more than unknowns, true coefficients."""
 
     trials: Trials
     D: ComplexArray
     redundant: int
+    W: ComplexArray
 
 
 class Outcome(NamedTuple):
@@ -117,7 +118,7 @@ def draw(
         errors=ReadingErrors(reading / told, reading / told) if stated else None,
         run_errors=scatter if between else None,
     )
-    return Job(trials, D, 2 * (S * C * (spare + 1) - P))
+    return Job(trials, D, 2 * (S * C * (spare + 1) - P), W)
 
 
 def outcome(job: Job, method: str | None = None) -> Outcome:
@@ -180,8 +181,6 @@ def main(jobs: int = 2500) -> None:
     print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
     each = -(-jobs // (len(SOURCES) * len(KINDS)))
     cells = {(source, kind): simulate(each, source, kind) for source in SOURCES for kind in KINDS}
-    for (source, kind), found in cells.items():
-        print(line(f"{source}: {kind}", found))
     for place, names in enumerate((SOURCES, KINDS)):
         for name in names:
             print(line(f"all: {name}", [one for key in cells if key[place] == name for one in cells[key]]))

@@ -18,6 +18,7 @@ PROGRAMS = {
     "fleet": ("coverage_fleet.py", 20, 1),
     "identify": ("coverage_identify.py", 500),
     "runup": ("coverage_runup.py", 1, 200),
+    "what_if": ("coverage_what_if.py", 200),
 }
 """Program and arguments of each table: half an hour in all on two cores."""
 BLOCK = re.compile(r"^% table ([^\n]+)\n\n```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)

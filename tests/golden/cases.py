@@ -139,6 +139,7 @@ turbo-weighted              balance {TURBO}/job.toml --method weighted
 turbo-weighted-limit        balance {TURBO}/job.toml --method weighted --limit "probe 4=2"
 turbo-limit                 balance {TURBO}/job.toml --limit 5
 turbo-limit-minmax          balance {TURBO}/job.toml --method minmax --limit "probe 1=3" --limit "probe 2=4"
+turbo-weights               balance {TURBO}/job.toml --weights left=423@168.9,right=448@11.7 --limit 5
 turbo-max-mass              balance {TURBO}/job.toml --max-mass 300g_mm
 turbo-ridge                 balance {TURBO}/job.toml --ridge 0.05
 turbo-part                  balance {TURBO}/job.toml --planes left,right --speeds 1220,3600
@@ -512,6 +513,7 @@ STORED = (
     "turbo-limit-minmax",
     "turbo-output",
     "turbo-stored",
+    "turbo-weights",
     "type",
     "type-foreign",
     "type-refined",

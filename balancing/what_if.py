@@ -1,0 +1,218 @@
+"""What given weights leave: at every reading, and where they make it worse.
+
+With weights D a reading is predicted as Y₀ + W D. A check run differs from that by what Y₀ and W err by, and
+by its own errors, those of a reading and those of its run. Draws of all give ±, the radius around the
+predicted vector within which 95 of 100 check runs read, and what the root mean square of a check run stays
+below; they are those of a correction of the same weights.
+
+Whether a reading that weights were not made for gets worse is asked of the truth, without the errors of a
+further run: it does where |Y₀ + W D| less its radius is above |Y₀| with its radius, both radii at 1 − 0.05/N
+for N readings, so that of 20 jobs at most one is warned of what does not rise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.influence import Influence, match_speeds, plane_indices
+from balancing.prediction import Outlook
+from balancing.regions import LEVEL, half_width, reach, real_parts
+from balancing.tables import degrees, largest_readings, rms, small, three_figures
+from balancing.trials import Trials
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.json import plain
+from rotorid.base.tables import Column, records, text
+from rotorid.base.text import capital, figures
+
+if TYPE_CHECKING:
+    from rotorid.base.arrays import ComplexArray, FloatArray
+
+DRAWS = 400
+BETTER = 0.9
+"""Of the rms of the bare rotor: what 95 of 100 check runs must stay below."""
+FEW = 6
+"""Readings that are shown in one table."""
+RISES = 0.1
+"""Of the largest reading: a smaller rise is not worth a word."""
+Word = Literal["better", "worse", "hardly different", "not judged"]
+
+
+@dataclass(frozen=True, eq=False)
+class WhatIf(Outlook, Answered):
+    """Vibration that given weights would leave.
+
+    Attributes
+    ----------
+    influence, weights, after_covariance, check_rms, remove
+        As of `balancing.Correction`.
+    rms_within
+        Half width of the 95 % interval of the rms of a check run; NaN where errors are unknown.
+    word
+        Better than the bare rotor by the rule of a correction, or worse in 95 of 100 check runs.
+    worse
+        Where they make it worse besides, in sentences.
+    """
+
+    rms_within: float
+    word: Word
+    worse: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        scale, remarks = self.labels.vibration_scale, self.influence.remarks
+        return plain(
+            {
+                "word": self.word,
+                "weights_refer_to": "the bare rotor, with every weight of the runs removed",
+                "weights": self.work_rows(self.planes, self.weights),
+                "residuals": records(self.columns()),
+                "rms_before": rms(self.before) * scale,
+                "rms_after": rms(self.after) * scale,
+                "rms_within": self.rms_within * scale,
+                "rms_after_95": self.check_rms * scale,
+                "worse_elsewhere": self.worse,
+                "warnings": remarks.warnings,
+                "notes": remarks.notes,
+            }
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """Better or worse, and what the weights are; then every reading."""
+        labels, remarks = self.labels, self.influence.remarks
+        scale, unit = labels.vibration_scale, labels.vibration_in
+        old = rms(self.before) * scale
+        left, known = f"{three_figures(old)} → {small(rms(self.after) * scale, old)}", " (errors unknown)"
+        if self.errors_known:
+            left += f" ± {figures(self.rms_within * scale, 2)}"
+            known = f", below {three_figures(self.check_rms * scale)} in 95 of 100 check runs"
+        sizes, places = labels.weight(self.weights)[0], self.places(self.planes, self.weights)
+        each = [
+            f"{plane} {'less ' * (plane in self.remove)}{figures(size)} {labels.weight_in} at {degrees(at)}"
+            for plane, size, at in zip(self.planes, sizes, places, strict=True)
+            if size
+        ]
+        first = f"{capital(self.word)}: with these weights rms {left} {unit}".rstrip() + f"{known}."
+        on = f"On the bare rotor: {'; '.join(each) or 'nothing'}; {labels.turning_in_words()}."
+        shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
+        table = f"{shown}:\n{text(self.columns(), left=2)}"
+        largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.after, self.within)
+        few = self.before.size <= FEW
+        return Answer(
+            "\n".join((first, *self.worse)),
+            f"{on}\n{table if few else f'Largest{largest}'}",
+            remarks.warnings,
+            remarks.notes,
+            () if few else (table,),
+            "every reading",
+            to_mount=True,
+        )
+
+    def columns(self) -> tuple[Column, ...]:
+        """One row a reading: before, after, and the radius around it that holds 95 of 100 check runs."""
+        within = Column("within", self.within.ravel(), lambda width: f"± {figures(width, 2)}", title="95 %")
+        return (*self.vibration_columns(), *([within] if self.errors_known else []))
+
+
+def what_if(
+    influence: Influence,
+    weights: Mapping[str, complex],
+    baseline: Trials | ArrayLike | None = None,
+    speeds: ArrayLike | None = None,
+    remove: Sequence[str] = (),
+) -> WhatIf:
+    """Predict what given weights leave, and how far check runs may be from that.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, from `estimate_influence` or stored.
+    weights
+        All that would be mounted on the bare rotor, kg or kg·m, angle with the rotation, by plane; the others
+        are empty.
+    baseline
+        As of `correct`.
+    speeds
+        rad/s, that count; default all. At the others the answer says where the weights make it worse.
+    remove
+        Planes where material is taken away instead of added.
+
+    Returns
+    -------
+    WhatIf
+        The same prediction as that of a `Correction` of these weights.
+
+    Raises
+    ------
+    ValueError
+        For an unknown plane or speed, and a missing or unfit baseline.
+    """
+    today = influence if baseline is None else influence.rebased(baseline)
+    if not today.has_baseline:
+        raise ValueError("there is no vibration that the weights could change: give the baseline run")
+    D = np.zeros(len(today.planes), dtype=complex)
+    if weights:
+        D[plane_indices(today, list(weights))] = list(weights.values())
+    used = range(len(today.speeds)) if speeds is None else match_speeds(speeds, today.speeds)
+    part = today.part(used)
+    off = check_readings(part, D)
+    after, before = part.baseline + part.W @ D, rms(part.baseline)
+    word: Word = "not judged"
+    width = bound = np.nan
+    if len(off):
+        sizes = np.sqrt(np.mean(np.abs(after + off) ** 2, axis=(1, 2)))
+        low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL))
+        word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
+        width = float(half_width(sizes - rms(after)))
+    removed = tuple(plane for plane in today.planes if plane in remove)
+    parts, n = real_parts(off[..., None]), len(off)
+    V = np.einsum("nsci,nscj->scij", parts, parts) / n if n else np.full((*after.shape, 2, 2), np.nan)
+    worse = worse_elsewhere(today, D, part.speeds)
+    return WhatIf(part, D, V, float(bound), width, word, worse, remove=removed)
+
+
+def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
+    """How far check runs with weights (P,) are off, drawn, (n, S, C); n = 0 where errors are unknown."""
+    after = influence.baseline + influence.W @ weights
+    each = zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False)
+    off = [Y + W @ weights + more - after for (Y, W), more in each]
+    return np.concatenate([np.zeros((0, *after.shape), dtype=complex), *off])
+
+
+def worse_elsewhere(today: Influence, weights: ComplexArray, used: FloatArray) -> tuple[str, ...]:
+    """A sentence about what weights clearly make worse at a speed they were not made for, or none.
+
+    Parameters
+    ----------
+    today
+        At all speeds, with the vibration of the bare rotor.
+    weights
+        On the bare rotor, (P,).
+    used
+        Speeds that they were made for, rad/s.
+    """
+    other = ~np.isin(today.speeds, used)
+    N = np.count_nonzero(other) * len(today.sensors)
+    if not (N and weights.any() and today.known_errors):
+        return ()
+    changes = np.append(1, 0 * weights), np.append(1, weights)
+    old, new = np.abs(today.baseline), np.abs(today.baseline + today.W @ weights)
+    noises = (today.errors.noise.changed(change[None]) for change in changes)
+    before, after = (reach(noise.covariance(today.errors.sizes)) for noise in noises)
+    of_all = np.sqrt(np.log((1 - LEVEL) / N) / np.log(1 - LEVEL))
+    rise = np.where(other[:, None] & (new - old > of_all * (before + after)), new - old, 0.0)
+    s, c = divmod(int(np.argmax(rise)), len(today.sensors))
+    if rise[s, c] <= RISES * old.max():
+        return ()
+    labels, scale = today.labels, today.labels.vibration_scale
+    low, high = three_figures(old[s, c] * scale), three_figures(new[s, c] * scale)
+    change = f"{low} → {high} ± {figures(after[s, c] * scale, 2)} {labels.vibration_in}".rstrip()
+    return (
+        f"But at {labels.speed_words(today.speeds[s])} these weights, which were not made for that, make it "
+        f"worse: {today.sensors[c]} {change}.",
+    )
