@@ -31,6 +31,7 @@ from balancing.influence import (
 )
 from balancing.iso21940 import GRADES, Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
+from balancing.modes import mode_made_worse
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
@@ -99,6 +100,7 @@ __all__ = [
     "last_run",
     "local_runs",
     "match_speeds",
+    "mode_made_worse",
     "model_influence",
     "mount",
     "reading_of",

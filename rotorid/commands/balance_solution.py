@@ -13,6 +13,7 @@ from warnings import catch_warnings
 from rotorid.base.text import listing
 from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
 from rotorid.commands.coefficients import choose, used_planes
+from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import Names, Speeds, names, speeds
 from rotorid.report.options import file_of
@@ -217,6 +218,9 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
     coefficients, of_type = coefficients_of(job, options)
     planes = planes or names(options.planes) or used_planes(job, coefficients[0])
     result = correct_job(job, coefficients, planes, options)
+    if more := next_mode(job, result):
+        decision = replace(result.decision, elsewhere=(*result.decision.elsewhere, *more))
+        result = replace(result, decision=decision)
     return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)
 
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from balancing import Correction, WhatIf
     from fem import Sensor
     from rotorid.base.text import Quantity
     from rotorid.files import Job
+
+
+REACH = 4.0
+"""Times the fastest reading: up to here a machine may run."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,23 @@ def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPl
         {p: job.radii[p] for p in job.planes} if by_mass else None,
         _quantity(job.trials.labels.vibration_unit),
     )
+
+
+def next_mode(job: Job, outlook: Correction | WhatIf) -> tuple[str, ...]:
+    """What the rotor model of a job says of the next mode beyond its readings; nothing without one."""
+    from balancing import mode_made_worse, model_influence
+    from fem import critical_speeds_below
+
+    fastest = float(job.trials.speeds.max())
+    if job.rotor is None or not {*job.trials.sensors} <= job.sensor_places.keys():
+        return ()
+    beyond = [w for w in critical_speeds_below(job.rotor, REACH * fastest) if w > fastest]
+    if not beyond or not {*outlook.planes} <= job.plane_nodes.keys():
+        return ()
+    sensors, quantity = job.sensor_places, _quantity(job.trials.labels.vibration_unit)
+    model = partial(model_influence, job.rotor, sensors=sensors, quantity=quantity)
+    levers = {} if outlook.labels.unbalances else job.radii
+    return mode_made_worse(outlook, model, job.plane_nodes, levers, job.rotor.n_nodes, beyond[0])
 
 
 def _quantity(unit: str) -> Quantity:

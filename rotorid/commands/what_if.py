@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotorid.base.answer import together
 from rotorid.base.tables import Table
 from rotorid.commands.balance_solution import coefficients_of
+from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import mounted_weights
 from rotorid.commands.quantities import speeds
 from rotorid.report.options import refuse
@@ -23,6 +25,8 @@ NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", "grade", "rotor_ma
 def predicted(job: Job, options: BalanceOptions) -> Outcome:
     """What the weights of the options would leave, with limits and zones.
 
+    Check runs count for the coefficients where `options.refine`, and else not at all.
+
     Raises
     ------
     ValueError
@@ -31,16 +35,12 @@ def predicted(job: Job, options: BalanceOptions) -> Outcome:
     from balancing import match_speeds, verdict_of_readings, what_if, zones_of
 
     refuse(options, NEEDLESS, "means nothing with --weights, which are taken as they are")
-    if job.check is not None and not options.refine:
-        raise ValueError(
-            "--weights asks what weights on the bare rotor would leave: count the check run for that with "
-            "--refine, or leave it out of the job"
-        )
     given = mounted_weights(job, options.weights or {})
     (influence, runs), of_type = coefficients_of(job, options)
     chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
     remove = [name for name, plane in job.planes.items() if plane.remove]
     result = what_if(influence, given, runs, chosen, remove)
+    result = replace(result, worse=(*result.worse, *next_mode(job, result)))
     verdict, limits = None, job.limits_of(influence.planes)
     if limits is not None:
         kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))

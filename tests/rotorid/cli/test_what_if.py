@@ -72,8 +72,10 @@ def test_what_is_refused(cli, options, words):
 
 
 def test_a_check_run_counts_with_refine_or_not_at_all(cli):
-    assert "--refine" in cli("balance", TURBO / "checked.toml", "--weights", "left=3@4").err
-    assert cli("balance", TURBO / "checked.toml", "--refine", "--weights", "left=3@4").out.startswith("Worse")
+    given = "--weights", "left=423@168.9", "--json"
+    jobs = ("job.toml",), ("checked.toml",), ("checked.toml", "--refine")
+    plain, ignored, counted = (cli("balance", TURBO / job[0], *job[1:], *given).json for job in jobs)
+    assert plain["residuals"] == ignored["residuals"] != counted["residuals"]
 
 
 def zoned(tmp_path, text, job="job.toml"):
