@@ -64,13 +64,12 @@ def _balancing() -> Pictures:
 
 
 def _reduction() -> Pictures:
-    from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost, plots
+    from rotorid.reduction import Methods, Placement, Reduction, StabilityCost, plots
 
     return {
         Reduction: plots.plot_reduction,
         Methods: plots.plot_methods,
         Placement: plots.plot_placement,
-        ResponseCost: plots.plot_running,
         StabilityCost: plots.plot_stability,
     }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +30,7 @@ from rotorid.reduction.placement import NAMED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rotorid.reduction.comparison import ResponseCost, StabilityCost
+    from rotorid.reduction.comparison import StabilityCost
     from rotorid.reduction.condensation import Methods
     from rotorid.reduction.placement import Placement
     from rotorid.reduction.reduce import Reduction
@@ -167,43 +166,6 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
         axes.plot(x[row], y[row], MARKERS[k], color=COLORS[k], label=text, **style)
     legend_above(axes, 1, 0.8, title=title, title_fontsize="medium")
     return axes
-
-
-def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axes:
-    """Draw the unbalance response of full rotor and small model over speed, and below it their difference.
-
-    Of the response the largest influence coefficient at each speed; its axes are returned.
-    """
-    if ax is None:
-        from matplotlib import pyplot as plt
-
-        ratios = {"height_ratios": (3, 2)}
-        _, ax = plt.subplots(2, sharex=True, layout="constrained", figsize=(WIDTH, 5.6), gridspec_kw=ratios)
-    above, below = ax
-    moving = running.speeds > 0
-    each = (running.full, running.small, running.small - running.full)
-    full, small, difference = (np.abs(values[moving]).max(axis=(1, 2)) for values in each)
-    speeds, percent = running.speeds[moving] * RPM, 100 * difference / full
-    above.semilogy(speeds, full, **FULL, label="full rotor")
-    above.semilogy(speeds, small, **SMALL, label=f"{len(running.nodes)}-mass model")
-    largest = max(full.max(), small.max())
-    above.set_ylim(max(min(full.min(), small.min()) / 2, largest * 1e-6), largest * 2)
-    # 1 m per kg·m is 1 µm per g·mm.
-    above.set(ylabel="largest of all influence\ncoefficients, µm per g·mm (log)")
-    below.plot(speeds, percent, color=DARK, linewidth=1.6)
-    words = f"left out, ±{100 * running.bands:.3g} % of a critical speed"
-    for panel in (above, below):
-        plain(panel)
-        for k, (low, high) in enumerate(running.left_out):
-            panel.axvspan(low * RPM, high * RPM, color="0.9", label=None if k else words, zorder=0)
-        panel.set_xlim(speeds[0], speeds[-1])
-    second_scale(above)
-    legend_above(above, borderaxespad=ABOVE_SCALE)
-    above.tick_params(labelbottom=False)
-    # On a scale of what counts: where the small model is left out, the difference may leave the picture.
-    below.set_ylim(0.0, 1.25 * max(1.0, float(percent[~running.excluded[moving]].max())))
-    below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
-    return above
 
 
 def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:

@@ -32,7 +32,6 @@ COMMANDS = {
     "vectors two": "vectors waveforms/run_up.wav --tacho 1 --unit um --phase lag --speeds 900,2000rpm",
     "vectors runs": "vectors waveforms/waveforms.toml --orders 1,2",
     "bearings": "bearings motion/rotor.toml --speeds 1000:9000:500rpm",
-    "bearings unloaded": "bearings motion/damper.toml --speeds 1000:3000:500rpm",
     "motion": "motion motion/rotor.toml --speed 4000rpm --time 0.02s --rate 500 --sensors 2,5,8,12,15,18,22",
     "motion orbits": "motion motion/unbalanced.toml --speed 3000rpm --time 0.1s --view orbits",
     "motion bode": "motion motion/unbalanced.toml --run-up 600:6200rpm --time 2s --view bode",

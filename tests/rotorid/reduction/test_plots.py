@@ -10,7 +10,7 @@ from fem_rotors import rotor23
 
 from rotorid.base.text import RPM
 from rotorid.reduction import compare_methods, reduce
-from rotorid.reduction.plots import plot_methods, plot_placement, plot_reduction, plot_running, plot_stability
+from rotorid.reduction.plots import plot_methods, plot_placement, plot_reduction, plot_stability
 
 mpl.use("Agg")
 
@@ -77,31 +77,6 @@ def test_the_map_holds_every_physical_choice_and_its_names():
     np.testing.assert_allclose(points.get_offsets(), [(0.03, 8.0), (0.01, 1.1), (0.94, 0.3)])
     np.testing.assert_allclose(points.get_array(), [18.0, 17.0, 24.0])
     check_hygiene(ax.figure, unitless=["condition number of the regression"])
-
-
-def test_both_responses_and_their_difference_over_speed():
-    speeds = np.linspace(0.0, 300.0, 61)
-    full = speeds**2 / np.abs(100.0**2 - speeds**2 + 200j * 10)
-    full = full[:, None, None] * np.array([[1.0, 0.5], [0.5, 2.0]]) * 1e-3 + 0j
-    small = full * (1.0 + 0.03 * speeds / 300.0)[:, None, None]
-    ax = plot_running(SimpleNamespace(
-        speeds=speeds, full=full, small=small, nodes=(7, 18), sensors=(7, 18), criticals=np.array([100.0]),
-        bands=0.1, left_out=[(90.0, 110.0)], excluded=(np.abs(speeds - 100.0) <= 10.0) | (speeds == 0),
-    ))  # fmt: skip
-    below = ax.figure.axes[1]
-    for line, values in zip(ax.get_lines(), (full, small), strict=True):
-        np.testing.assert_allclose(line.get_ydata(), np.abs(values[1:, 1, 1]))
-    assert legend_of(ax) == ["full rotor", "2-mass model", "left out, ±10 % of a critical speed"]
-    assert "µm per g·mm" in ax.get_ylabel()
-    (difference,) = below.get_lines()
-    np.testing.assert_allclose(difference.get_ydata(), 3.0 * speeds[1:] / 300.0, rtol=1e-9)
-    np.testing.assert_allclose(difference.get_xdata(), RPM * speeds[1:])
-    assert below.get_xlabel() == "speed, rpm"
-    assert below.get_ylim() == (0.0, pytest.approx(3.75))
-    for panel in (ax, below):
-        band = panel.patches[0].get_path().get_extents(panel.patches[0].get_patch_transform())
-        assert (band.x0, band.x1) == pytest.approx((90.0 * RPM, 110.0 * RPM))
-    check_hygiene(ax.figure)
 
 
 def test_decrements_and_thresholds_of_both_models():
