@@ -199,13 +199,17 @@ def _test(job: Job) -> ConventionTest:
 
 
 def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
-    of_type = None
+    of_type, check = None, job.check if options.refine else None
+    if options.refine and check is None:
+        raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if options.machine_type is None:
         coefficients = choose(job, options.coefficients, refined=options.refine)
     else:
+        from balancing import with_check_runs
         from rotorid.fleet.machine_type import type_coefficients
 
-        of_type = type_coefficients(job, options.machine_type, refined=options.refine)
+        trials = with_check_runs(job.trials, check) if check else job.trials
+        of_type = type_coefficients(job, options.machine_type, trials)
         coefficients = of_type.influence, None
     planes = planes or names(options.planes) or used_planes(job, coefficients[0])
     result = correct_job(job, coefficients, planes, options)

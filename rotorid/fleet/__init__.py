@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FleetFitOptions", "fleet_fit"]
 
-_HEADS = ("rpm", "sensor", "plane", "influence", "°", "± % between", "± °", "± % within", "± ° ")
-"""Of the table, on a terminal."""
-_NO_REASON = "nothing that was tried makes it fit"
-
 
 @dataclass(frozen=True)
 class FleetFitOptions:
@@ -63,10 +59,11 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
     if types.empty:
         words = f"{tree}: no balancing job in it has a type (machine_type) and coefficients"
         raise ValueError("\n".join([words, *unreadable]))
-    name = str(types.index[0])
-    kind = type_of_fleet(fleet, name)
+    kind = type_of_fleet(fleet, str(types.index[0]))
     machines, jobs, table = len(kind.machines), int(kind.effects.jobs.sum()), _table(kind)
-    head = f"{name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. Coefficients differ between "
+    head = (
+        f"{kind.name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. Coefficients differ between "
+    )
     head += f"machines {_typical(kind, kind.effects.between)}"
     notes = list(kind.notes)
     if jobs > machines:
@@ -79,22 +76,22 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         notes.append(f"{counted(len(types) - 1, 'other type')} in the tree: fit its folder alone")
     odd, warnings = list[dict[str, object]](), list[str]()
     for record, far in kind.odd:
-        each = {"machine": record.machine, "path": record.job, "times_the_limit": far**0.5}
-        odd.append(each | {"reason": kind.why_odd(record) or None})
-        why = f"it would fit if {odd[-1]['reason']}" if odd[-1]["reason"] else _NO_REASON
-        words = (
-            f"{record.machine} ({record.job}) is odd, {far**0.5:.2g} times as far off as machines of a type"
+        times, reason = far**0.5, kind.why_odd(record) or None
+        odd.append(
+            {"machine": record.machine, "path": record.job, "times_the_limit": times, "reason": reason}
         )
+        why = f"it would fit if {reason}" if reason else "nothing that was tried makes it fit"
+        words = f"{record.machine} ({record.job}) is odd, {times:.2g} times as far off as machines of a type"
         warnings.append(f"{words} are, and was left out: {why}")
     unit = f"{kind.labels.vibration_unit or '1'}/{kind.labels.weight_unit}"
     return Outcome(
         result=kind,
         sentences=(f"{head}. In {unit}, phases lead, angles with the rotation:",),
-        tables=(table.only(dict(zip(table.headings, _HEADS, strict=True))),),
+        tables=(table,),
         file=table,
         files={".parquet": lambda _: parquet(arrow("a fleet").Table.from_pandas(fleet))},
         keys={
-            "machine_type": name,
+            "machine_type": kind.name,
             "types": types.to_dict(),
             "machines": list(kind.machines),
             "jobs": jobs,
@@ -129,16 +126,19 @@ def _table(kind: MachineType) -> Table:
     W, scale = kind.mean, kind.labels.vibration_scale / kind.labels.weight_scale
     s, c, p = np.indices(W.shape).reshape(3, -1)
     within = kind.effects.within if kind.effects.jobs.max() > 1 else np.nan * kind.effects.within
-    scatter = np.concatenate((_scatter(kind, kind.effects.between), _scatter(kind, within)))
-    names = ("between_percent", "between_deg", "within_percent", "within_deg")
+    along, across = _scatter(kind, kind.effects.between)
+    along_within, across_within = _scatter(kind, within)
     tenths = "{:.1f}".format
     columns = (
-        Column("speed_rpm", np.round(kind.speeds[s] * RPM, 9), "{:.6g}".format),
+        Column("speed_rpm", np.round(kind.speeds[s] * RPM, 9), "{:.6g}".format, title="rpm"),
         Column("sensor", np.array(kind.sensors)[c]),
         Column("plane", np.array(kind.planes)[p]),
         Column("influence", np.abs(W).ravel() * scale, partial(figures, digits=3)),
-        Column("phase_deg", np.degrees(np.angle(W)).ravel() % 360.0, tenths),
-        *(Column(name, values, tenths) for name, values in zip(names, scatter, strict=True)),
+        Column("phase_deg", np.degrees(np.angle(W)).ravel() % 360.0, tenths, title="°"),
+        Column("between_percent", along, tenths, title="± % between"),
+        Column("between_deg", across, tenths, title="± °"),
+        Column("within_percent", along_within, tenths, title="± % within"),
+        Column("within_deg", across_within, tenths, title="± °"),
     )
     return Table("coefficients", columns)
 
