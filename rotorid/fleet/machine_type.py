@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from balancing import (
     Influence,
@@ -44,7 +45,7 @@ from balancing import (
     usual_run_errors,
     with_parameters,
 )
-from balancing.noise import Gaussian, Mounted
+from balancing.noise import Gaussian, Mounted, Whitening
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
@@ -155,15 +156,14 @@ class MachineType(NamedTuple):
         expected = Influence(self.speeds, self.sensors, self.planes, W, *nothing, labels)
         return with_parameters(expected, columns, 0.0)
 
-    def why_odd(self, record: MachineRecord) -> str:
-        """What would make a record fit the type best, in words; "" where nothing tried does."""
+    def why_odd(self, record: MachineRecord) -> str | None:
+        """What would make an odd record fit the type best, in words; None where nothing tried does."""
         W, std, share = record.W, record.std, self.mean / np.abs(self.mean) ** 2
         lag = W.conj() * np.exp(1j * np.angle(np.sum(W * share, axis=(0, 1))))
         theta = np.angle(np.sum(W.conj() * share))
         degrees = round(np.degrees(theta))
         mark = f"{'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
         tried = [
-            ("", W, std, 0),
             (f"its phases {mark}", W * np.exp(1j * theta), std, 1),
             ("its phases were of the other sense (lag for lead)", lag, std, len(self.planes)),
         ]
@@ -176,7 +176,7 @@ class MachineType(NamedTuple):
             (self.effects.distance(*_rows(W, std, self.turn)) + _CHOSEN * chosen, words)
             for words, W, std, chosen in tried
         )
-        return reason if distance <= self.limit else ""
+        return reason if distance <= self.limit else None
 
 
 def _doubt(effects: RandomEffects) -> FloatArray:
@@ -185,13 +185,13 @@ def _doubt(effects: RandomEffects) -> FloatArray:
     Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
     σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
     """
-    from scipy.special import ndtr
+    from scipy.special import erfcx
 
     M, B = len(effects.jobs), np.diag(effects.between)
     total = M * (np.diag(effects.new_group) - B)
     std = np.sqrt(2 * np.maximum(total**2 - B**2, 0) / (M - 1))
     ratio = np.divide(B, std, out=np.full_like(B, np.inf), where=std > 0)
-    return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
+    return np.asarray(std * np.sqrt(2 / np.pi) / erfcx(-ratio / np.sqrt(2)))
 
 
 def _rows(W: ComplexArray, std: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -201,7 +201,7 @@ def _rows(W: ComplexArray, std: FloatArray, turn: ComplexArray) -> tuple[FloatAr
 
 
 def fit_type(
-    records: Sequence[MachineRecord], speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
+    records: Sequence[MachineRecord], speeds: ArrayLike, sensors: Sequence[str], planes: Sequence[str]
 ) -> MachineType:
     """Coefficients of a type, from jobs of its machines; those that do not belong are left out and named.
 
@@ -230,12 +230,14 @@ def fit_type(
         )
     notes, assumed = list[str](), int((~std[fits].any(axis=(1, 2, 3))).sum())
     if assumed:
-        none = f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none"
-        notes.append(f"{none}, and ± are too wide rather than too narrow")
+        notes.append(
+            f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none, and "
+            "± are too wide rather than too narrow"
+        )
     if np.isinf(limit):
         notes.append(f"with {counted(len(machines), 'machine')} nothing tells an odd one from the others")
     return MachineType(
-        speeds,
+        np.array(speeds),
         tuple(sensors),
         tuple(planes),
         turn,
@@ -272,18 +274,19 @@ def type_of_fleet(
     rows = rows[rows.groupby("job")["cell"].transform("size") == len(grid)]
     if rows.empty:
         there = (f"{one} {listing(sorted({*cells[one]}), 'and')}" for one in (*READ[1:], *MOUNTED))
-        words = f"no job of {name} has coefficients of all these speeds, sensors and planes; there are"
-        raise UndeterminedError(f"{words} {', '.join(there)}")
-    speeds, sensors, planes = (grid[one].unique() for one in ("speed_rad_s", "sensor", "plane"))
-    shape = -1, len(speeds), len(sensors), len(planes)
-    re, im, std = (rows[part].to_numpy().reshape(shape) for part in ("re", "im", "std"))
+        raise UndeterminedError(
+            f"no job of {name} has coefficients of all these speeds, sensors and planes; there are "
+            f"{', '.join(there)}"
+        )
+    where = [grid[one].unique().tolist() for one in ("speed_rad_s", "sensor", "plane")]
+    re, im, std = (rows[part].to_numpy().reshape(-1, *map(len, where)) for part in ("re", "im", "std"))
     first = rows[:: len(grid)]
     records = list(map(MachineRecord, first["machine"], first["job"], re + 1j * im, std))
-    kind = fit_type(records, speeds, sensors.tolist(), planes.tolist())
+    kind = fit_type(records, *where)
     left_out, notes = cells["job"].nunique() - len(records), kind.notes
     if left_out:
-        words = "left out: copies of others, or without all of these coefficients"
-        notes = (f"{counted(left_out, 'job')} of {name} {words}", *notes)
+        about = "left out: copies of others, or without all of these coefficients"
+        notes = (f"{counted(left_out, 'job')} of {name} {about}", *notes)
     unit, of_weight = rows[["vibration_unit", "weight_unit"]].iloc[0]
     labels = Labels(unit, vibration(unit).scale if unit else 1.0, of_weight, weight(of_weight).scale)
     return kind._replace(name=name, labels=labels, left_out=left_out, notes=notes)
@@ -307,8 +310,10 @@ class TypeKnowledge(NamedTuple):
         """A correction that is not to be mounted where the machine is not of its type."""
         if self.probability >= LEVEL:
             return result
-        cause = f"by its runs this machine is not of the type {self.kind.name!r} (χ², probability "
-        cause += f"{self.probability:.1g})"
+        cause = (
+            f"by its runs this machine is not of the type {self.kind.name!r} "
+            f"(χ², probability {self.probability:.1g})"
+        )
         instead = ("Instead: balance it without --type.",)
         decision = replace(result.decision, word="do not mount", cause=cause, instead=instead)
         return replace(result, decision=decision)
@@ -340,15 +345,14 @@ def type_coefficients(job: Job, address: str, trials: Trials) -> TypeKnowledge:
     mounted = pd.DataFrame([(plane, mounted_in(job, plane)) for plane in planes], columns=MOUNTED)
     kind = type_of_fleet(read_fleet(Path(file)), name, read, mounted if planes else None, runs_of(job))
     if not planes:  # nothing but a baseline: in the unit of the others' weights
-        unit, scale = kind.labels.weight_unit, kind.labels.weight_scale
-        labels = replace(labels, weight_unit=unit, weight_scale=scale)
+        labels = replace(labels, weight_unit=kind.labels.weight_unit, weight_scale=kind.labels.weight_scale)
     influence, probability = update(kind.influence(labels, machine), replace(trials, labels=labels))
-    warnings, earlier, machines = list(influence.remarks.warnings), 0, len(kind.machines)
+    warnings, machines = list(influence.remarks.warnings), len(kind.machines)
+    earlier = dict(zip(kind.machines, kind.effects.jobs.tolist(), strict=True)).get(machine, 0)
     words = f"coefficients of the type {name!r}, {counted(machines, 'machine')}"
     if machines < ENOUGH and not trials.weights.any():
         warnings.append(_FEW)
-    if machine in kind.machines:
-        earlier = int(kind.effects.jobs[kind.machines.index(machine)])
+    if earlier:
         words += f", and of {counted(earlier, 'earlier job')} of {machine!r}"
         if kind.effects.jobs.max() == 1:
             warnings.append(
@@ -387,11 +391,10 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
         _, reading, run, *_ = estimate_influence(runs).errors
     errors = expected.errors._replace(reading=reading, run=run)
     noise = replace(expected, errors=errors).difference_noise(runs)
-    single, columns = noise.at(errors.sizes)  # (S, C, 2R, 2R), (M, S, C, R)
-    single += 1e-12 * (np.trace(single, axis1=-2, axis2=-1).max() or 1.0) * np.eye(2 * R)
+    columns = noise.at(errors.sizes)[1]  # (M, S, C, R)
     off = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
     K = np.moveaxis(real_parts(np.concatenate((columns, off[None]))), 0, -1)
-    root, M = np.linalg.cholesky(single), len(columns)
+    root, M = np.linalg.cholesky(Whitening(noise, errors.sizes).blocks), len(columns)
     K = np.linalg.solve(root, K)  # (S, C, 2R, M + 1), the last is y
     A = np.linalg.solve(root, np.tile(np.eye(2), (R, 1)))
     G = np.linalg.pinv(A)
@@ -404,12 +407,13 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     moved[0, ..., 0] += unstretch((G @ K)[..., M])[..., 0]
     alone = 0 * expected.channels()
     alone[..., :2, :2] = G @ np.swapaxes(G, -1, -2)
-    mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
     result = replace(
         expected,
         W=expected.W + moved[0, ..., 1:],
         baseline=moved[0, ..., 0],
-        errors=Gaussian(alone, moved[1:], reading, run, mounted),
+        errors=Gaussian(
+            alone, moved[1:], reading, run, Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
+        ),
         labels=trials.labels,
         remarks=Remarks(tuple(dict.fromkeys((*trials.warnings, *reading.warnings)))),
     )

@@ -190,10 +190,10 @@ def test_what_is_wrong_is_refused(fleet, tmp_path):
             balance(job, BalanceOptions(**options))
 
     refused("expected the table of a fleet and a type, FLEET.parquet:TYPE", machine_type="fan")
-    refused("a table of a fleet .No such file", machine_type=f"{tmp_path / 'none'}:fan")
+    refused("none: expected a file that exists", machine_type=f"{tmp_path / 'none'}:fan")
     refused("a table of a fleet .it is damaged", machine_type=f"{job}:fan")
     pd.read_parquet(store).drop(columns="std").to_parquet(tmp_path / "other.parquet")
-    refused("column std: expected the table that", machine_type=f"{tmp_path / 'other.parquet'}:fan")
+    refused("expected the table that rotorid fleet fit", machine_type=f"{tmp_path / 'other.parquet'}:fan")
     refused("the type .fun. is not known .did you mean .fan.", machine_type=f"{store}:fun")
     refused("no check runs to refine with", machine_type=address(fleet), refine=True)
     refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
