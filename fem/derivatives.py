@@ -36,29 +36,27 @@ class MatrixChange:
     Attributes
     ----------
     bands
-        Those that change, by name, shape (width + 1, size).
+        Of `_BANDS`, each of shape (width + 1, size); none where supports alone change.
     nodes
         Of the supports that change, from 1, length k.
     supports
         Shape (S, k, 2, 2), on forward and backward amplitudes.
     """
 
-    bands: dict[str, FloatArray]
+    bands: list[FloatArray]
     nodes: tuple[int, ...]
     supports: ComplexArray
 
 
-def matrix_change(
-    changed: Callable[[float], Rotor], value: float, step: float, speeds: FloatArray
-) -> MatrixChange:
-    """∂D of the rotors `changed(value)`; on one side only, where the other is no rotor.
+def matrix_change(changed: Callable[[float], Rotor], step: float, speeds: FloatArray) -> MatrixChange:
+    """∂D of the rotors `changed(by)`; on one side only, where the other is no rotor.
 
     Parameters
     ----------
     changed
-        Gives the rotor with another value of the number.
-    value, step
-        The number, and by how much it is changed, in its unit.
+        Gives the rotor with the number changed by so much.
+    step
+        By how much it is changed, in its unit.
     speeds
         rad/s, shape (S,).
 
@@ -69,10 +67,10 @@ def matrix_change(
     ends, width = [], 0.0
     for side in (step, -step):
         try:
-            ends.append(changed(value + side))
+            ends.append(changed(side))
             width += step
         except ValueError:
-            ends.append(changed(value))
+            ends.append(changed(0.0))
     if width == 0:
         raise ValueError("the rotor can have no other value here, neither larger nor smaller")
     up, down = ends
@@ -80,9 +78,10 @@ def matrix_change(
     supports = np.zeros((speeds.size, len(pairs), 2, 2), dtype=complex)
     for k, pair in enumerate(pairs):
         supports[:, k] = whirl_change(*pair, speeds) / width
-    one, other = assemble(up), assemble(down)
-    changes = {name: (getattr(one, name) - getattr(other, name)) / width for name in _BANDS}
-    bands = {name: band for name, band in changes.items() if band.any()}
+    bands = list[FloatArray]()
+    if all(more.tilting_stiffness != less.tilting_stiffness for more, less in pairs):  # of the shaft, too
+        one, other = assemble(up), assemble(down)
+        bands = [(getattr(one, name) - getattr(other, name)) / width for name in _BANDS]
     return MatrixChange(bands, tuple(more.node for more, _ in pairs), supports)
 
 
@@ -156,9 +155,10 @@ def receptance_with_derivatives(
             for k, node in enumerate(change.nodes):
                 at = A.deflection(node)
                 derivative -= p[:, :, at] @ change.supports[part, k] @ q[:, at]
-            for name, band in change.bands.items():
-                moved = q.swapaxes(0, 1)
-                forces = multiply(band, moved.reshape(A.size, -1)).reshape(moved.shape).swapaxes(0, 1)
-                for plane, factor in enumerate(on_planes[_BANDS.index(name)]):
-                    derivative -= factor * (p[..., plane] @ forces[:, :, plane])
+            moved = q.swapaxes(0, 1)
+            for band, factors_of in zip(change.bands, on_planes, strict=False):
+                if band.any():
+                    forces = multiply(band, moved.reshape(A.size, -1)).reshape(moved.shape).swapaxes(0, 1)
+                    for plane, factor in enumerate(factors_of):
+                        derivative -= factor * (p[..., plane] @ forces[:, :, plane])
     return ReceptanceWithDerivatives(H, by_number, by_angle)

@@ -70,7 +70,7 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
         In one sentence: for a path that the rotor does not have, a plain value where a table or a material
         along the shaft has several, a number given twice, an impossible value.
     """
-    numbers, given = _numbers(rotor), list[tuple[str, int, str]]()
+    numbers, given = {at: {**its} for at, its in _numbers(rotor).items()}, list[tuple[str, int, str]]()
     changes = [(path, *_parameter(rotor, path)) for path in values]
     for path, before, suffix in sorted(changes, key=lambda change: [*_ACTS].index(change[-1])):
         value = number(values[path], path, signed=True)
@@ -84,18 +84,18 @@ def with_parameters(rotor: Rotor, values: Mapping[str, float]) -> Rotor:
             item = numbers[kind, i]
             item[key] = _ACTS[suffix](item[key], value)
     changed = {at[:2] for change in changes for at in change[-2]}
-    discs, supports = list(rotor.discs), list(rotor.supports)
-    for i, disc in enumerate(discs):
-        if ("disc", i) in changed:
-            discs[i] = replace(disc, **numbers["disc", i])
+    supports = list(rotor.supports)
+    discs = [
+        replace(disc, **numbers["disc", i]) if ("disc", i) in changed else disc
+        for i, disc in enumerate(rotor.discs)
+    ]
     for i, support in enumerate(supports):
-        if (support.kind, i) not in changed:
-            continue
-        its = tuple(numbers[support.kind, i].values())
-        table = np.reshape(its[:8], (2, 2, 2, -1)).transpose(0, 3, 1, 2)
-        k, c = table if support.speeds else table[:, 0]
-        pedestal = Pedestal(its[9], its[10:12], its[12:]) if support.pedestal else None
-        supports[i] = replace(support, stiffness=k, damping=c, pedestal=pedestal, tilting_stiffness=its[8])
+        if (support.kind, i) in changed:
+            its = tuple(numbers[support.kind, i].values())
+            table = np.reshape(its[:8], (2, 2, 2, -1)).transpose(0, 3, 1, 2)
+            k, c = table if support.speeds else table[:, 0]
+            stand = Pedestal(its[9], its[10:12], its[12:]) if support.pedestal else None
+            supports[i] = replace(support, stiffness=k, damping=c, pedestal=stand, tilting_stiffness=its[8])
     return replace(rotor, discs=discs, supports=supports, **numbers["material", 0])
 
 
@@ -117,8 +117,7 @@ def with_changes(rotor: Rotor, changes: Mapping[str, float]) -> Rotor:
 def as_change(rotor: Rotor, path: str) -> str:
     """The parameter by which this one can be changed from where it stands: `.offset` of a coefficient."""
     numbers, suffix = _parameter(rotor, path)
-    tabled = any(key in _TABLED for _, _, key in numbers)
-    return f"{path}.offset" if tabled and not suffix else path
+    return path if suffix or not any(key in _TABLED for *_, key in numbers) else f"{path}.offset"
 
 
 def numbers_of(rotor: Rotor, path: str) -> frozenset[tuple[str, int, str]]:
@@ -163,8 +162,7 @@ def typical_size(rotor: Rotor, path: str) -> float:
     numbers, suffix = _parameter(rotor, path)
     if suffix == "scale" or not numbers:
         return 1.0
-    around = _numbers(rotor)
-    alike = [around[kind, i][other] for kind, i, key in numbers for other in _alike((key,))]
+    alike = [_numbers(rotor)[kind, i][other] for kind, i, key in numbers for other in _alike((key,))]
     size, around_it = (np.abs(np.hstack(each)).max() for each in ([*numbers.values()], alike))
     return float(size or around_it or 1.0)
 
@@ -238,6 +236,10 @@ def _alike(keys: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _numbers(rotor: Rotor) -> _Numbers:
+    """To be read only: they are kept with the rotor."""
+    kept: _Numbers | None = vars(rotor).get("_numbers")
+    if kept:
+        return kept
     numbers = {("material", 0): {key: getattr(rotor, key) for key in _MATERIAL}}
     for i, disc in enumerate(rotor.discs):
         numbers["disc", i] = {key: getattr(disc, key) for key in _DISC}
@@ -246,6 +248,7 @@ def _numbers(rotor: Rotor) -> _Numbers:
         if stand := support.pedestal:
             values += [stand.mass, *stand.xy("stiffness"), *stand.xy("damping")]
         numbers[support.kind, i] = dict(zip(_SUPPORT, values, strict=False))
+    vars(rotor)["_numbers"] = numbers
     return numbers
 
 

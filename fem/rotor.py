@@ -629,7 +629,7 @@ def _too_short(length: FloatArray) -> BoolArray:
     -------
     Shape (n,).
     """
-    beside = np.pad(length, 1)
+    beside: FloatArray = np.hstack((0.0, length, 0.0))
     return SHORTEST * length < np.maximum(beside[:-2], beside[2:])
 
 

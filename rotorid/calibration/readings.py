@@ -105,14 +105,13 @@ class RunReadings:
         if self.bow:
             loads.append(self._bow_loads(start, rotor))
 
-        def size(path: str) -> float:  # also of a number near 0
-            return max(typical_size(each, path) for each in (start, rotor))
-
         def change(path: str) -> MatrixChange:
-            step = STEP * size(path)
-            return matrix_change(lambda by: with_changes(rotor, {path: by}), 0.0, step, speeds)
+            step = STEP * sizes[path]
+            return matrix_change(lambda by: with_changes(rotor, {path: by}), step, speeds)
 
         of_rotor = [path for path in derivatives if not is_reading(path)]
+        # also of a number near 0
+        sizes = {path: max(typical_size(each, path) for each in (start, rotor)) for path in of_rotor}
         receptance = receptance_with_derivatives(
             rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in of_rotor]
         )
@@ -127,7 +126,7 @@ class RunReadings:
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         to = as_they_stand(start, {path: values[path] for path in of_rotor})
         for k, path in enumerate(of_rotor):  # what rounding leaves of a number that does nothing
-            seen = np.abs(receptance.by_number[k]).max() * size(path)
+            seen = np.abs(receptance.by_number[k]).max() * sizes[path]
             receptance.by_number[k] *= seen > UNSEEN * np.abs(receptance.H).max()
         by_number = np.tensordot(to.T, receptance.by_number, 1)
         for k, path in enumerate(derivatives):

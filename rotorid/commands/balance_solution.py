@@ -206,11 +206,16 @@ def coefficients_of(
     job: Job, options: BalanceOptions
 ) -> tuple[tuple[Influence, Trials | None], TypeKnowledge | None]:
     """Coefficients, the runs that give the vibration (None: theirs), and the type that they are from."""
+    check = job.check if options.refine else None
+    if options.refine and check is None:
+        raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if options.machine_type is None:
         return choose(job, options.coefficients, refined=options.refine), None
+    from balancing import with_check_runs
     from rotorid.fleet.machine_type import type_coefficients
 
-    of_type = type_coefficients(job, options.machine_type, refined=options.refine)
+    trials = with_check_runs(job.trials, check) if check else job.trials
+    of_type = type_coefficients(job, options.machine_type, trials)
     return (of_type.influence, None), of_type
 
 

@@ -52,8 +52,6 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
             kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
     check = job.check if refined else None
-    if refined and check is None:
-        raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if check is not None and (kind == "computed" or job.influence is not None):
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     if kind == "computed":

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FleetFitOptions", "fleet_fit"]
 
-_HEADS = ("rpm", "sensor", "plane", "influence", "°", "± % between", "± °", "± % within", "± ° ")
-"""Of the table, on a terminal."""
-_NO_REASON = "nothing that was tried makes it fit"
-
 
 @dataclass(frozen=True)
 class FleetFitOptions:
@@ -52,25 +48,29 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         Without any job that gives coefficients, and for a type that is not there; UndeterminedError with
         fewer than three machines.
     """
+    import numpy as np
+
     from rotorid.fleet.jobs import arrow, parquet, read_tree
     from rotorid.fleet.machine_type import type_of_fleet
 
-    options = options or FleetFitOptions()
     fleet, undetermined, damaged = read_tree(Path(tree))
     unreadable = [f"{path} cannot be read: {why}" for path, why in damaged.items()]
     types = fleet.drop_duplicates("job")["machine_type"].value_counts().drop("", errors="ignore")
     if types.empty:
         words = f"{tree}: no balancing job in it has a type (machine_type) and coefficients"
         raise ValueError("\n".join([words, *unreadable]))
-    name = str(types.index[0])
-    kind = type_of_fleet(fleet, name)
-    machines, jobs, table = len(kind.machines), int(kind.effects.jobs.sum()), _table(kind)
-    head = f"{name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. Coefficients differ between "
-    head += f"machines {_typical(kind, kind.effects.between)}"
+    kind = type_of_fleet(fleet, str(types.index[0]))
+    machines, jobs = len(kind.machines), int(kind.effects.jobs.sum())
+    between, within = _scatter(kind, kind.effects.between), _scatter(kind, kind.effects.within)
+    head = (
+        f"{kind.name}: {counted(machines, 'machine')}, {counted(jobs, 'job')}. "
+        f"Coefficients differ between machines {_typical(between)}"
+    )
     notes = list(kind.notes)
     if jobs > machines:
-        head += f"; from run to run of one {_typical(kind, kind.effects.within)}"
+        head += f"; from run to run of one {_typical(within)}"
     else:
+        within *= np.nan
         notes.insert(0, "± within a machine is not determined by one job a machine")
     if undetermined:
         notes.append(f"the runs of {counted(len(undetermined), 'job')} do not determine coefficients")
@@ -78,22 +78,25 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         notes.append(f"{counted(len(types) - 1, 'other type')} in the tree: fit its folder alone")
     odd, warnings = list[dict[str, object]](), list[str]()
     for record, far in kind.odd:
-        each = {"machine": record.machine, "path": record.job, "times_the_limit": far**0.5}
-        odd.append(each | {"reason": kind.why_odd(record) or None})
-        why = f"it would fit if {odd[-1]['reason']}" if odd[-1]["reason"] else _NO_REASON
-        words = (
-            f"{record.machine} ({record.job}) is odd, {far**0.5:.2g} times as far off as machines of a type"
+        times, reason = far**0.5, kind.why_odd(record)
+        odd.append(
+            {"machine": record.machine, "path": record.job, "times_the_limit": times, "reason": reason}
         )
-        warnings.append(f"{words} are, and was left out: {why}")
-    unit = f"{kind.labels.vibration_unit or '1'}/{kind.labels.weight_unit}"
+        why = f"it would fit if {reason}" if reason else "nothing that was tried makes it fit"
+        warnings.append(
+            f"{record.machine} ({record.job}) is odd, {times:.2g} times as far off as machines of a type "
+            f"are, and was left out: {why}"
+        )
+    table = _table(kind, between, within)
+    unit = kind.influence(kind.labels).unit
     return Outcome(
         result=kind,
         sentences=(f"{head}. In {unit}, phases lead, angles with the rotation:",),
-        tables=(table.only(dict(zip(table.headings, _HEADS, strict=True))),),
+        tables=(table,),
         file=table,
         files={".parquet": lambda _: parquet(arrow("a fleet").Table.from_pandas(fleet))},
         keys={
-            "machine_type": name,
+            "machine_type": kind.name,
             "types": types.to_dict(),
             "machines": list(kind.machines),
             "jobs": jobs,
@@ -109,7 +112,7 @@ def fleet_fit(tree: Path | str, options: FleetFitOptions | None = None) -> Outco
         warnings=(*warnings, *unreadable),
         notes=tuple(notes),
         title="Type of machines",
-        provenance=provenance((), options, tree=str(tree)),
+        provenance=provenance((), options or FleetFitOptions(), tree=str(tree)),
     )
 
 
@@ -121,15 +124,12 @@ def _scatter(kind: MachineType, covariance: FloatArray) -> FloatArray:
     return np.array([100 * along, np.degrees(np.arctan(across))])
 
 
-def _table(kind: MachineType) -> Table:
+def _table(kind: MachineType, between: FloatArray, within: FloatArray) -> Table:
     """One row per speed, sensor and plane: mean coefficients, and one standard deviation of each kind."""
     import numpy as np
 
     W, scale = kind.mean, kind.labels.vibration_scale / kind.labels.weight_scale
     s, c, p = np.indices(W.shape).reshape(3, -1)
-    within = kind.effects.within if kind.effects.jobs.max() > 1 else np.nan * kind.effects.within
-    scatter = np.concatenate((_scatter(kind, kind.effects.between), _scatter(kind, within)))
-    names = ("between_percent", "between_deg", "within_percent", "within_deg")
     tenths = "{:.1f}".format
     columns = (
         Column("speed_rpm", np.round(kind.speeds[s] * RPM, 9), "{:.6g}".format),
@@ -137,16 +137,19 @@ def _table(kind: MachineType) -> Table:
         Column("plane", np.array(kind.planes)[p]),
         Column("influence", np.abs(W).ravel() * scale, partial(figures, digits=3)),
         Column("phase_deg", np.degrees(np.angle(W)).ravel() % 360.0, tenths),
-        *(Column(name, values, tenths) for name, values in zip(names, scatter, strict=True)),
+        Column("between_percent", between[0], tenths, title="± % between"),
+        Column("between_deg", between[1], tenths, title="± °"),
+        Column("within_percent", within[0], tenths, title="± % within"),
+        Column("within_deg", within[1], tenths, title="± °"),
     )
     return Table("coefficients", columns)
 
 
-def _typical(kind: MachineType, covariance: FloatArray) -> str:
+def _typical(scatter: FloatArray) -> str:
     """Root mean square over the coefficients, in words."""
     import numpy as np
 
-    percent, degrees = np.sqrt(np.mean(_scatter(kind, covariance) ** 2, axis=1)).tolist()
+    percent, degrees = np.sqrt(np.mean(scatter**2, axis=1)).tolist()
     if not percent:
         return "no more than the errors of their runs explain"
     return f"by {figures(percent, 2)} % and {figures(degrees, 2)}°"

@@ -20,9 +20,9 @@ import numpy as np
 from balancing import Influence, Labels, UndeterminedError, estimate_influence
 from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
-from rotorid.files import InputError, read_job
-from rotorid.files.disk import each_file_once
-from rotorid.files.problems import Problem, printable
+from rotorid.files import read_job
+from rotorid.files.disk import each_file_once, read_bytes
+from rotorid.files.problems import Problems, printable, refusal
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 
@@ -98,7 +98,7 @@ def _read_job(file: Path, path: str, machine_type: str) -> list[pd.DataFrame]:
 
 def known_errors(measured: Influence) -> FloatArray:
     """Standard deviation of either part of coefficients, (S, C, P); 0 where errors are assumed."""
-    variances = np.diagonal(measured.channels(known=True), axis1=-2, axis2=-1)[..., 2:]
+    variances = np.einsum("...ii->...i", measured.channels(known=True))[..., 2:]
     return np.asarray(np.sqrt(variances.reshape(*measured.W.shape, 2).mean(axis=-1)))
 
 
@@ -144,18 +144,17 @@ def parquet(table: pa.Table) -> bytes:
 
 def read_parquet(path: Path, what: str) -> pa.Table:
     """The table of a Parquet file; InputError, that `what` was expected, where it is not there or damaged."""
-    pa, reason = arrow(what), "it is damaged, or something else"
+    pa, problems = arrow(what), Problems()
+    data = problems.need(read_bytes(path, problems))
     try:
-        return pa.parquet.read_table(io.BytesIO(path.read_bytes()), page_checksum_verification=True)
-    except (OSError, pa.ArrowException) as error:
-        reason = getattr(error, "strerror", "") or reason
-        raise InputError([Problem(str(path), None, None, None, f"{what} ({reason})")]) from error
+        return pa.parquet.read_table(io.BytesIO(data), page_checksum_verification=True)
+    except pa.ArrowException as error:
+        raise refusal(path, f"{what} (it is damaged, or something else)") from error
 
 
 def read_fleet(path: Path) -> pd.DataFrame:
     """The table of jobs that `fleet fit --output` has written; InputError for what is none."""
     table: pd.DataFrame = read_parquet(path, "a table of a fleet").to_pandas()
-    if lacking := [name for name in COLUMNS if name not in table]:
-        expected = f"the table that rotorid fleet fit TREE --output {path.name} writes, with {lacking[0]}"
-        raise InputError([Problem(str(path), None, lacking[0], None, expected)])
+    if not {*COLUMNS} <= {*table}:
+        raise refusal(path, f"the table that rotorid fleet fit TREE --output {path.name} writes")
     return table

@@ -22,14 +22,15 @@ runs: the measured coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from balancing import (
     Influence,
@@ -42,16 +43,15 @@ from balancing import (
     reading_of,
     real_parts,
     usual_run_errors,
-    with_check_runs,
     with_parameters,
 )
-from balancing.noise import Gaussian, Mounted, kind_sizes, run_noise
+from balancing.noise import Gaussian, Mounted, Whitening
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.choices import did_you_mean
+from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
 from rotorid.files.layout import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight
-from rotorid.fleet.jobs import known_errors, machine_of, mounted_in, quantity_of, read_fleet, runs_of
+from rotorid.fleet.jobs import machine_of, mounted_in, quantity_of, read_fleet, runs_of
 from rotorid.regression import covariance_root, unstretch
 from rotorid.regression.random_effects import RandomEffects, oddness, random_effects
 
@@ -69,6 +69,8 @@ LEVEL = 0.001
 """Probability below which runs are not those of a machine of the type."""
 ENOUGH = 12
 """Machines, from which on the regions of first shots hold what they say."""
+READ, MOUNTED = ["speed_rad_s", "sensor", "quantity"], ["plane", "mounted"]
+"""Columns of the table of a fleet: what a coefficient is of."""
 _FEW = (
     "the type rests on few machines: where whole machines differ, 95 % regions of first shots held the truth "
     "in 84 to 88 of 100 simulated ones; make a trial run"
@@ -91,16 +93,6 @@ class MachineRecord(NamedTuple):
     job: str
     W: ComplexArray
     std: FloatArray
-
-
-class Grid(NamedTuple):
-    """Speeds (rad/s), sensors, what they read; planes (none: all) and what is mounted in each."""
-
-    speeds: FloatArray
-    sensors: tuple[str, ...]
-    quantity: str
-    planes: tuple[str, ...]
-    mounted: tuple[str, ...]
 
 
 class MachineType(NamedTuple):
@@ -164,30 +156,27 @@ class MachineType(NamedTuple):
         expected = Influence(self.speeds, self.sensors, self.planes, W, *nothing, labels)
         return with_parameters(expected, columns, 0.0)
 
-    def why_odd(self, record: MachineRecord) -> str:
-        """What would make a record fit the type best, in words; "" where nothing tried does."""
+    def why_odd(self, record: MachineRecord) -> str | None:
+        """What would make an odd record fit the type best, in words; None where nothing tried does."""
         W, std, share = record.W, record.std, self.mean / np.abs(self.mean) ** 2
-
-        def far(W: ComplexArray, std: FloatArray, chosen: int = 0) -> float:
-            """Squared distance, more for numbers that were chosen."""
-            return self.effects.distance(*_rows(W, std, self.turn)) + _CHOSEN * chosen
-
         lag = W.conj() * np.exp(1j * np.angle(np.sum(W * share, axis=(0, 1))))
         theta = np.angle(np.sum(W.conj() * share))
         degrees = round(np.degrees(theta))
         mark = f"{'led' if degrees > 0 else 'lagged'} {abs(degrees)}° more (another keyphasor mark)"
-        reasons = {
-            "": far(W, std),
-            f"its phases {mark}": far(W * np.exp(1j * theta), std, 1),
-            "its phases were of the other sense (lag for lead)": far(lag, std, len(self.planes)),
-        }
+        tried = [
+            (f"its phases {mark}", W * np.exp(1j * theta), std, 1),
+            ("its phases were of the other sense (lag for lead)", lag, std, len(self.planes)),
+        ]
         for a, b in combinations(range(len(self.sensors)), 2):
             order = np.arange(len(self.sensors))
             order[[a, b]] = b, a
             words = f"its sensors {self.sensors[a]} and {self.sensors[b]} were exchanged"
-            reasons[words] = far(W[:, order], std[:, order])
-        reason = min(reasons, key=reasons.__getitem__)
-        return reason if reasons[reason] <= self.limit else ""
+            tried.append((words, W[:, order], std[:, order], 0))
+        distance, reason = min(
+            (self.effects.distance(*_rows(W, std, self.turn)) + _CHOSEN * chosen, words)
+            for words, W, std, chosen in tried
+        )
+        return reason if distance <= self.limit else None
 
 
 def _doubt(effects: RandomEffects) -> FloatArray:
@@ -196,13 +185,13 @@ def _doubt(effects: RandomEffects) -> FloatArray:
     Where errors E of the coefficients are most of the scatter B + E, what is left of it is uncertain by
     σ = √(2 ((B + E)² - B²) / (M - 1)) and not negative; its mean then is B + σ φ(B / σ) / Φ(B / σ).
     """
-    from scipy.special import ndtr
+    from scipy.special import erfcx
 
     M, B = len(effects.jobs), np.diag(effects.between)
     total = M * (np.diag(effects.new_group) - B)
     std = np.sqrt(2 * np.maximum(total**2 - B**2, 0) / (M - 1))
     ratio = np.divide(B, std, out=np.full_like(B, np.inf), where=std > 0)
-    return np.asarray(std * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi) / ndtr(ratio))
+    return np.asarray(std * np.sqrt(2 / np.pi) / erfcx(-ratio / np.sqrt(2)))
 
 
 def _rows(W: ComplexArray, std: FloatArray, turn: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -212,7 +201,7 @@ def _rows(W: ComplexArray, std: FloatArray, turn: ComplexArray) -> tuple[FloatAr
 
 
 def fit_type(
-    records: Sequence[MachineRecord], speeds: FloatArray, sensors: Sequence[str], planes: Sequence[str]
+    records: Sequence[MachineRecord], speeds: ArrayLike, sensors: Sequence[str], planes: Sequence[str]
 ) -> MachineType:
     """Coefficients of a type, from jobs of its machines; those that do not belong are left out and named.
 
@@ -241,12 +230,14 @@ def fit_type(
         )
     notes, assumed = list[str](), int((~std[fits].any(axis=(1, 2, 3))).sum())
     if assumed:
-        none = f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none"
-        notes.append(f"{none}, and ± are too wide rather than too narrow")
+        notes.append(
+            f"{counted(assumed, 'job')} without errors that are stated or measured: they count as none, and "
+            "± are too wide rather than too narrow"
+        )
     if np.isinf(limit):
         notes.append(f"with {counted(len(machines), 'machine')} nothing tells an odd one from the others")
     return MachineType(
-        speeds,
+        np.array(speeds),
         tuple(sensors),
         tuple(planes),
         turn,
@@ -259,53 +250,46 @@ def fit_type(
 
 
 def type_of_fleet(
-    fleet: pd.DataFrame, name: str, grid: Grid | None = None, without: Collection[str] = ()
+    fleet: pd.DataFrame,
+    name: str,
+    read: pd.DataFrame | None = None,
+    mounted: pd.DataFrame | None = None,
+    without: str = "",
 ) -> MachineType:
-    """A type at a grid (None: where most of its coefficients are), without some jobs.
+    """A type where a job has read and mounted weights (None: the first of those with most), without runs.
 
-    ValueError for a type that is not there; UndeterminedError with too few machines.
+    `read` and `mounted` have the columns `READ` and `MOUNTED`. ValueError for a type that is not there;
+    UndeterminedError with too few machines.
     """
-    import pandas as pd
-
-    types = sorted({*fleet["machine_type"]} - {""})
-    if name not in types:
-        hint = did_you_mean(name, types) or f"; there are {listing(types, 'and') or 'none'}"
-        raise ValueError(f"there is no type {name!r} in the fleet{hint}")
-    cells = fleet[(fleet["machine_type"] == name) & ~fleet["job"].isin(list(without))]
+    one_of(name, "the type", sorted({*fleet["machine_type"]} - {""}))
+    cells = fleet[(fleet["machine_type"] == name) & (fleet["runs"] != without)]
     each = cells.drop_duplicates(["runs", "speed_rad_s", "sensor", "plane"])  # without copies
-    grid = grid or _usual(each)
-    if not grid.planes and len(each):
-        grid = _usual(each)._replace(speeds=grid.speeds, sensors=grid.sensors, quantity=grid.quantity)
-    off = np.abs(each["speed_rad_s"].to_numpy()[:, None] / grid.speeds - 1)
-    alike = each["plane"].map(dict(zip(grid.planes, grid.mounted, strict=True))) == each["mounted"]
-    alike &= (each["quantity"] == grid.quantity) & (off.min(axis=1) <= DEFAULT_TOLERANCE / 100)
-    values, keys = ["re", "im", "std"], ["speed", "sensor", "plane"]
-    long = each.assign(speed=off.argmin(axis=1))[alike].drop_duplicates(["job", *keys])
-    every = pd.MultiIndex.from_product([values, range(len(grid.speeds)), grid.sensors, grid.planes])
-    wide = long.pivot(index=["machine", "job"], columns=keys, values=values).reindex(columns=every).dropna()
-    if wide.empty:
-        names = ("sensor", "plane", "quantity", "mounted")
-        there = (f"{one} {listing(sorted({*cells[one]}), 'and')}" for one in names)
-        words = f"no job of {name} has coefficients of all these speeds, sensors and planes; there are"
-        raise UndeterminedError(f"{words} {', '.join(there)}")
-    rows = zip(wide.index, wide.to_numpy().reshape(len(wide), *every.levshape), strict=True)
-    records = [MachineRecord(machine, path, re + 1j * im, std) for (machine, path), (re, im, std) in rows]
-    kind = fit_type(records, grid.speeds, grid.sensors, grid.planes)
+    usual = each[each["job"].isin(each["job"].mode()[:1])]
+    read = usual[READ].drop_duplicates() if read is None else read
+    mounted = usual[MOUNTED].drop_duplicates() if mounted is None else mounted
+    grid = read.merge(mounted, how="cross").reset_index(names="cell")
+    rows = each.merge(grid, on=[*READ[1:], *MOUNTED], suffixes=("", "_wanted"))
+    rows = rows[(rows["speed_rad_s"] / rows["speed_rad_s_wanted"] - 1).abs() <= DEFAULT_TOLERANCE / 100]
+    rows = rows.drop_duplicates(["job", "cell"]).sort_values(["machine", "job", "cell"])
+    rows = rows[rows.groupby("job")["cell"].transform("size") == len(grid)]
+    if rows.empty:
+        there = (f"{one} {listing(sorted({*cells[one]}), 'and')}" for one in (*READ[1:], *MOUNTED))
+        raise UndeterminedError(
+            f"no job of {name} has coefficients of all these speeds, sensors and planes; there are "
+            f"{', '.join(there)}"
+        )
+    where = [grid[one].unique().tolist() for one in ("speed_rad_s", "sensor", "plane")]
+    re, im, std = (rows[part].to_numpy().reshape(-1, *map(len, where)) for part in ("re", "im", "std"))
+    first = rows[:: len(grid)]
+    records = list(map(MachineRecord, first["machine"], first["job"], re + 1j * im, std))
+    kind = fit_type(records, *where)
     left_out, notes = cells["job"].nunique() - len(records), kind.notes
     if left_out:
-        words = "left out: copies of others, or without all of these coefficients"
-        notes = (f"{counted(left_out, 'job')} of {name} {words}", *notes)
-    read, mounted = long[["vibration_unit", "weight_unit"]].iloc[0]
-    labels = Labels(read, vibration(read).scale if read else 1.0, mounted, weight(mounted).scale)
+        about = "left out: copies of others, or without all of these coefficients"
+        notes = (f"{counted(left_out, 'job')} of {name} {about}", *notes)
+    unit, of_weight = rows[["vibration_unit", "weight_unit"]].iloc[0]
+    labels = Labels(unit, vibration(unit).scale if unit else 1.0, of_weight, weight(of_weight).scale)
     return kind._replace(name=name, labels=labels, left_out=left_out, notes=notes)
-
-
-def _usual(cells: pd.DataFrame) -> Grid:
-    """The grid of the first job of those with most coefficients."""
-    part = cells[cells["job"] == cells["job"].mode().iloc[0]]
-    planes, sensors = part.drop_duplicates("plane"), tuple(part["sensor"].unique())
-    mounted = tuple(planes["plane"]), tuple(planes["mounted"])
-    return Grid(np.unique(part["speed_rad_s"]), sensors, part["quantity"].iloc[0], *mounted)
 
 
 class TypeKnowledge(NamedTuple):
@@ -313,8 +297,7 @@ class TypeKnowledge(NamedTuple):
 
     `influence` has what the job's own runs have added, `files` are those of the job and the table of the
     fleet, and so many `earlier` jobs of the machine count. `probability` is that of runs farther from the
-    type, 1 where nothing tells; if it is below `LEVEL`, `reason` would make the machine one of the type ("":
-    not known).
+    type, 1 where nothing tells.
     """
 
     kind: MachineType
@@ -322,15 +305,15 @@ class TypeKnowledge(NamedTuple):
     files: tuple[Path, ...]
     earlier: int
     probability: float
-    reason: str
 
     def judged(self, result: Correction) -> Correction:
         """A correction that is not to be mounted where the machine is not of its type."""
         if self.probability >= LEVEL:
             return result
-        cause = f"by its runs this machine is not of the type {self.kind.name!r} (χ², probability "
-        cause += f"{self.probability:.1g})"
-        cause += f"; it would fit if {self.reason}" if self.reason else ""
+        cause = (
+            f"by its runs this machine is not of the type {self.kind.name!r} "
+            f"(χ², probability {self.probability:.1g})"
+        )
         instead = ("Instead: balance it without --type.",)
         decision = replace(result.decision, word="do not mount", cause=cause, instead=instead)
         return replace(result, decision=decision)
@@ -343,53 +326,40 @@ class TypeKnowledge(NamedTuple):
             "earlier_jobs": self.earlier,
             "probability": self.probability,
             "of_type": self.probability >= LEVEL,
-            "reason": self.reason or None,
         }
 
 
-def type_coefficients(job: Job, address: str, *, refined: bool = False) -> TypeKnowledge:
-    """Coefficients of a job's machine from a type, FLEET:TYPE, and the job's runs; check runs if `refined`.
+def type_coefficients(job: Job, address: str, trials: Trials) -> TypeKnowledge:
+    """Coefficients of a job's machine from a type, FLEET:TYPE, and from runs of the machine.
 
-    ValueError for an address, a fleet or a type that are not there, and check runs that are not.
+    ValueError for an address, a fleet or a type that are not there.
     """
+    import pandas as pd
+
     file, _, name = address.rpartition(":")
     if not file or not name:
         raise ValueError(f"--type {address!r}: expected the table of a fleet and a type, FLEET.parquet:TYPE")
-    fleet, trials, machine = read_fleet(Path(file)), job.trials, machine_of(job)
-    if refined:
-        if job.check is None:
-            raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
-        trials = with_check_runs(trials, job.check)
-    planes = tuple(plane for plane in job.planes if plane in (*job.used, *trials.planes))
-    mounted = tuple(mounted_in(job, plane) for plane in planes)
-    grid = Grid(trials.speeds, trials.sensors, quantity_of(trials.labels), planes, mounted)
-    # the job itself, by its runs, or at the same place as it was before it changed
-    place = f"/{job.files[0].resolve().as_posix()}"
-    here = fleet["job"].map(lambda path: place.endswith(f"/{path}")) & (fleet["machine"] == machine)
-    kind = type_of_fleet(fleet, name, grid, fleet["job"][here | (fleet["runs"] == runs_of(job))])
-    machines, labels = len(kind.machines), trials.labels
-    if not job.planes:  # nothing but a baseline: in the unit of the others' weights
-        unit, scale = kind.labels.weight_unit, kind.labels.weight_scale
-        labels = replace(labels, weight_unit=unit, weight_scale=scale)
-    trials = replace(trials, labels=labels)
-    influence, probability = update(kind.influence(labels, machine), trials)
-    warnings, reason, earlier = list(influence.remarks.warnings), "", 0
+    labels, machine = trials.labels, machine_of(job)
+    read = pd.DataFrame(product(trials.speeds, trials.sensors, [quantity_of(labels)]), columns=READ)
+    planes = [plane for plane in job.planes if plane in (*job.used, *trials.planes)]
+    mounted = pd.DataFrame([(plane, mounted_in(job, plane)) for plane in planes], columns=MOUNTED)
+    kind = type_of_fleet(read_fleet(Path(file)), name, read, mounted if planes else None, runs_of(job))
+    if not planes:  # nothing but a baseline: in the unit of the others' weights
+        labels = replace(labels, weight_unit=kind.labels.weight_unit, weight_scale=kind.labels.weight_scale)
+    influence, probability = update(kind.influence(labels, machine), replace(trials, labels=labels))
+    warnings, machines = list(influence.remarks.warnings), len(kind.machines)
+    earlier = dict(zip(kind.machines, kind.effects.jobs.tolist(), strict=True)).get(machine, 0)
     words = f"coefficients of the type {name!r}, {counted(machines, 'machine')}"
     if machines < ENOUGH and not trials.weights.any():
         warnings.append(_FEW)
-    if machine in kind.machines:
-        earlier = int(kind.effects.jobs[kind.machines.index(machine)])
+    if earlier:
         words += f", and of {counted(earlier, 'earlier job')} of {machine!r}"
         if kind.effects.jobs.max() == 1:
             warnings.append(
                 f"no machine of the type was balanced twice: the errors lack how {machine!r} changed"
             )
-    if probability < LEVEL and np.isfinite(kind.limit):
-        with suppress(ValueError):  # runs that do not give coefficients tell no reason
-            measured = estimate_influence(local_runs(influence, trials))
-            reason = kind.why_odd(MachineRecord(machine, "", measured.W, known_errors(measured)))
     influence = replace(influence, remarks=Remarks(tuple(warnings), (words, *kind.notes)))
-    return TypeKnowledge(kind, influence, (*job.files, Path(file)), earlier, probability, reason)
+    return TypeKnowledge(kind, influence, (*job.files, Path(file)), earlier, probability)
 
 
 def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
@@ -419,32 +389,33 @@ def update(expected: Influence, trials: Trials) -> tuple[Influence, float]:
     reading, run = reading_of(runs), usual_run_errors(runs)
     with suppress(UndeterminedError):  # as runs that tell more than the coefficients show them
         _, reading, run, *_ = estimate_influence(runs).errors
-    noise = run_noise(runs, expected.W, np.eye(R, dtype=complex), reading, run)
-    single, shared = noise.at(kind_sizes(run))  # (S, C, 2R, 2R), (…, S, C, R)
-    single += 1e-12 * (np.trace(single, axis1=-2, axis2=-1).max() or 1.0) * np.eye(2 * R)
+    errors = expected.errors._replace(reading=reading, run=run)
+    noise = replace(expected, errors=errors).difference_noise(runs)
+    columns = noise.at(errors.sizes)[1]  # (M, S, C, R)
     off = np.moveaxis(runs.mean, 0, -1) - expected.W @ runs.weights.T
-    K = real_parts(np.concatenate((change[..., 1:] @ runs.weights.T, shared, off[None])))
-    root, M = np.linalg.cholesky(single), len(K) - 1
-    K = np.linalg.solve(root, np.moveaxis(K, 0, -1))  # (S, C, 2R, M + 1), the last is y
+    K = np.moveaxis(real_parts(np.concatenate((columns, off[None]))), 0, -1)
+    root, M = np.linalg.cholesky(Whitening(noise, errors.sizes).blocks), len(columns)
+    K = np.linalg.solve(root, K)  # (S, C, 2R, M + 1), the last is y
     A = np.linalg.solve(root, np.tile(np.eye(2), (R, 1)))
     G = np.linalg.pinv(A)
     left = np.vstack(((K - A @ (G @ K)).reshape(-1, M + 1), np.eye(M, M + 1)))
-    U, size, V = np.linalg.svd(left[:, :M], full_matrices=False)
-    z = U.T @ left[:, M]
-    epsilon = np.column_stack((z, np.eye(M))).T / size @ V  # (1 + M, M): its mean, and columns of its errors
+    Q, root = np.linalg.qr(left[:, :M])
+    z = Q.T @ left[:, M]
+    epsilon = np.linalg.solve(root, np.column_stack((z, np.eye(M)))).T  # (1 + M, M): mean, errors
     moved = np.tensordot(epsilon[:, : len(change)], change, 1)
     moved[..., 0] = unstretch(np.tensordot(-epsilon, G @ K[..., :M], (1, 3)))[..., 0]
     moved[0, ..., 0] += unstretch((G @ K)[..., M])[..., 0]
     alone = 0 * expected.channels()
     alone[..., :2, :2] = G @ np.swapaxes(G, -1, -2)
-    mounted = Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
     result = replace(
         expected,
         W=expected.W + moved[0, ..., 1:],
         baseline=moved[0, ..., 0],
-        errors=Gaussian(alone, moved[1:], reading, run, mounted),
+        errors=Gaussian(
+            alone, moved[1:], reading, run, Mounted(runs.runs[-1], expected.planes, runs.weights[-1])
+        ),
         labels=trials.labels,
         remarks=Remarks(tuple(dict.fromkeys((*trials.warnings, *reading.warnings)))),
     )
     spare = 2 * off[..., 1:].size
-    return result, float(chdtrc(spare, np.sum((left[:, M] - U @ z) ** 2))) if spare else 1.0
+    return result, float(chdtrc(spare, np.sum((left[:, M] - Q @ z) ** 2))) if spare else 1.0

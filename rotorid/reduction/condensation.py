@@ -233,13 +233,14 @@ def compare_methods(reduction: Reduction) -> Methods:
     n, at_masters = len(places), full.shapes[places - 1]
     pencil = whole_rotor(full.rotor, assemble(full.rotor))
     static, carried = static_shapes(pencil.stiffness, pencil.waves[0][places - 1])
-    motion = reduction.equations_of_motion
+    motion, guyan = reduction.equations_of_motion, _ritz(pencil, static)
+    improved: _Model
     try:
-        improved = _ritz(pencil, _improved(pencil, static, carried))
+        improved = _ritz(pencil, _improved(pencil, static, carried, *guyan[:2]))
     except ValueError as failure:
         improved = None, None, None, np.full(n, np.nan), np.full((n, n), np.nan), str(failure)
     models: dict[str, _Model] = {
-        "Guyan": _ritz(pencil, static),
+        "Guyan": guyan,
         "IRS": improved,
         f"regression, {counted(reduction.modes, 'mode')}": (
             *(motion.M, motion.K, None, reduction.frequencies, reduction.shapes, ""),
@@ -258,15 +259,14 @@ _Model = tuple[FloatArray | None, FloatArray | None, FloatArray | None, FloatArr
 """M, K, T, frequencies and shapes of a method, and what to know about it."""
 
 
-def _matrices(pencil: Pencil, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Tᵀ M T, and Tᵀ K T from strains, which keep their digits on fine meshes."""
-    M = T.T @ multiply(pencil.mass, np.asfortranarray(T))
-    return (M + M.T) / 2, np.asarray(pencil.energy(T))
-
-
-def _improved(pencil: Pencil, static: FloatArray, carried: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """T of IRS."""
-    M, K = _matrices(pencil, static)
+def _improved(
+    pencil: Pencil,
+    static: FloatArray,
+    carried: Callable[[FloatArray], FloatArray],
+    M: FloatArray,
+    K: FloatArray,
+) -> FloatArray:
+    """T of IRS, from M and K of Guyan."""
     least, most = np.linalg.eigvalsh(M)[[0, -1]]
     if least <= MASSLESS * most:
         raise ValueError(
@@ -276,11 +276,14 @@ def _improved(pencil: Pencil, static: FloatArray, carried: Callable[[FloatArray]
     return static + carried(multiply(pencil.mass, np.asfortranarray(static @ np.linalg.solve(M, K))))
 
 
-def _ritz(pencil: Pencil, T: FloatArray) -> _Model:
+def _ritz(
+    pencil: Pencil, T: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, str]:
     """The model whose rotor moves as T."""
     from scipy.linalg import eigh
 
-    M, K = _matrices(pencil, T)
+    M, K = T.T @ multiply(pencil.mass, np.asfortranarray(T)), pencil.energy(T)  # from strains
+    M = (M + M.T) / 2
     mu, shapes = eigh(M, K)  # μ = 1/ω²: the inverse form keeps the digits of the low modes
     mu, shapes = mu[::-1], shapes[:, ::-1]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -67,32 +67,30 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
         For files that cannot be, a result file of another study or of one that is running, a sample that
         fails, and workers that die.
     """
-    import numpy as np
     from scipy.stats import binomtest
 
     from rotorid.files.disk import sha256
     from rotorid.fleet.jobs import arrow
     from rotorid.study.samples import draw_all
-    from rotorid.study.study_file import draw_machine, nominal, read_study
+    from rotorid.study.study_file import draw_machine, influence_of, read_study
 
     options = options or StudyOptions()
     read = read_study(file_of(file, "a study file"))
-    n = read.samples if options.samples is None else options.samples
-    if min(n, options.workers) < 1:
-        raise ValueError("--samples and --workers take a number from 1")
-    results = None if options.results is None else Path(options.results)
-    model, made = nominal(read), provenance(read.files, options)
+    n = options.samples or read.samples
+    model, made = influence_of(read, read.rotor), provenance(read.files, options)
+    if model.windows:
+        raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
     identity = {"version": made["version"], "seed": read.seed, "inputs": [*map(sha256, read.files)]}
     columns = {"sample": "int64"} | {f"ratio_{k}": "double" for k in range(read.corrections + 1)}
     columns |= {"runs_needed": "int32", "held": "bool", "warned": "bool", "why": "string"}
     schema = arrow("a study").schema([*columns.items()], {"study": json.dumps(identity)})
     with _workers(options, executor) as pool:
-        drawn = draw_all(partial(draw_machine, read, model.W), read.seed, n, schema, pool, results)
-    frame = drawn.to_pandas()
-
+        sample = partial(draw_machine, read, model.W)
+        frame = draw_all(sample, read.seed, n, schema, pool, options.results).to_pandas()
     runs = [1, *range(len(read.planes) + 2, len(read.planes) + 2 + read.corrections)]
     met = [int((frame["runs_needed"] <= count).sum()) for count in runs]
-    ends = np.array([binomtest(count, n).proportion_ci() for count in met])  # exact (Clopper and Pearson)
+    intervals = [binomtest(count, n).proportion_ci() for count in met]  # exact (Clopper and Pearson)
+    low, high = zip(*intervals, strict=True)
     shown = "{:.4f}".format
     table = Table(
         "corrections",
@@ -100,9 +98,9 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
             Column("corrections", range(len(runs))),
             Column("runs", runs),
             Column("met", met),
-            Column("probability", np.divide(met, n), shown),
-            Column("low", ends[:, 0], shown),
-            Column("high", ends[:, 1], shown),
+            Column("probability", [count / n for count in met], shown),
+            Column("low", low, shown),
+            Column("high", high, shown),
         ),
     )
     head = f"The limit is met by {100 * met[0] / n:.4g} % as built"
@@ -129,7 +127,7 @@ def study(file: Path | str, options: StudyOptions | None = None, executor: Execu
             "seed": read.seed,
             "warnings": list(model.warnings),
             "probability": met[-1] / n,
-            "interval": ends[-1].tolist(),
+            "interval": [low[-1], high[-1]],
             "rows": table.records,
             "coverage": coverage,
             "not_balanced": reasons,
@@ -150,10 +148,9 @@ def _workers(options: StudyOptions, executor: Executor | None) -> AbstractContex
     try:
         from distributed import Client
 
-        pool: Executor = Client(options.scheduler, timeout=10).get_executor()  # type: ignore[no-untyped-call]
+        return Client(options.scheduler, timeout=10).get_executor()  # type: ignore[no-untyped-call, no-any-return]
     except ImportError as error:
         raise ValueError("--scheduler needs Dask: pip install dask[distributed]") from error
     except (OSError, ValueError) as error:
         words = f"--scheduler {options.scheduler}: no cluster answers there ({error})"
         raise ValueError(words) from error
-    return pool

@@ -1,14 +1,13 @@
 """The samples of a study: drawn by any executor, kept in one Parquet file.
 
 Sample k draws from `default_rng([seed, k])`, and the file is written from all of them in their order, so that
-neither the executor nor a break changes a byte. It is written now and then, and at the end of every run, also
-of one that breaks; what is missing is drawn by the next.
+neither the executor nor a break changes a byte. It is written after each part, also by a run
+that breaks; what is missing is drawn by the next.
 """
 
 from __future__ import annotations
 
 import sqlite3
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
@@ -26,10 +25,8 @@ from rotorid.fleet.jobs import arrow, parquet, read_parquet
 if TYPE_CHECKING:
     import pyarrow as pa
 
-CHUNK = 250
-"""Samples that a worker draws before it gives them back: some seconds of work."""
-KEPT = 10.0
-"""Seconds of work that are lost at most where nobody can write any more, as in a power failure."""
+CHUNK, PARTS = 250, 50
+"""Samples that a worker draws before it gives them back, some seconds of work; but at most so many parts."""
 Row = dict[str, Any]
 Sample = Callable[[np.random.Generator], Row]
 
@@ -46,7 +43,12 @@ def draw(sample: Sample, seed: int, numbers: list[int]) -> list[Row]:
 
 
 def draw_all(
-    sample: Sample, seed: int, samples: int, schema: pa.Schema, pool: Executor, file: Path | None = None
+    sample: Sample,
+    seed: int,
+    samples: int,
+    schema: pa.Schema,
+    pool: Executor,
+    results: Path | str | None = None,
 ) -> pa.Table:
     """All samples, of which those are drawn that the file does not have.
 
@@ -60,7 +62,7 @@ def draw_all(
         Of the table, with `sample` first; its metadata say which study it is.
     pool
         Who draws.
-    file
+    results
         The Parquet file that keeps them; None: nothing does.
 
     Raises
@@ -76,19 +78,17 @@ def draw_all(
             write_files({file: parquet(table)})
         return table
 
-    pa = arrow("a study")
+    pa, file = arrow("a study"), Path(results) if results else None
     with _alone(file) if file else nullcontext():
         rows = _read(file, schema) if file and file.exists() else {}
-        missing, due = [k for k in range(samples) if k not in rows], time.monotonic() + KEPT
-        chunks = [missing[k : k + CHUNK] for k in range(0, len(missing), CHUNK)]
+        missing, size = [k for k in range(samples) if k not in rows], max(CHUNK, samples // PARTS)
+        chunks = [missing[k : k + size] for k in range(0, len(missing), size)]
         try:
             with single_threads():
                 for drawn in pool.map(partial(draw, sample, seed), chunks):
                     rows |= {row["sample"]: row for row in drawn}
                     progress.info("%d of %d samples", len(rows), samples)
-                    if time.monotonic() > due:
-                        kept()
-                        due = time.monotonic() + KEPT
+                    kept()
         except (ValueError, OSError):  # of a sample, or of the file
             raise
         except Exception as error:  # of the executor
@@ -107,10 +107,9 @@ def _alone(file: Path) -> Iterator[None]:
         held = sqlite3.connect(lock, timeout=0)
         held.execute("BEGIN EXCLUSIVE")
     except sqlite3.OperationalError as error:
-        locked = "locked" in str(error)
-        why = (
-            "a study is running on this file: wait for its end" if locked else f"cannot be written ({error})"
-        )
+        why = f"cannot be written ({error})"
+        if "locked" in str(error):
+            why = "a study is running on this file: wait for its end"
         raise ValueError(f"{file}: {why}, or name another") from error
     try:
         yield

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from balancing import (
     ReadingErrors,
@@ -23,9 +22,10 @@ from balancing import (
     estimate_influence,
 )
 from fem import InfluenceCoefficients, Rotor, Sensor, influence
-from fem.parameters import expand, numbers_of, parameter_value, with_parameters
+from fem.parameters import expand, parameter_value, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.files import units
+from rotorid.files.attached import Place
 from rotorid.files.problems import Problems
 from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings import (
@@ -48,27 +48,17 @@ TRIAL = 0.5
 """By how much a trial moves one reading, by the rotor as its file has it: a share of the largest as built."""
 UNDETERMINED = "the readings do not determine a correction"
 UNSTABLE = "the drawn rotor is unstable, and has no steady response"
-_NODE = "the node, a number from 1, or a station"
-Node = Whole | Text
-Percent = Annotated[NotNegative, Field(le=100)]
+_Scatter = dict[str, tuple[float, float]]
 
 
-class PlaneKeys(Settings):
-    """A correction plane: `[planes.NAME]`."""
-
-    node: Node = key(_NODE)
-
-
-class SensorKeys(Settings):
+class SensorKeys(Place):
     """A sensor with its limit: `[sensors.NAME]`."""
 
-    node: Node = key(_NODE)
     angle_deg: Turn = key("direction, with the rotation from x", default=0.0)
     limit: Annotated[Quantity, of(Positive)] = key(
         "largest amplitude allowed",
         "limit_um_pp limit_mm_s_rms",
         units=units.VIBRATION,
-        expected="the limit of the sensor",
     )
 
 
@@ -79,34 +69,33 @@ class UnbalanceKeys(Settings):
         "root mean square of the size; x and y are normal, any angle is as likely",
         "rms_g_mm",
         units=units.UNBALANCE,
-        expected="how large the unbalance is",
     )
 
 
 class ReadingKeys(Settings):
     """Errors of readings, one standard deviation: `[readings]`."""
 
-    amplitude_percent: Percent = key("standard deviation of a reading's amplitude", default=0.0)
-    phase_deg: Annotated[NotNegative, Field(le=180)] = key("standard deviation of its phase", default=0.0)
-    floor_percent: Percent = key("besides in each direction, percent of the sensor's limit", default=0.0)
-    run_percent: Percent = key("from run to run; half of its variance common to a run", default=0.0)
+    amplitude_percent: NotNegative = key("standard deviation of a reading's amplitude", default=0.0)
+    phase_deg: NotNegative = key("standard deviation of its phase", default=0.0)
+    floor_percent: NotNegative = key("besides in each direction, percent of the sensor's limit", default=0.0)
+    run_percent: NotNegative = key("from run to run; half of its variance common to a run", default=0.0)
 
 
 class StudyKeys(Settings):
     """A study file."""
 
     kind: Literal["balance"] = key("what a sample is", default="balance")
-    rotor: Text = key("rotor table or file, relative to this file", expected="the rotor's file")
-    samples: Whole = key("how many, default 1000", default=1000, ge=1, le=10**9)
-    seed: Whole = key("of all that is drawn, default 1", default=1, ge=0, le=2**31)
+    rotor: Text = key("rotor table or file, relative to this file")
+    samples: Whole = key("how many, default 1000", default=1000, ge=1)
+    seed: Whole = key("of all that is drawn, default 1", default=1, ge=0)
     speeds: listed(Positive) = key(  # type: ignore[valid-type]
         "speeds at which limits hold and runs are made",
         "speeds_rpm",
         units=units.SPEED,
         example="speeds_rpm = [1500, 3000]",
     )
-    corrections: Whole = key("most corrections, default none", default=0, ge=0, le=20)
-    planes: dict[str, PlaneKeys] = key("correction planes", default={})
+    corrections: Whole = key("most corrections, default none", default=0, ge=0)
+    planes: dict[str, Place] = key("correction planes", default={})
     sensors: dict[str, SensorKeys] = key("sensors with their limits", min_length=1)
     unbalance: dict[str, UnbalanceKeys] = key("drawn unbalance, by node or station", min_length=1)
     scatter: by_name(NotNegative) = key(  # type: ignore[valid-type]
@@ -115,11 +104,9 @@ class StudyKeys(Settings):
     readings: ReadingKeys = key("errors of readings, which are stated, too", default=ReadingKeys())
 
     def wrong(self) -> Iterator[tuple[str, str]]:
-        """Corrections without planes, a speed twice."""
+        """Corrections without planes."""
         if self.corrections and not self.planes:
             yield "planes", "the planes of the corrections; corrections = 0: as built only"
-        if len({*self.speeds}) < len(self.speeds):
-            yield "speeds", "each speed once"
 
 
 class Study(NamedTuple):
@@ -177,21 +164,25 @@ def read_study(path: str | Path) -> Study:
             return rotor.node(place)
         except ValueError as error:
             section.complain(problems, field, f"a node or station of the rotor: {error}")
-            return 0
+            return 1
 
     planes = {name: node(plane, "node", plane.node) for name, plane in keys.planes.items()}
-    places = {name: node(sensor, "node", sensor.node) for name, sensor in keys.sensors.items()}
-    nodes = tuple(node(keys, "unbalance", place) for place in keys.unbalance)
-    scatter = _scatter(keys, rotor, problems)
+    sensors = {
+        name: Sensor(node(sensor, "node", sensor.node), sensor.angle_deg)
+        for name, sensor in keys.sensors.items()
+    }
+    nodes, scatter = tuple(node(keys, "unbalance", place) for place in keys.unbalance), _Scatter()
+    try:
+        for pattern, percent in keys.scatter.items():
+            spread = float(np.sqrt(np.log1p((percent / 100) ** 2)))
+            scatter |= {path: (parameter_value(rotor, path), spread) for path in expand(rotor, pattern)}
+        with_parameters(rotor, {path: value for path, (value, _) in scatter.items()})  # each number once
+    except ValueError as error:
+        keys.complain(problems, "scatter", f"numbers of the rotor: {error}")
     problems.stop()
+    speeds, errors = np.array(keys.speeds), keys.readings
     limits = [sensor.limit for sensor in keys.sensors.values()]
-    velocity = [limit.unit.kind == "velocity" for limit in limits]
-    speeds, readings = np.array(keys.speeds), keys.readings
-    sizes = (
-        readings.amplitude_percent / 100,
-        float(np.radians(readings.phase_deg)),
-        readings.floor_percent / 100,
-    )
+    sizes = errors.amplitude_percent / 100, np.radians(errors.phase_deg), errors.floor_percent / 100
     return Study(
         keys.samples,
         keys.seed,
@@ -200,46 +191,19 @@ def read_study(path: str | Path) -> Study:
         rotor,
         speeds,
         planes,
-        {name: Sensor(place, keys.sensors[name].angle_deg) for name, place in places.items()},
-        np.where(velocity, 1j * speeds[:, None], 1.0 + 0j) / np.array([limit.si for limit in limits]),
+        sensors,
+        np.where([limit.unit.kind == "velocity" for limit in limits], 1j * speeds[:, None], 1)
+        / np.array([limit.si for limit in limits]),
         nodes,
         np.array([drawn.rms for drawn in keys.unbalance.values()]) / np.sqrt(2),
         scatter,
         ReadingErrors(*sizes) if any(sizes) else None,
-        RunScatter(readings.run_percent / 100) if readings.run_percent else None,
+        RunScatter(errors.run_percent / 100) if errors.run_percent else None,
     )
 
 
-def _scatter(keys: StudyKeys, rotor: Rotor, problems: Problems) -> dict[str, tuple[float, float]]:
-    """Numbers of the rotor by path, each once, with the standard deviation of its logarithm."""
-    scatter, taken = dict[str, tuple[float, float]](), set[object]()
-    for pattern, percent in keys.scatter.items():
-        spread = float(np.sqrt(np.log1p((percent / 100) ** 2)))
-        try:
-            values = {path: parameter_value(rotor, path) for path in expand(rotor, pattern)}
-            for path, value in values.items():
-                numbers = numbers_of(rotor, path)
-                if not numbers or numbers & taken:
-                    raise ValueError(f"{pattern}: each number of the rotor once")
-                taken |= numbers
-                scatter[path] = value, spread
-            if not any(values.values()):
-                raise ValueError(f"{pattern} is 0, and so is any share of it")
-        except ValueError as error:
-            keys.complain(problems, "scatter", f"numbers of the rotor: {error}")
-    return scatter
-
-
-def nominal(study: Study) -> InfluenceCoefficients:
-    """Coefficients (S, C, P + U) of the rotor as its file has it; refuses an unstable one."""
-    model = _influence(study, study.rotor)
-    if model.windows:
-        raise ValueError("the rotor itself is unstable at the speeds of the study: it has no steady response")
-    return model
-
-
-def _influence(study: Study, rotor: Rotor) -> InfluenceCoefficients:
-    """Of unbalance in the planes and at the drawn nodes, in shares of the limits."""
+def influence_of(study: Study, rotor: Rotor) -> InfluenceCoefficients:
+    """Coefficients (S, C, P + U) of the planes and of the drawn unbalance, in shares of the limits."""
     places = [*study.planes.values(), *study.nodes]
     model = influence(rotor, places, list(study.sensors.values()), study.speeds)
     return replace(model, W=model.W * study.gains[..., None])
@@ -248,17 +212,18 @@ def _influence(study: Study, rotor: Rotor) -> InfluenceCoefficients:
 def draw_machine(study: Study, W: ComplexArray, rng: np.random.Generator) -> dict[str, Any]:
     """Largest readings over the limit, as built and after each correction; `runs_needed` to meet it.
 
-    `W` is that of `nominal`. `held`: the 95 % region of the first weights holds the true ones, those of the
-    same weighing of readings without errors; `warned`: this correction had a warning.
+    `W` is that of the rotor as built. `held`: the 95 % region of the first weights holds the true ones, those
+    of the same weighing of readings without errors; `warned`: this correction had a warning.
     """
-    P, stated = len(study.planes), (study.errors, study.run_errors)
+    P = len(study.planes)
     trial = TRIAL / np.abs(W[..., :P]).max(axis=(0, 1))
-    normal = rng.standard_normal(len(study.scatter))
+    values = {
+        path: value * float(np.exp(spread * rng.standard_normal()))
+        for path, (value, spread) in study.scatter.items()
+    }
     unbalance = study.unbalance * _normal(rng, len(study.nodes))
-    if study.scatter:
-        each = zip(normal, study.scatter.items(), strict=True)
-        values = {path: value * float(np.exp(spread * x)) for x, (path, (value, spread)) in each}
-        model = _influence(study, with_parameters(study.rotor, values))
+    if values:
+        model = influence_of(study, with_parameters(study.rotor, values))
         if model.windows:
             return {"why": UNSTABLE}
         W = model.W
@@ -274,12 +239,20 @@ def draw_machine(study: Study, W: ComplexArray, rng: np.random.Generator) -> dic
         if k == 0:
             mounted += [*np.diag(ratio * trial)]
             readings += [_read_sensors(study, bare + W @ weights, rng) for weights in mounted[1:]]
-        runs, names = tuple(map(str, range(len(readings)))), (tuple(study.sensors), tuple(study.planes))
-        trials = Trials(runs, study.speeds, *names, np.array(readings), np.array(mounted))
+        trials = Trials(
+            tuple(map(str, range(len(readings)))),
+            study.speeds,
+            tuple(study.sensors),
+            tuple(study.planes),
+            np.array(readings),
+            np.array(mounted),
+            errors=study.errors,
+            run_errors=study.run_errors,
+        )
         try:
-            estimate = estimate_influence(replace(trials, errors=study.errors, run_errors=study.run_errors))
+            estimate = estimate_influence(trials)
             correction = correct(estimate)
-            if k == 0 and any(stated):
+            if k == 0 and (study.errors or study.run_errors):
                 true = correct(replace(estimate, W=W, baseline=bare)).weights
                 held = bool(correction.region().holds(true)) if correction.region_known else None
                 row |= {"held": held, "warned": bool(correction.warnings)}

@@ -140,7 +140,7 @@ def odd_machines(rng: np.random.Generator, drawn: Type) -> tuple[list[tuple[str,
         other = {"lag for lead": np.conj(W), "another keyphasor mark": turned}.get(what, W[:, order])
         records[m] = record(m, other)
     kind = fit_type(records, *drawn[2:])
-    odd = {each.job: kind.why_odd(each) for each, _ in kind.odd}
+    odd = {each.job: kind.why_odd(each) or "" for each, _ in kind.odd}
     told = [
         (what, str(m) in odd, word in odd.get(str(m), ""))
         for (what, word), m in zip(ODD.items(), chosen, strict=True)

@@ -58,8 +58,7 @@ def test_an_odd_machine_is_found_with_what_would_make_it_fit(what, words):
     assert [record.machine for record, _ in kind.odd] == ["m7"]
     near = [words.format(abs(what) + off) for off in range(-8, 9)] if "{}" in words else [words]
     assert kind.why_odd(every[7]) in near
-    assert kind.why_odd(every[7]._replace(W=every[7].W * 30)) == ""
-    assert kind.why_odd(every[0]) == ""  # a turn by 1° is no reason where none is needed
+    assert kind.why_odd(every[7]._replace(W=every[7].W * 30)) is None
 
 
 def test_few_machines_are_refused_and_widen_the_answer():

@@ -91,6 +91,11 @@ def address(fleet):
     return f"{fleet[0] / 'fans.parquet'}:fan"
 
 
+def coefficients_of(job, table):
+    read = read_job(job)
+    return type_coefficients(read, table, read.trials)
+
+
 def test_a_fit_gives_back_what_was_drawn(fleet):
     outcome = fleet_fit(fleet[0] / "tree")
     table = outcome.to_frame()
@@ -117,7 +122,7 @@ def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
     folder, machines = fleet
 
     def knowledge(job, table=""):
-        return type_coefficients(read_job(job), table or address(fleet))
+        return coefficients_of(job, table or address(fleet))
 
     own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
     assert knowledge(own).earlier == 2
@@ -130,10 +135,6 @@ def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
         np.trace(one.influence.channels()[..., 2:, 2:], axis1=2, axis2=3).sum() for one in (first, other)
     )
     assert near < 0.3 * far
-    runs = shutil.copytree(folder / "tree", tmp_path / "tree") / "fan" / "F2" / "2026-01-01" / "runs.csv"
-    fit(tmp_path / "tree", tmp_path / "fans.parquet")
-    runs.write_text(runs.read_text() + "\n")  # a further run, or a reading that was corrected
-    assert knowledge(runs.parent / "job.toml", f"{tmp_path / 'fans.parquet'}:fan").earlier == 2
 
 
 def test_copies_count_once_and_one_job_a_machine_tells_nothing_within(tmp_path):
@@ -153,7 +154,6 @@ def test_a_machine_of_another_kind_is_not_to_be_balanced_so(fleet, tmp_path):
     machine.W = machine.W * np.exp(1j * np.radians(100))
     answer = balance(machine.job(tmp_path / "turned"), BalanceOptions(machine_type=address(fleet)))
     assert answer.answer.judgement.startswith("Do not mount these weights: by its runs this machine is not")
-    assert "lagged" in answer.of_type.reason
     assert not answer.to_dict()["of_type"]["of_type"]
 
 
@@ -175,10 +175,10 @@ def test_masses_at_another_radius_are_of_another_kind(tmp_path):
     assert outcome.to_dict()["machines"] == ["F0", "F1", "F2", "F4"]
     table = f"{tmp_path / 'f.parquet'}:fan"
     job = Machine(rng).job(tmp_path / "new", runs=1, more=at(100))
-    assert len(type_coefficients(read_job(job), table).kind.machines) == 4
+    assert len(coefficients_of(job, table).kind.machines) == 4
     job = Machine(rng).job(tmp_path / "other", runs=1, more=at(200))
     with pytest.raises(UndeterminedError, match="mounted mass at 100 mm and mass at 150 mm"):
-        type_coefficients(read_job(job), table)
+        coefficients_of(job, table)
 
 
 def test_what_is_wrong_is_refused(fleet, tmp_path):
@@ -190,16 +190,16 @@ def test_what_is_wrong_is_refused(fleet, tmp_path):
             balance(job, BalanceOptions(**options))
 
     refused("expected the table of a fleet and a type, FLEET.parquet:TYPE", machine_type="fan")
-    refused("a table of a fleet .No such file", machine_type=f"{tmp_path / 'none'}:fan")
+    refused("none: expected a file that exists", machine_type=f"{tmp_path / 'none'}:fan")
     refused("a table of a fleet .it is damaged", machine_type=f"{job}:fan")
     pd.read_parquet(store).drop(columns="std").to_parquet(tmp_path / "other.parquet")
-    refused("column std: expected the table that", machine_type=f"{tmp_path / 'other.parquet'}:fan")
-    refused("there is no type 'fun'.*did you mean 'fan'", machine_type=f"{store}:fun")
+    refused("expected the table that rotorid fleet fit", machine_type=f"{tmp_path / 'other.parquet'}:fan")
+    refused("the type .fun. is not known .did you mean .fan.", machine_type=f"{store}:fun")
     refused("no check runs to refine with", machine_type=address(fleet), refine=True)
     refused("balance it from its type .rotorid balance --type FLEET:fan.", UndeterminedError)
     table = pd.read_csv(job.parent / "runs.csv")
     for changed, words in (
-        (table.assign(sensor=["S1", "S9"]), "there are sensor S1 and S2, plane L and R"),
+        (table.assign(sensor=["S1", "S9"]), "sensor S1 and S2, quantity displacement, plane L and R"),
         (table.rename(columns={"amplitude_um_pp": "amplitude_mm_s"}), "quantity displacement"),
     ):
         changed.to_csv(job.parent / "runs.csv", index=False)

@@ -58,7 +58,7 @@ def test_one_worker_two_threads_and_dask_write_the_same_bytes(tmp_path, threads)
 def test_a_study_that_is_killed_and_continued_is_an_unbroken_one(tmp_path, threads):
     file = write(tmp_path, STUDY.replace("= 60", "= 400") + '[scatter]\n"bearing[*].stiffness" = 20')
     small = (
-        "import rotorid.study.samples as s, rotorid.cli; s.CHUNK, s.KEPT = 20, 0.0; "
+        "import rotorid.study.samples as s, rotorid.cli; s.CHUNK = 20; "
         "__name__ == '__main__' and rotorid.cli.main()"
     )
     killed, unbroken = tmp_path / "killed.parquet", tmp_path / "unbroken.parquet"
