@@ -22,7 +22,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
 from rotorid.files import read_job
 from rotorid.files.disk import each_file_once, read_bytes
-from rotorid.files.problems import Problems, printable, refusal
+from rotorid.files.problems import printable, refusal
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 
@@ -144,8 +144,7 @@ def parquet(table: pa.Table) -> bytes:
 
 def read_parquet(path: Path, what: str) -> pa.Table:
     """The table of a Parquet file; InputError, that `what` was expected, where it is not there or damaged."""
-    pa, problems = arrow(what), Problems()
-    data = problems.need(read_bytes(path, problems))
+    pa, data = arrow(what), read_bytes(path)
     try:
         return pa.parquet.read_table(io.BytesIO(data), page_checksum_verification=True)
     except pa.ArrowException as error:
