@@ -240,11 +240,15 @@ def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tu
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
-    """R with R Rᵀ = C, shape (…, n, n), without what is negative of it; in units of a variance (…, n)."""
+    """R with R Rᵀ = C, (…, n, n), without what is negative of it; in units of a variance (…, n).
+
+    R is symmetric in these units: so it is the same whatever eigenvectors a library returns of equal variances.
+    """
     size = np.sqrt(np.maximum(variance, 0.0))
     scale = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(covariance / (scale[..., :, None] * scale[..., None, :]))
-    return np.asarray(scale[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return np.asarray(scale[..., :, None] * root)
 
 
 def _real_problem(
