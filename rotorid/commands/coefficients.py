@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotorid.files.disk import sha256
@@ -104,8 +105,6 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     ValueError
         As `model_places`.
     """
-    from dataclasses import replace
-
     from balancing import model_influence
     from rotorid.commands.model_places import model_places
     from rotorid.commands.one_shot import calibrated
@@ -126,4 +125,10 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         key_phasor=job.key_phasor,
         labels=labels,
     )
-    return computed if job.rotor.calibration is None else calibrated(computed, job, places)
+    if job.rotor.calibration is None:
+        return computed
+    computed = calibrated(computed, job, places)
+    warnings = computed.remarks.warnings
+    if job.rotor.calibration.needs_trial_run:
+        warnings = *warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    return replace(computed, remarks=computed.remarks._replace(warnings=warnings))

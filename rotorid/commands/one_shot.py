@@ -15,7 +15,6 @@ from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
 from rotorid.calibration import RunReadings, run_errors
-from rotorid.commands.coefficients import NEEDS_TRIAL
 
 if TYPE_CHECKING:
     from balancing import Influence
@@ -39,11 +38,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
     errors = Gaussian(none.blocks[0], none.columns, influence.reading, run_errors(job.trials))
-    with_errors = with_parameters(replace(influence, W=W, errors=errors), columns, lack)
-    if not calibration.needs_trial_run:
-        return with_errors
-    warnings = *with_errors.remarks.warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
-    return replace(with_errors, remarks=with_errors.remarks._replace(warnings=warnings))
+    return with_parameters(replace(influence, W=W, errors=errors), columns, lack)
 
 
 def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
