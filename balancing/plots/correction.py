@@ -170,7 +170,8 @@ def amplitudes(
         for aside, vectors, circle, look, name in marks:
             sizes, radii = np.abs(vectors).ravel() * labels.vibration_scale, np.nan_to_num(circle).ravel()
             ax.vlines(places + aside, (sizes - radii).clip(min=0.0), sizes + radii, look["color"])
-            ax.plot(places + aside, sizes, linestyle="", label=name, **look)
+            label = name if radii.any() else name.partition(", with 95")[0]
+            ax.plot(places + aside, sizes, linestyle="", label=label, **look)
             most = max(most, *(sizes + radii))
         if left is None and c.limits is not None and np.isfinite(c.limits.residual).any():
             limit = c.limits.residual.ravel() * labels.vibration_scale

@@ -176,6 +176,6 @@ def _mark_criticals(ax: Axes, criticals: Sequence[tuple[float, float]], top: flo
                 while any(abs(other - height) < gap for other in used):
                     height += gap / 4  # clear of the curves of other modes, and of other words
                 used += [own, height]
-                words = f"{side * own:.0f} rpm, δ = {delta:z.2f}"
+                words = f"{side * own:.0f} rpm, δ = {delta:z.2g}"
                 at = side * own, side * height
                 note(ax, words, at, (-9 * side, 5 * side), ha=ha, va=va, zorder=7, path_effects=white)

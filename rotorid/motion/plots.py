@@ -61,7 +61,7 @@ def motion_figure(motion: MotionRun) -> Figure:
         for ax in row:
             plain(ax)
             if np.abs(ax.get_ylim()).max() < _NOTHING:
-                ax.set_ylim(-1.0, 1.0)
+                ax.set_ylim(-1.0 if ax is row[0] else 0.0, 1.0)
     against = f"{'cycles a turn' if turn else 'Hz'}, backward < 0"
     for ax, label in zip(axes[-1], ("time, s", against), strict=False):
         ax.set_xlabel(label)
@@ -164,9 +164,14 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     """
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
+    whole = ax.inset_axes((1.05, 0.5, 0.4, 0.4), aspect="equal")
+    whole.set_title("the whole clearance", fontsize=TEXT)
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
+        whole.plot(path.real, path.imag, marker=".", markersize=2, **look(k))
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
-    ax.plot(*CIRCLE, color=DARK, label="clearance")
+    for part in (ax, whole):
+        part.plot(*CIRCLE, color=DARK)
+    whole.axis("off")
     x, y = ((part.min() + part.max()) / 2 for part in (Z.real, Z.imag))
     reach = 0.7 * max(np.ptp(Z.real), np.ptp(Z.imag), 0.1)  # the paths fill the axes, not the circle
     ax.set(aspect="equal", xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
@@ -177,7 +182,7 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance")
     ax.set_title(f"{where}; rotation anticlockwise", fontsize=TEXT)
-    ax.legend(frameon=False, fontsize=TEXT, loc="upper left", bbox_to_anchor=(1.03, 1.0))
+    ax.legend(frameon=False, fontsize=TEXT, loc="upper left", bbox_to_anchor=(1.03, 0.4))
     plain(ax)
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from rotorid.waveforms.tacho import Tacho
     from rotorid.waveforms.vectors import Vectors
 
-TURNS = 4
-"""Drawn of a tacho."""
+TURNS, MANY = 4, 30
+"""Drawn of a tacho; vectors of a record that have small marks."""
 
 
 def figure_vectors(each: Sequence[Vectors], labels: Labels, channel: Channel, rate: float) -> Figure:
@@ -49,7 +49,15 @@ def figure_vectors(each: Sequence[Vectors], labels: Labels, channel: Channel, ra
             )
             for ax, y, error in zip(axes, labels.vibration(z), errors, strict=True):
                 name = f"{one.sensors[c]}, {one.orders[k]}×"
-                ax.errorbar(x, y, 2 * error, fmt=MARKERS[n], color=COLORS[n], ms=4, label=name)
+                ax.errorbar(
+                    x,
+                    y,
+                    2 * error,
+                    fmt=MARKERS[n],
+                    color=COLORS[n],
+                    ms=5 if len(x) < MANY else 2.5,
+                    label=name,
+                )
     axes[0].set(ylabel=f"amplitude, {labels.vibration_in or 'as recorded'}", ylim=(0, None))
     axes[1].set(ylabel=f"phase ({labels.phase}), °", ylim=(-10, 370), yticks=range(0, 361, 90))
     for ax in axes:

@@ -81,7 +81,7 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     assert (hollow.get_markerfacecolor(), *hollow.get_xdata()) == ("none", RPM * 800)
     words = sorted((text for text in above.texts if "δ" in text.get_text()), key=lambda text: text.xy)
     texts = [text.get_text() for text in words]
-    assert texts == ["3638 rpm, δ = 0.30", "4021 rpm, δ = 0.19", "7639 rpm, δ = 2.00"]
+    assert texts == ["3638 rpm, δ = 0.3", "4021 rpm, δ = 0.19", "7639 rpm, δ = 2"]
     np.testing.assert_allclose(below.get_lines()[1].get_ydata(), whirl().log_decrements[:, 1])
     assert below.get_ylim()[0] < -0.1
     for ax in (above, below):
