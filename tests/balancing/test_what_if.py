@@ -1,17 +1,20 @@
 """What given weights leave, zones, and corrections that make it worse where they were not made for."""
 
 from dataclasses import replace
+from functools import partial
 
 import fem_rotors
 import numpy as np
 import pytest
-from balancing_data import GRAM, noisy, rms, synthetic
+from balancing_data import GRAM, complex_normal, noisy, rms, synthetic
+from repetitions import repetitions
 
 from balancing import (
     Labels,
     ReadingErrors,
     correct,
     estimate_influence,
+    mode_made_worse,
     model_influence,
     what_if,
     zones_of,
@@ -92,6 +95,37 @@ def test_what_is_not_clearly_worse_is_not_said_to_be(relative, further):
     D = correct(planes, Y0, speeds=planes.speeds[:1], refuse=False).weights
     made = what_if(planes, dict(zip(planes.planes, D, strict=True)), Y0, planes.speeds[:1])
     assert bool(made.worse) == (relative < 0.1 and further < 0)
+
+
+def test_a_mode_beyond_the_readings_is_only_called_worse_where_it_is():
+    """Drawn shafts with unbalance at all nodes or at a few, by a model whose bearings err; the true mode."""
+    rng, said, worse, wrong = np.random.default_rng(8), 0, 0, 0
+    for _ in range(repetitions(60)):
+        at = int(rng.integers(1, 5)), int(rng.integers(17, 22))
+        K = 10 ** rng.uniform(6.5, 9, 2)
+        each = [zip(at, K * factor, strict=True) for factor in (1, rng.uniform(0.7, 1.4, 2))]
+        shafts = [
+            fem_rotors.uniform(20, diameter=0.06, supports=[Support(*one) for one in two]) for two in each
+        ]
+        (first, true), low = (
+            (critical_speeds(shaft, 1).frequencies[0] for shaft in shafts),
+            rng.uniform(0.2, 0.6),
+        )
+        speeds, sensors = np.array([low * min(first, true), 0.98 * true]), {"l": 3, "r": 18}
+        planes = dict(zip("AB", rng.choice(np.arange(2, 21), 2, replace=False).tolist(), strict=True))
+        W = model_influence(shafts[1], {str(k): k for k in range(1, 22)}, sensors, speeds).W
+        U = complex_normal(rng, 21) * (rng.random(21) < rng.choice([0.3, 1.0]))
+        c = correct(model_influence(shafts[0], planes, sensors, speeds[:1]), W[:1] @ U)
+        model = partial(model_at, shafts[0], sensors)
+        words = mode_made_worse(c, model, planes, {}, 21, first)
+        after = W[1] @ U + W[1][:, [planes["A"] - 1, planes["B"] - 1]] @ c.weights
+        rose = rms(after) > rms(W[1] @ U)
+        said, worse, wrong = said + bool(words), worse + rose, wrong + (bool(words) and not rose)
+    assert (wrong, said >= 0.1 * worse, worse >= 3, said >= 1) == (0, True, True, True)
+
+
+def model_at(shaft, sensors, nodes, speeds):
+    return model_influence(shaft, nodes, sensors, speeds)
 
 
 def test_zones_as_they_are_printed():
