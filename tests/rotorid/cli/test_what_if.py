@@ -57,7 +57,7 @@ def test_pieces_in_holes_are_judged_as_those_of_split(cli):
     [
         (("--weights", "left=3"), "'3': a weight at an angle or in a hole, such as"),
         (("--weights", "lft=3@4"), "did you mean 'left'?"),
-        (("--weights", "left=1g@4"), "converts only with a radius"),
+        (("--weights", "left=1g@4"), "converts only with --radius or radius_mm"),
         (("--weights", "left=3#9"), "hole of left '9'"),
         (("--weights", "left=-3@9"), "a value above 0"),
         (("--weights", "left=3@4", "--planes", "left"), "--planes means nothing with --weights"),
