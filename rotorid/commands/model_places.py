@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from balancing import Correction, WhatIf
+    from balancing import Correction, Influence, WhatIf
     from fem import Sensor
+    from rotorid.base.arrays import FloatArray
     from rotorid.base.text import Quantity
     from rotorid.files import Job
 
@@ -82,10 +82,13 @@ def next_mode(job: Job, outlook: Correction | WhatIf) -> tuple[str, ...]:
     beyond = [w for w in critical_speeds_below(job.rotor, REACH * fastest) if w > fastest]
     if not beyond or not {*outlook.planes} <= job.plane_nodes.keys():
         return ()
-    sensors, quantity = job.sensor_places, _quantity(job.trials.labels.vibration_unit)
-    model = partial(model_influence, job.rotor, sensors=sensors, quantity=quantity)
+    rotor, sensors, unit = job.rotor, job.sensor_places, job.trials.labels.vibration_unit
+
+    def model(nodes: Mapping[str, int], speeds: FloatArray) -> Influence:
+        return model_influence(rotor, nodes, sensors, speeds, quantity=_quantity(unit))
+
     levers = {} if outlook.labels.unbalances else job.radii
-    return mode_made_worse(outlook, model, job.plane_nodes, levers, job.rotor.n_nodes, beyond[0])
+    return mode_made_worse(outlook, model, job.plane_nodes, levers, rotor.n_nodes, beyond[0])
 
 
 def _quantity(unit: str) -> Quantity:

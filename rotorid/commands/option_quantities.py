@@ -127,8 +127,8 @@ def weight(
     converted = units.in_job_units(Quantity(what, *amount), unit, radius)
     if converted is None:
         raise ValueError(
-            f"{what}: weights are in {unit} here, to which {amount[1].name} converts only with a radius, "
-            "--radius or radius_mm of the plane"
+            f"{what}: weights are in {unit} here, to which {amount[1].name} converts only with --radius or "
+            "radius_mm of the plane"
         )
     return converted[0]
 

@@ -13,7 +13,7 @@ FLOOR = ReadingErrors(0.005, 0.005, 0.1)
 """Of small readings, too: what is left after weights with errors is within those of a trim."""
 
 
-def checked(seed, factor, *, errors=ERRORS, **options):
+def checked(seed, factor, *, errors=ERRORS, wider=1.0, **options):
     """A job whose check run has `factor` times the proposed weights; truth, and what is left to do."""
     rng = np.random.default_rng(seed)
     exact, W, _ = synthetic(rng)
@@ -26,6 +26,7 @@ def checked(seed, factor, *, errors=ERRORS, **options):
         trials, runs=("check",), readings=noisy(rng, W @ (U + D), errors)[None, None], weights=D[None]
     )
     c = correct(refine(trials, check), refuse=False)
+    c = replace(c, draws=c.weights + wider * (c.draws - c.weights))
     return W @ (U + D), W, U, after_check_run(c, check, **options)
 
 
@@ -34,6 +35,17 @@ def test_what_hardly_reads_anything_is_done(seed):
     *_, left = checked(seed, 1.0, errors=FLOOR, explained=True)
     assert left.word in ("done", "add nothing yet")  # the run itself is better than what a trim promises
     assert not left.trim.any()
+    assert " → " in left.why  # what a trim would reach
+
+
+def test_a_trim_within_its_error_that_may_be_worth_it_is_told():
+    *_, left = checked(0, 0.9, wider=30.0, explained=True)
+    assert (left.word, left.trim.any()) == ("done", False)
+    assert "a trim would be within its own error (rms " in left.why
+    added = left.correction.to_add * 1e3
+    for name, weight in zip("AB", added, strict=True):
+        at = np.degrees(np.angle(weight)) % 360
+        assert f"{name} {abs(weight):.4g} g at {at:.0f}°" in left.why
 
 
 @pytest.mark.parametrize("seed", range(4))

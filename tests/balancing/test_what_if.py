@@ -1,17 +1,20 @@
 """What given weights leave, zones, and corrections that make it worse where they were not made for."""
 
 from dataclasses import replace
+from functools import partial
 
 import fem_rotors
 import numpy as np
 import pytest
-from balancing_data import GRAM, noisy, rms, synthetic
+from balancing_data import GRAM, complex_normal, noisy, rms, synthetic
+from repetitions import repetitions
 
 from balancing import (
     Labels,
     ReadingErrors,
     correct,
     estimate_influence,
+    mode_made_worse,
     model_influence,
     what_if,
     zones_of,
@@ -92,6 +95,30 @@ def test_what_is_not_clearly_worse_is_not_said_to_be(relative, further):
     D = correct(planes, Y0, speeds=planes.speeds[:1], refuse=False).weights
     made = what_if(planes, dict(zip(planes.planes, D, strict=True)), Y0, planes.speeds[:1])
     assert bool(made.worse) == (relative < 0.1 and further < 0)
+
+
+def test_a_mode_beyond_the_readings_is_only_called_worse_where_it_is():
+    """Drawn shafts with unbalance at all nodes or at a few, by a model whose bearings err; the true mode."""
+    rng, sensors, found = np.random.default_rng(8), {"l": 3, "r": 18}, []
+    for _ in range(repetitions(60)):
+        both = 10 ** rng.uniform(6.5, 9, 2) * rng.uniform(0.7, 1.4, (2, 2))
+        supports = [[Support(node, size) for node, size in zip((3, 19), K, strict=True)] for K in both]
+        shaft, true = (fem_rotors.uniform(20, diameter=0.06, supports=each) for each in supports)
+        first, mode = (critical_speeds(each, 1).frequencies[0] for each in (shaft, true))
+        speeds, nodes = [rng.uniform(0.2, 0.6) * min(first, mode), 0.98 * mode], rng.choice(19, 2, False) + 2
+        W = model_influence(true, {str(k): k for k in range(1, 22)}, sensors, speeds).W
+        U = complex_normal(rng, 21) * (rng.random(21) < rng.choice([0.3, 1.0]))
+        planes = dict(zip("AB", nodes.tolist(), strict=True))
+        c = correct(model_influence(shaft, planes, sensors, speeds[:1]), W[:1] @ U)
+        words = mode_made_worse(c, partial(at_nodes, shaft, sensors), planes, {}, 21, first)
+        found.append((bool(words), rms(W[1] @ U + W[1][:, nodes - 1] @ c.weights) > rms(W[1] @ U)))
+    said, worse = np.array(found).T
+    assert said.sum() >= 0.1 * worse.sum() >= 0.3
+    assert worse[said].all()
+
+
+def at_nodes(shaft, sensors, nodes, speeds):
+    return model_influence(shaft, nodes, sensors, speeds)
 
 
 def test_zones_as_they_are_printed():
