@@ -255,10 +255,10 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
             continue
         then = end if step == end - t else t + step
+        bends = DENSE @ stages[0]
         while written < len(times) and times[written] <= then:  # by the method's polynomial of degree 4
             part = (times[written] - t) / step
-            bend = DENSE @ stages[0]
-            bend = bend[0] + part * (bend[1] + part * bend[2])
+            bend = bends[0] + part * (bends[1] + part * bends[2])
             out[written] = (1.0 - part) * state[0] + part * (now[0] + (1.0 - part) * bend)
             written += 1
         state, now = now, state

@@ -1,4 +1,9 @@
-"""Motion in time at a constant speed or through a range of speeds, sampled evenly."""
+"""Motion in time at a constant speed or through a range of speeds, sampled evenly.
+
+A rotor without forces that are not linear, at a constant speed and with mass at all unknowns, has constant
+coefficients: y′ = A y for y = (q, v, 1, e^{iφ}), of which q and v are the real parts, and y(t + h) = e^{Ah} y
+at any step h. All others take the steps of `rotorid.motion.rosenbrock`.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from fem import NodeForce
-from rotorid.base.arrays import ComplexArray, FloatArray, number
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, number
 from rotorid.base.text import counted, rpm_text
 from rotorid.motion.equilibrium import check_journals, named
 from rotorid.motion.rosenbrock import DONE, Equations, Turning, advance, evaluate
@@ -51,7 +56,7 @@ class MotionRun:
     angle
         Of rotation at time 0, rad.
     steps
-        Of the method.
+        Of the method, or samples where none is needed.
     tolerance
         Error of one step, see `rotorid.motion.rosenbrock.advance`.
     stopped
@@ -165,12 +170,16 @@ def run(
     q, v = (np.array(part, dtype=float) for part in start)
     _consistent(system, q, v, (angle, first, (last - first) / time))
     deflections[0] = q[places]
-    others = np.array([float(name[0] not in "xy") for name in system.coordinates])
-    origin = q.copy()
+    others, origin = np.array([float(name[0] not in "xy") for name in system.coordinates]), q.copy()
     largest = _SMALLEST * np.where(others, np.abs(q * others).max(), np.abs(q * (1 - others)).max())
     shorter = min(time, turn)
     h, least, done, steps, stopped = 1e-3 * shorter, 1e-10 * shorter, 1, 0, ""
-    for (begin, end), equations, turning in _pieces(system, (first, last), time, angle, count):
+    exact = not system.forces and first == last and np.linalg.cond(system.M) < 1 / _MASSLESS
+    if exact:
+        deflections, done, steps = _follow(system, q, v, angle, first, times, places), times.size, count
+    for (begin, end), equations, turning in (
+        () if exact else _pieces(system, (first, last), time, angle, count)
+    ):
         at = times[done:][times[done:] <= end]
         out = np.empty((at.size, system.size))
         span, at = (0.0, end - begin), np.minimum(at, end) - begin
@@ -190,6 +199,37 @@ def run(
             break
     z = deflections[:done, :, 0] + 1j * deflections[:done, :, 1]
     return MotionRun(system, names, times[:done], (first, last), z, q, v, angle, steps, tolerance, stopped)
+
+
+def _follow(
+    system: MotionSystem,
+    q: FloatArray,
+    v: FloatArray,
+    angle: float,
+    speed: float,
+    times: FloatArray,
+    places: IndexArray,
+) -> FloatArray:
+    """Some unknowns at the times, of constant coefficients; q and v are those at the last then."""
+    from scipy.linalg import expm
+
+    C, K = system.linear(speed)
+    n = len(q)
+    A = np.zeros((2 * n + 2, 2 * n + 2), complex)
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n] = np.linalg.solve(
+        system.M, np.column_stack((-K, -C, system.weight, system.unbalance * speed**2 + system.bow))
+    )
+    A[-1, -1] = 1j * speed
+    y = np.concatenate((q, v, [1.0, np.exp(1j * angle)]))
+    kept, before = [q[places]], 0.0
+    for step in np.diff(times):
+        if abs(step - before) > 1e-9 * before:
+            change, before = expm(A * step), step
+        y = change @ y
+        kept.append(y[places].real)
+    q[:], v[:] = y[:n].real, y[n : 2 * n].real
+    return np.array(kept)
 
 
 def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> None:
