@@ -20,6 +20,7 @@ from balancing.conventions import Labels
 from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
+from balancing.groups import Groups, Unknowns, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
     Influence,
@@ -58,6 +59,7 @@ __all__ = [
     "Correction",
     "Discrete",
     "Gaussian",
+    "Groups",
     "Holes",
     "Influence",
     "Labels",
@@ -78,6 +80,7 @@ __all__ = [
     "Trials",
     "Unbalance",
     "UndeterminedError",
+    "Unknowns",
     "Verdict",
     "after_check_run",
     "change_of_run",
@@ -94,6 +97,7 @@ __all__ = [
     "from_list",
     "last_run",
     "local_runs",
+    "mapped",
     "match_speeds",
     "model_influence",
     "mount",
@@ -107,6 +111,7 @@ __all__ = [
     "trial_from_coefficients",
     "trial_from_force",
     "unbalance_of_run",
+    "unknowns",
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",

@@ -19,7 +19,7 @@ from rotorid.commands.balance_solution import (
     solve,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS
+from rotorid.commands.coefficients import KINDS, as_measured
 from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
@@ -130,12 +130,12 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
 
-        return influence_bytes(path, influence)
+        return influence_bytes(path, as_measured(read, influence))
 
     def solved_equations() -> Equations:
         from rotorid.report.equations_of_results import correction_equations
 
-        return correction_equations(result)
+        return correction_equations(result.parts or result if result.unknowns else result)
 
     plain = outcome_of(
         result,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rotorid.base.text import listing
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from balancing import Influence, Trials
     from rotorid.files import Job
@@ -27,6 +29,10 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     refined
         By the check runs of the job.
 
+    Returns
+    -------
+    Of groups where the trial weights tell these alone, else of planes.
+
     Raises
     ------
     ValueError
@@ -34,8 +40,9 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     UndeterminedError
         Where the runs do not determine the coefficients.
     """
-    from balancing import UndeterminedError, combine, estimate_influence, refine
+    from balancing import UndeterminedError, combine, estimate_influence, mapped, refine, unknowns
     from rotorid.commands.one_shot import counted_before
+    from rotorid.files.job_planes import in_planes
 
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
@@ -48,19 +55,67 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
             kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
-    check = job.check if refined else None
+    check = counted(job) if refined else None
     if refined and check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
     if check is not None and (kind == "computed" or job.influence is not None):
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     if kind == "computed":
-        return computed(job, 0.0), job.trials
+        return computed(job, 0.0), in_planes(job.trials, job.groups)
     baseline = None if job.influence is None else job.trials
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
         calibrated = job.rotor is not None and job.rotor.calibration
-        measured = combine(measured, computed(job, 0.0 if calibrated else MODEL_ERROR))
+        model = computed(job, 0.0 if calibrated else MODEL_ERROR)
+        of = unknowns(job.groups, measured.planes, model.planes)
+        measured = combine(measured, mapped(model, of.names, of.shares) if of.constrained else model)
     return measured, baseline
+
+
+def counted(job: Job) -> Trials | None:
+    """The check runs with weights in what the trial runs have theirs in; None: there are none.
+
+    Raises
+    ------
+    ValueError
+        Where what was mounted is beside the groups of the trial weights.
+    """
+    from balancing import unknowns
+
+    if job.check is None or job.groups.keys().isdisjoint(job.trials.planes):
+        return job.check
+    return unknowns(job.groups, job.trials.planes).of_runs(job.check)
+
+
+def of_planes(
+    job: Job, coefficients: tuple[Influence, Trials | None], names: Sequence[str] = ()
+) -> tuple[Influence, Trials | None]:
+    """Coefficients of groups, and their runs, as those of planes: right for weights of these groups alone.
+
+    Raises
+    ------
+    ValueError
+        Where planes or other groups of these names are asked for.
+    """
+    import numpy as np
+
+    from balancing import mapped, unknowns
+    from rotorid.files.job_planes import in_planes
+
+    influence, runs = coefficients
+    if job.groups.keys().isdisjoint(influence.planes):
+        return coefficients
+    of = unknowns(job.groups, influence.planes)
+    asked = unknowns(job.groups, names or of.names)
+    whole = of.over(asked.planes)
+    shares = dict(zip(asked.planes, asked.shares, strict=True))
+    nothing = 0 * asked.shares[0]
+    if whole.beside(np.array([shares.get(plane, nothing) for plane in whole.planes]).T) > 1e-9:
+        raise ValueError(
+            f"the trial weights were in {listing(map(repr, of.names), 'and')} only, which does not tell what "
+            f"{listing(map(repr, asked.names), 'and')} would do: choose of these, or add trial runs"
+        )
+    return mapped(influence, of.planes, of.inverse), runs and in_planes(runs, job.groups)
 
 
 def _separate(trials: Trials) -> bool:
@@ -74,9 +129,21 @@ def _separate(trials: Trials) -> bool:
     return True
 
 
+def as_measured(job: Job, influence: Influence) -> Influence:
+    """Coefficients of planes as those of the groups that the trial weights tell alone."""
+    from balancing import mapped, unknowns
+
+    stated = job.trials.planes if job.influence is None else job.influence.planes
+    if job.groups.keys().isdisjoint(stated):
+        return influence
+    of = unknowns(job.groups, stated, influence.planes)
+    return mapped(influence, of.names, of.shares)
+
+
 def used_planes(job: Job, influence: Influence) -> list[str]:
-    """Planes of these coefficients that the job does not leave out."""
-    return [plane for plane in influence.planes if plane in job.used or plane not in job.planes]
+    """Planes and groups of these coefficients of which the job does not leave out a plane."""
+    left_out = job.planes.keys() - job.used
+    return [name for name in influence.planes if left_out.isdisjoint(job.groups.get(name, (name,)))]
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials
+from balancing import Groups, Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
@@ -25,7 +25,15 @@ from rotorid.files.job_models import (
     WrittenJob,
     named_tables,
 )
-from rotorid.files.job_planes import in_model, make_holes, make_limits, planes_of, row_weights, with_taken
+from rotorid.files.job_planes import (
+    as_coefficients,
+    in_model,
+    make_holes,
+    make_limits,
+    planes_of,
+    row_weights,
+    with_taken,
+)
 from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials
@@ -53,6 +61,9 @@ class Job:
     planes
         By name, what the job says of each (P): those of stored coefficients or else of the weights, then
         those that only the rotor model knows. A `node` is a number; lengths in m, angles as the job counts.
+    groups
+        The weight of each plane of each group where that of the group is 1; `trials` and `influence` are in
+        groups where these are all that is known of planes.
     sensors
         The same for each sensor of the readings (C).
     limits
@@ -84,6 +95,7 @@ class Job:
     conventions: Conventions
     files: tuple[Path, ...]
     planes: dict[str, Plane] = field(default_factory=dict)
+    groups: Groups = field(default_factory=dict)
     sensors: dict[str, Sensor] = field(default_factory=dict)
     limits: Limits | None = None
     row_weights: FloatArray | None = None
@@ -239,7 +251,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
-    trials, planes = planes_of(settings, trials, influence, rotor, problems)
+    trials, influence, planes = planes_of(settings, trials, influence, rotor, problems)
+    groups = settings.shares(trials.labels)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)
     holes = make_holes(planes, trials.labels, limits, problems)
@@ -248,7 +261,10 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         from rotorid.files.further_runs import check_runs
 
         sources = tables["check"], mounted
-        check = check_runs(sources, trials, [*planes], conventions, settings.errors, slow_roll, problems)
+        stated_errors = settings.errors
+        check = check_runs(
+            sources, trials, [*planes], groups, conventions, stated_errors, slow_roll, problems
+        )
         if check is not None and mounted is not None:
             holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
@@ -259,7 +275,9 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     degrees = [angle for plane in planes.values() for angle in plane.angles]
     if rotor is not None:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
-    vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
+    shares = np.array([share for group in groups.values() for share in group.values()], dtype=complex)
+    vectors = [trials.weights, shares, np.exp(1j * np.radians(degrees))]
+    vectors += [] if check is None else [check.weights]
     matters = {"phase": True, "angles": any(map(off_axis, vectors))}
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
@@ -268,6 +286,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         conventions=conventions,
         files=tuple(file for file in files if isinstance(file, Path)),
         planes=planes,
+        groups=groups,
         sensors=sensors,
         limits=limits,
         row_weights=weights,
@@ -332,6 +351,8 @@ def _readings(
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     if source is not None and influence is not None and trials is not None:
+        groups = settings.shares(conventions.labels)
+        trials = as_coefficients(trials, influence, settings, groups, problems)
         tolerance = conventions.speed_tolerance_percent
         influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:

@@ -3,6 +3,8 @@
 Where material is removed, a hole drilled at the angle φ acts like a weight added at φ + 180°. Holes and
 forbidden arcs then have the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is
 the correction. Against the rotation an angle a of the job is −a here, and an arc begins where it ended there.
+
+Trial weights in groups are those of their planes, unless they do not tell these apart: then the groups stay.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials, from_list
+from balancing import Groups, Holes, Influence, Labels, Limits, Trials, from_list, mapped, unknowns
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -82,10 +84,14 @@ def planes_of(
     influence: Influence | None,
     rotor: Rotor | None,
     problems: Problems,
-) -> tuple[Trials, dict[str, Plane]]:
-    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone."""
-    stated = settings.planes
-    measured = trials.planes if influence is None else influence.planes
+) -> tuple[Trials, Influence | None, dict[str, Plane]]:
+    """Readings with weights at the correction radius, coefficients, planes: of the tables, then the model's.
+
+    Weights and coefficients are those of planes, or of groups where these are all that is known of planes.
+    """
+    stated, groups = settings.planes, settings.shares(trials.labels)
+    names = trials.planes if influence is None else influence.planes
+    measured = tuple(dict.fromkeys(plane for name in names for plane in groups.get(name, (name,))))
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
@@ -96,16 +102,63 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    for kind, names in (("planes", [*planes]), ("sensors", trials.sensors)):
-        for name, part in getattr(settings, kind).items() if names else ():
-            if name not in names:
-                expected = f"one of the job's {kind}, {listing(names, 'and')}{did_you_mean(name, names)}"
+    for kind, there in (("planes", [*planes]), ("sensors", trials.sensors)):
+        for name, part in getattr(settings, kind).items() if there else ():
+            if name not in there:
+                expected = f"one of the job's {kind}, {listing(there, 'and')}{did_you_mean(name, there)}"
                 if kind == "planes":
                     expected += f"; there is no trial weight in plane {name!r}: is its row missing?"
                 problems.append(replace(part.problem("", expected), value=name))
+    for group in settings.groups.values() if planes else ():
+        if lost := [plane for plane in group.planes if plane not in planes]:
+            expected = f"planes of the job, {listing(planes, 'and')}, not {lost[0]!r}"
+            group.complain(problems, "planes", expected + did_you_mean(lost[0], planes))
     if not trials.labels.unbalances:
-        trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
-    return trials, planes
+        levers = [[planes[plane].lever for plane in groups.get(name, (name,))] for name in trials.planes]
+        for name, several in zip(trials.planes, levers, strict=True):
+            if len(set(several)) > 1:
+                expected = "planes with the same ratio of trial_radius_mm to radius_mm"
+                settings.groups[name].complain(problems, "planes", expected)
+        trials = replace(trials, weights=trials.weights * [several[0] for several in levers])
+    return *_told_apart(trials, influence, groups), planes
+
+
+def _told_apart(
+    trials: Trials, influence: Influence | None, groups: Groups
+) -> tuple[Trials, Influence | None]:
+    """Weights and coefficients of groups as those of planes, if they tell these apart."""
+    names = trials.planes if influence is None else influence.planes
+    try:
+        of = None if groups.keys().isdisjoint(names) else unknowns(groups, names)
+    except ValueError:  # more than the planes need
+        of = None
+    if of is not None and of.constrained:
+        return trials, influence
+    whole = influence if influence is None or of is None else mapped(influence, of.planes, of.inverse)
+    return in_planes(trials, groups), whole
+
+
+def as_coefficients(
+    trials: Trials, influence: Influence, settings: JobSettings, groups: Groups, problems: Problems
+) -> Trials:
+    """Runs with weights in what stored coefficients are of: planes, or groups."""
+    if not trials.planes or groups.keys().isdisjoint((*trials.planes, *influence.planes)):
+        return trials
+    try:
+        return unknowns(groups, influence.planes).of_runs(in_planes(trials, groups), 0.0)
+    except ValueError as error:
+        settings.complain(problems, "weights", f"weights of which the effect is stored: {error}")
+        return trials
+
+
+def in_planes(trials: Trials, groups: Groups) -> Trials:
+    """Runs with weights in planes, where they have some in groups."""
+    if groups.keys().isdisjoint(trials.planes):
+        return trials
+    columns = [groups.get(name, {name: 1.0}) for name in trials.planes]
+    planes = tuple(dict.fromkeys(plane for column in columns for plane in column))
+    shares = np.array([[column.get(plane, 0.0) for plane in planes] for column in columns], dtype=complex)
+    return replace(trials, planes=planes, weights=trials.weights @ shares)
 
 
 def make_limits(
