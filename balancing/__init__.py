@@ -20,7 +20,7 @@ from balancing.conventions import Labels
 from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
-from balancing.groups import Groups, Unknowns, mapped, unknowns
+from balancing.groups import Groups, Unknowns, held, in_planes, mapped, members, unknowns
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
     Influence,
@@ -95,10 +95,13 @@ __all__ = [
     "estimate_unbalance",
     "expected_lag",
     "from_list",
+    "held",
+    "in_planes",
     "last_run",
     "local_runs",
     "mapped",
     "match_speeds",
+    "members",
     "model_influence",
     "mount",
     "reading_of",

@@ -19,15 +19,17 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 
 from balancing.influence import Influence
 from balancing.trials import Arc, Limits, Trials
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.choices import did_you_mean
-from rotorid.base.text import listing
+from rotorid.base.text import listing, percent
 
 Groups = Mapping[str, Mapping[str, complex]]
 """By group: the weight in each of its planes where that of the group is 1."""
+ROUNDING = 1e-9
 PIECES = 0.2
 """Share of what is mounted that may be beside groups: pieces are not exactly what they stand for."""
 
@@ -48,16 +50,6 @@ class Unknowns(NamedTuple):
     def inverse(self) -> ComplexArray:
         """G⁺ (U, P)."""
         return np.asarray(np.linalg.pinv(self.shares))
-
-    def over(self, planes: Sequence[str]) -> Unknowns:
-        """With these planes too, in which they put nothing."""
-        more = tuple(plane for plane in planes if plane not in self.planes)
-        return Unknowns(self.names, self.planes + more, np.pad(self.shares, ((0, len(more)), (0, 0))))
-
-    def beside(self, weights: ComplexArray) -> float:
-        """Share of weights (…, P) that the unknowns do not make."""
-        left = weights - weights @ (self.shares @ self.inverse).T
-        return float(np.linalg.norm(left) / (np.linalg.norm(weights) or 1.0))
 
     def limits(self, limits: Limits) -> Limits:
         """Limits of the planes, in their order, as those of the unknowns.
@@ -90,16 +82,39 @@ class Unknowns(NamedTuple):
         ValueError
             Where these are off by more than a share of the weights.
         """
-        whole = self.over(trials.planes)
-        weights = np.zeros((len(trials.runs), len(whole.planes)), dtype=complex)
-        weights[:, [whole.planes.index(plane) for plane in trials.planes]] = trials.weights
-        if (share := whole.beside(weights)) > max(allowed, 1e-9):
-            names = listing(map(repr, self.names), "and")
+        planes = tuple(dict.fromkeys((*self.planes, *trials.planes)))
+        weights = np.zeros((len(trials.runs), len(planes)), dtype=complex)
+        weights[:, [planes.index(plane) for plane in trials.planes]] = trials.weights
+        q = weights[:, : len(self.planes)] @ self.inverse.T
+        made = np.pad(q @ self.shares.T, ((0, 0), (0, len(planes) - len(self.planes))))
+        beside = float(norm(weights - made) / (norm(weights) or 1.0))
+        if beside > max(allowed, ROUNDING):
             raise ValueError(
-                f"{100 * share:.2g} % of what is mounted is beside {names}, and what that does is not known: "
-                "it takes trial weights in the planes themselves"
+                f"{percent(beside)} % of what is mounted is beside {listing(map(repr, self.names), 'and')}, "
+                "and what that does is not known: it takes trial weights in the planes themselves"
             )
-        return replace(trials, planes=self.names, weights=weights @ whole.inverse.T)
+        return replace(trials, planes=self.names, weights=q)
+
+
+def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
+    """Groups and planes of these names, where they do not tell planes apart; None: they do."""
+    try:
+        of = unknowns(groups, names) if set(names) & set(groups) else None
+    except ValueError:  # more than the planes need
+        return None
+    return of if of is not None and of.constrained else None
+
+
+def members(groups: Groups, names: Sequence[str]) -> tuple[str, ...]:
+    """The planes of groups and planes of these names."""
+    return tuple(dict.fromkeys(plane for name in names for plane in groups.get(name, (name,))))
+
+
+def in_planes(trials: Trials, groups: Groups) -> Trials:
+    """Runs with weights in planes, where they have some in groups."""
+    planes, columns = members(groups, trials.planes), [groups.get(n, {n: 1.0}) for n in trials.planes]
+    shares = np.array([[column.get(plane, 0.0) for plane in planes] for column in columns])
+    return replace(trials, planes=planes, weights=trials.weights @ shares) if columns else trials
 
 
 def unknowns(groups: Groups, names: Sequence[str], planes: Sequence[str] | None = None) -> Unknowns:
@@ -119,8 +134,7 @@ def unknowns(groups: Groups, names: Sequence[str], planes: Sequence[str] | None 
     ValueError
         For a name or a plane of a group that is not there, and for unknowns that depend on each other.
     """
-    columns = [groups.get(name, {name: 1.0}) for name in names]
-    inside = dict.fromkeys(plane for column in columns for plane in column)
+    columns, inside = [groups.get(name, {name: 1.0}) for name in names], members(groups, names)
     there = tuple(planes or inside)
     if lost := next((plane for plane in inside if plane not in there), None):
         of = next(name for name, column in zip(names, columns, strict=True) if lost in column)

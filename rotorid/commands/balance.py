@@ -19,7 +19,7 @@ from rotorid.commands.balance_solution import (
     solve,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS, as_measured
+from rotorid.commands.coefficients import KINDS, as_measured, counted
 from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
@@ -109,7 +109,11 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     elif options.split and (read.holes or read.check_pieces is None):
         mounted = mount(result, influence, runs, read.holes, on_top=options.refine)
     if read.check is not None and not options.refine:
-        check = replace(compare_check(result, read.check, influence, runs), as_proposed=not stated)
+        compared = result, read.check, influence, runs
+        if read.held is not None and result.parts is not None and (there := counted(read)) is not None:
+            own = as_measured(read, influence)
+            compared = result.parts, there, own, runs and read.held.of_runs(runs)
+        check = replace(compare_check(*compared), as_proposed=not stated)
     tolerance = _tolerance(result.planes, options)
     verdict = _judge(result, influence, read, tolerance, mounted)
     if read.check is not None:

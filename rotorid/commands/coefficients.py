@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
@@ -40,9 +41,15 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     UndeterminedError
         Where the runs do not determine the coefficients.
     """
-    from balancing import UndeterminedError, combine, estimate_influence, mapped, refine, unknowns
+    from balancing import (
+        UndeterminedError,
+        combine,
+        estimate_influence,
+        in_planes,
+        refine,
+        unknowns,
+    )
     from rotorid.commands.one_shot import counted_before
-    from rotorid.files.job_planes import in_planes
 
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
@@ -63,12 +70,12 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     if kind == "computed":
         return computed(job, 0.0), in_planes(job.trials, job.groups)
     baseline = None if job.influence is None else job.trials
+    if job.influence is not None and job.groups.keys() & job.influence.planes:
+        baseline = unknowns(job.groups, job.influence.planes).of_runs(job.trials)
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
         calibrated = job.rotor is not None and job.rotor.calibration
-        model = computed(job, 0.0 if calibrated else MODEL_ERROR)
-        of = unknowns(job.groups, measured.planes, model.planes)
-        measured = combine(measured, mapped(model, of.names, of.shares) if of.constrained else model)
+        measured = combine(measured, as_measured(job, computed(job, 0.0 if calibrated else MODEL_ERROR)))
     return measured, baseline
 
 
@@ -80,11 +87,7 @@ def counted(job: Job) -> Trials | None:
     ValueError
         Where what was mounted is beside the groups of the trial weights.
     """
-    from balancing import unknowns
-
-    if job.check is None or job.groups.keys().isdisjoint(job.trials.planes):
-        return job.check
-    return unknowns(job.groups, job.trials.planes).of_runs(job.check)
+    return job.check if job.check is None or job.held is None else job.held.of_runs(job.check)
 
 
 def of_planes(
@@ -95,27 +98,28 @@ def of_planes(
     Raises
     ------
     ValueError
-        Where planes or other groups of these names are asked for.
+        Where others of these names are asked for.
     """
     import numpy as np
 
-    from balancing import mapped, unknowns
-    from rotorid.files.job_planes import in_planes
+    from balancing import in_planes, mapped, unknowns
 
     influence, runs = coefficients
     if job.groups.keys().isdisjoint(influence.planes):
         return coefficients
     of = unknowns(job.groups, influence.planes)
-    asked = unknowns(job.groups, names or of.names)
-    whole = of.over(asked.planes)
-    shares = dict(zip(asked.planes, asked.shares, strict=True))
-    nothing = 0 * asked.shares[0]
-    if whole.beside(np.array([shares.get(plane, nothing) for plane in whole.planes]).T) > 1e-9:
+    if of.constrained and (lost := [name for name in names if name not in of.names]):
         raise ValueError(
             f"the trial weights were in {listing(map(repr, of.names), 'and')} only, which does not tell what "
-            f"{listing(map(repr, asked.names), 'and')} would do: choose of these, or add trial runs"
+            f"{lost[0]!r} would do: choose of these, or add trial runs"
         )
-    return mapped(influence, of.planes, of.inverse), runs and in_planes(runs, job.groups)
+    influence = mapped(influence, of.planes, of.inverse)
+    if job.check is not None and job.check.planes and influence.mounted.run == job.check.runs[-1]:
+        there = dict(zip(job.check.planes, job.check.weights[-1], strict=True))
+        weights = np.array([there.get(plane, 0.0) for plane in of.planes])  # all of it, whatever counted
+        mounted = influence.mounted._replace(weights=weights)
+        influence = replace(influence, errors=influence.errors._replace(mounted=mounted))
+    return influence, runs and in_planes(runs, job.groups)
 
 
 def _separate(trials: Trials) -> bool:
@@ -130,14 +134,11 @@ def _separate(trials: Trials) -> bool:
 
 
 def as_measured(job: Job, influence: Influence) -> Influence:
-    """Coefficients of planes as those of the groups that the trial weights tell alone."""
-    from balancing import mapped, unknowns
+    """Coefficients of planes as those of the groups that do not tell planes apart."""
+    from balancing import mapped
 
-    stated = job.trials.planes if job.influence is None else job.influence.planes
-    if job.groups.keys().isdisjoint(stated):
-        return influence
-    of = unknowns(job.groups, stated, influence.planes)
-    return mapped(influence, of.names, of.shares)
+    of = job.held
+    return influence if of is None else mapped(influence, of.names, of.shares)
 
 
 def used_planes(job: Job, influence: Influence) -> list[str]:
@@ -156,8 +157,6 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     ValueError
         As `model_places`.
     """
-    from dataclasses import replace
-
     from balancing import model_influence
     from rotorid.commands.model_places import model_places
     from rotorid.commands.one_shot import calibrated

@@ -19,13 +19,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Groups, Influence, Trials
+from balancing import Groups, Influence, Trials, in_planes
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
-from rotorid.files.job_planes import in_planes
 from rotorid.files.layout import Conventions
 from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds

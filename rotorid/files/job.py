@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Groups, Holes, Influence, Labels, Limits, Trials
+from balancing import Groups, Holes, Influence, Labels, Limits, Trials, Unknowns, held, in_planes, members
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
@@ -26,7 +26,6 @@ from rotorid.files.job_models import (
     named_tables,
 )
 from rotorid.files.job_planes import (
-    as_coefficients,
     in_model,
     make_holes,
     make_limits,
@@ -62,8 +61,7 @@ class Job:
         By name, what the job says of each (P): those of stored coefficients or else of the weights, then
         those that only the rotor model knows. A `node` is a number; lengths in m, angles as the job counts.
     groups
-        The weight of each plane of each group where that of the group is 1; `trials` and `influence` are in
-        groups where these are all that is known of planes.
+        The weight of each plane of each group where that of the group is 1.
     sensors
         The same for each sensor of the readings (C).
     limits
@@ -112,6 +110,11 @@ class Job:
     def check_of_weights(self) -> bool:
         """Whether the weights were mounted for the check, although there are holes for pieces."""
         return self.settings.check_weights == WEIGHTS and not self.check_mounted
+
+    @property
+    def held(self) -> Unknowns | None:
+        """The groups of stored coefficients or of trial weights, where these do not tell planes apart."""
+        return held(self.groups, (self.trials if self.influence is None else self.influence).planes)
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -251,7 +254,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
-    trials, influence, planes = planes_of(settings, trials, influence, rotor, problems)
+    trials, planes = planes_of(settings, trials, influence, rotor, problems)
     groups = settings.shares(trials.labels)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)
@@ -352,9 +355,10 @@ def _readings(
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     if source is not None and influence is not None and trials is not None:
         groups = settings.shares(conventions.labels)
-        trials = as_coefficients(trials, influence, settings, groups, problems)
+        trials = in_planes(trials, groups)
         tolerance = conventions.speed_tolerance_percent
-        influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)
+        planes = members(groups, influence.planes)
+        influence = fit_to_readings(influence, trials, planes, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels

@@ -3,8 +3,6 @@
 Where material is removed, a hole drilled at the angle φ acts like a weight added at φ + 180°. Holes and
 forbidden arcs then have the angles of these equivalent weights: amounts are positive, and Σ amounts e^{iφ} is
 the correction. Against the rotation an angle a of the job is −a here, and an arc begins where it ended there.
-
-Trial weights in groups are those of their planes, unless they do not tell these apart: then the groups stay.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Groups, Holes, Influence, Labels, Limits, Trials, from_list, mapped, unknowns
+from balancing import Holes, Influence, Labels, Limits, Trials, from_list, held, in_planes, members
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -84,14 +82,13 @@ def planes_of(
     influence: Influence | None,
     rotor: Rotor | None,
     problems: Problems,
-) -> tuple[Trials, Influence | None, dict[str, Plane]]:
-    """Readings with weights at the correction radius, coefficients, planes: of the tables, then the model's.
+) -> tuple[Trials, dict[str, Plane]]:
+    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone.
 
-    Weights and coefficients are those of planes, or of groups where these are all that is known of planes.
+    The weights are those of planes, or of groups where they do not tell planes apart.
     """
     stated, groups = settings.planes, settings.shares(trials.labels)
-    names = trials.planes if influence is None else influence.planes
-    measured = tuple(dict.fromkeys(plane for name in names for plane in groups.get(name, (name,))))
+    measured = members(groups, trials.planes if influence is None else influence.planes)
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
@@ -113,52 +110,14 @@ def planes_of(
         if lost := [plane for plane in group.planes if plane not in planes]:
             expected = f"planes of the job, {listing(planes, 'and')}, not {lost[0]!r}"
             group.complain(problems, "planes", expected + did_you_mean(lost[0], planes))
+    trials, of = in_planes(trials, groups), held(groups, trials.planes)
     if not trials.labels.unbalances:
-        levers = [[planes[plane].lever for plane in groups.get(name, (name,))] for name in trials.planes]
-        for name, several in zip(trials.planes, levers, strict=True):
-            if len(set(several)) > 1:
-                expected = "planes with the same ratio of trial_radius_mm to radius_mm"
-                settings.groups[name].complain(problems, "planes", expected)
-        trials = replace(trials, weights=trials.weights * [several[0] for several in levers])
-    return *_told_apart(trials, influence, groups), planes
-
-
-def _told_apart(
-    trials: Trials, influence: Influence | None, groups: Groups
-) -> tuple[Trials, Influence | None]:
-    """Weights and coefficients of groups as those of planes, if they tell these apart."""
-    names = trials.planes if influence is None else influence.planes
+        trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
     try:
-        of = None if groups.keys().isdisjoint(names) else unknowns(groups, names)
-    except ValueError:  # more than the planes need
-        of = None
-    if of is not None and of.constrained:
-        return trials, influence
-    whole = influence if influence is None or of is None else mapped(influence, of.planes, of.inverse)
-    return in_planes(trials, groups), whole
-
-
-def as_coefficients(
-    trials: Trials, influence: Influence, settings: JobSettings, groups: Groups, problems: Problems
-) -> Trials:
-    """Runs with weights in what stored coefficients are of: planes, or groups."""
-    if not trials.planes or groups.keys().isdisjoint((*trials.planes, *influence.planes)):
-        return trials
-    try:
-        return unknowns(groups, influence.planes).of_runs(in_planes(trials, groups), 0.0)
+        trials = trials if of is None else of.of_runs(trials, 0.0)
     except ValueError as error:
-        settings.complain(problems, "weights", f"weights of which the effect is stored: {error}")
-        return trials
-
-
-def in_planes(trials: Trials, groups: Groups) -> Trials:
-    """Runs with weights in planes, where they have some in groups."""
-    if groups.keys().isdisjoint(trials.planes):
-        return trials
-    columns = [groups.get(name, {name: 1.0}) for name in trials.planes]
-    planes = tuple(dict.fromkeys(plane for column in columns for plane in column))
-    shares = np.array([[column.get(plane, 0.0) for plane in planes] for column in columns], dtype=complex)
-    return replace(trials, planes=planes, weights=trials.weights @ shares)
+        settings.complain(problems, "groups", f"planes with the same trial_radius_mm / radius_mm: {error}")
+    return trials, planes
 
 
 def make_limits(

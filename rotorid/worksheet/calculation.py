@@ -127,6 +127,8 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
     """The answer: what to do, its tables as HTML, what there is to mount."""
     from markupsafe import Markup
 
+    from rotorid.base.tables import Column, Table, html
+    from rotorid.base.text import figures
     from rotorid.report.balance import to_do
 
     made, read = _balance(*asked)
@@ -137,10 +139,16 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         drilled = row.get("remove_at_deg")
         return float(row["angle_deg"] if drilled is None else drilled)
 
+    parts = [] if "left_to_do" in document else document["parts"]
+    heads = {"part": ("", str), "mass": (labels.weight_in, figures), "angle_deg": ("at °", figures)}
+    columns = (
+        Column(key, [row[key] for row in parts], *head[1:], title=head[0]) for key, head in heads.items()
+    )
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
         "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
+        "parts": html(Table("parts", tuple(columns))) if parts else "",
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
         "to_mount": [{**row, "at": at(row)} for row in rows],

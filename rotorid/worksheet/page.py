@@ -150,10 +150,11 @@ class View:
         return self.names.get(key, {}).get(what, {"weight": "mass_g"}.get(what, ""))
 
     def readings(self, key: str, run: str) -> list[Line]:
-        """Amplitude and phase of each sensor, a line for each speed."""
+        """Amplitude and phase, if there is one, of each sensor, a line for each speed."""
         rows = self.of_run(key, run)
         at = {(row["place"], row["sensor"]): row for row in rows}
-        pairs = [(sensor, what) for sensor in self.sensors for what in ("amplitude", "phase")]
+        read = [what for what in ("amplitude", "phase") if what in self.names[key]]
+        pairs = [(sensor, what) for sensor in self.sensors for what in read]
         return [
             (place, [self._cell(key, at.get((place, s)), what, f"{s}, {place}") for s, what in pairs], "")
             for place in _each(row["place"] for row in rows)
@@ -247,7 +248,8 @@ def setup(view: View, fields: Fields) -> list[Edit]:
     speeds, sensors = (_each(re.split(r"\s*[,;]\s*", fields[name].strip())) for name in ("speeds", "sensors"))
     names, made = view.names.get("runs"), list[Edit]()
     if names is None:
-        header = ["run", fields["speed_unit"], "sensor", fields["amplitude_unit"], "phase_deg"]
+        header = ["run", fields["speed_unit"], "sensor", fields["amplitude_unit"]]
+        header += [] if "no_phase" in fields else ["phase_deg"]
         names = {content(name): name for name in header}
         made.append({"create": "runs", "header": header})
     places = [(speed, sensor) for speed in speeds for sensor in sensors]
