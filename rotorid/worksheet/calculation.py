@@ -140,15 +140,16 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         return float(row["angle_deg"] if drilled is None else drilled)
 
     parts = [] if "left_to_do" in document else document["parts"]
-    heads = {"part": ("", str), "mass": (labels.weight_in, figures), "angle_deg": ("at °", figures)}
     columns = (
-        Column(key, [row[key] for row in parts], *head[1:], title=head[0]) for key, head in heads.items()
+        Column("part", [row["part"] for row in parts], title=""),
+        Column("mass", [row["mass"] for row in parts], figures, title=labels.weight_in),
+        Column("angle_deg", [row["angle_deg"] for row in parts], figures, title="at °"),
     )
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
         "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
-        "parts": html(Table("parts", tuple(columns))) if parts else "",
+        "parts": html(Table("parts", columns)) if parts else "",
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
         "to_mount": [{**row, "at": at(row)} for row in rows],
