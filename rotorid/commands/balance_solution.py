@@ -12,7 +12,7 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
-from rotorid.commands.coefficients import choose, counted, of_planes, used_planes
+from rotorid.commands.coefficients import choose, counted, of_planes, unknowns_of
 from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import Names, Speeds, names, speeds
 from rotorid.report.options import file_of
@@ -207,7 +207,7 @@ def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> 
 
         of_type = type_coefficients(job, options.machine_type, refined=options.refine)
         coefficients = of_type.influence, None
-    planes = planes or names(options.planes) or used_planes(job, coefficients[0])
+    planes = planes or names(options.planes) or unknowns_of(job, coefficients[0])
     coefficients = of_planes(job, coefficients, planes)
     result = correct_job(job, coefficients, planes, options)
     return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)

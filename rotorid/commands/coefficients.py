@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -114,6 +115,11 @@ def of_planes(
             f"{lost[0]!r} would do: choose of these, or add trial runs"
         )
     influence = mapped(influence, of.planes, of.inverse)
+    if of.constrained:
+        words = f"the trial weights were in {listing(map(repr, of.names), 'and')} only"
+        words += ": what weights beside these do, such as the rounding of pieces, is not known"
+        notes = (*influence.remarks.notes, words)
+        influence = replace(influence, remarks=influence.remarks._replace(notes=notes))
     if job.check is not None and job.check.planes and influence.mounted.run == job.check.runs[-1]:
         there = dict(zip(job.check.planes, job.check.weights[-1], strict=True))
         weights = np.array([there.get(plane, 0.0) for plane in of.planes])  # all of it, whatever counted
@@ -145,6 +151,18 @@ def used_planes(job: Job, influence: Influence) -> list[str]:
     """Planes and groups of these coefficients of which the job does not leave out a plane."""
     left_out = job.planes.keys() - job.used
     return [name for name in influence.planes if left_out.isdisjoint(job.groups.get(name, (name,)))]
+
+
+def unknowns_of(job: Job, influence: Influence) -> list[str]:
+    """The groups of the job, where they are as many as the planes in use and tell them apart; else these."""
+    from balancing import unknowns
+
+    planes, names = used_planes(job, influence), [*job.groups]
+    with suppress(ValueError):
+        of = unknowns(job.groups, names, planes) if names else None
+        if of is not None and not of.constrained and of.planes == tuple(planes):
+            return names
+    return planes
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
