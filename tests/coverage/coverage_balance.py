@@ -228,9 +228,8 @@ def main(jobs: int = 2500) -> None:
             name = f"{method}: relative error of the weights {low:g} … {high:g}"
             print(f"{name:<60}{percent(at):>6} of {len(at)}")
 
-    print(f"\ne. Weights of three planes that two groups hold together, errors stated\n{head}")
-    for kind in KINDS:
-        print(line(kind, held_together(jobs // 5, kind)))
+    print(f"\ne. Weights of three planes that two groups hold together; errors stated\n{head}")
+    print(line("all", [one for kind in KINDS for one in held_together(jobs // 5, kind)]))
 
 
 def assumed(times: float) -> tuple[float, float]:
