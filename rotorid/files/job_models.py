@@ -251,10 +251,9 @@ class Plane(_Placed):
 class Group(Settings):
     """`[groups.NAME]`."""
 
-    planes: dict[str, Share] = key(
+    planes: by_name(Share) = key(  # type: ignore[valid-type]
         "the weights of its planes as ratio@angle, the angle in the job's direction",
         example='{ P1 = "1@0", P2 = "1@180" }',
-        min_length=1,
     )
 
 

@@ -99,7 +99,6 @@ KHURMI = polar(16, 180), polar(21, 135), polar(24, 65), polar(16, -55)
 PRINTED = {
     "Cemb Hofmann: a couple of 6000 g cm cm": ([600, -600], [0, 10], [0, 15], 400, 0, 1e-9),
     "Micropoise: a couple of 56 oz in in": ([56, -56], [0, 1], [0, 7], 8, 0, 1e-9),
-    "Vibromera: 20 g at 90 degrees in the middle": ([20j], [150], [0, 300], 10, 90, 1e-9),
     "Norton, 12-2": (NORTON, [2.243, 1.396, 0.701], [0, 3.097], 0.904, 75.27, 5e-4),
     "Khurmi and Gupta, 21.2, drawn": (KHURMI, [-1, 2, 3, 6], [0, 4], 35.5, 145, 0.03),
 }
