@@ -35,7 +35,17 @@ PIECES = 0.2
 
 
 class Unknowns(NamedTuple):
-    """Names (U) of groups and planes, planes (P) that they put weights into, and their shares G (P, U)."""
+    """Groups and planes whose weights are sought.
+
+    Attributes
+    ----------
+    names
+        Of U groups and planes.
+    planes
+        P, that they put weights into.
+    shares
+        G, (P, U).
+    """
 
     names: tuple[str, ...]
     planes: tuple[str, ...]
@@ -52,7 +62,12 @@ class Unknowns(NamedTuple):
         return np.asarray(np.linalg.pinv(self.shares))
 
     def limits(self, limits: Limits) -> Limits:
-        """Limits of the planes, in their order, as those of the unknowns.
+        """Limits as those of the unknowns.
+
+        Parameters
+        ----------
+        limits
+            Of the planes, in their order.
 
         Raises
         ------
@@ -75,12 +90,19 @@ class Unknowns(NamedTuple):
         return Limits(most, limits.residual, tuple(arcs))
 
     def of_runs(self, trials: Trials, allowed: float = PIECES) -> Trials:
-        """Runs with weights in planes as weights of the unknowns.
+        """Runs with weights as those of the unknowns.
+
+        Parameters
+        ----------
+        trials
+            With weights in planes.
+        allowed
+            Share of the weights that may be beside the unknowns.
 
         Raises
         ------
         ValueError
-            Where these are off by more than a share of the weights.
+            Where more is beside them.
         """
         planes = tuple(dict.fromkeys((*self.planes, *trials.planes)))
         weights = np.zeros((len(trials.runs), len(planes)), dtype=complex)
@@ -97,7 +119,13 @@ class Unknowns(NamedTuple):
 
 
 def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
-    """Groups and planes of these names, where they do not tell planes apart; None: they do."""
+    """Unknowns that do not tell planes apart; None: they do.
+
+    Parameters
+    ----------
+    groups, names
+        As of `unknowns`.
+    """
     try:
         of = unknowns(groups, names) if set(names) & set(groups) else None
     except ValueError:  # more than the planes need
@@ -106,12 +134,30 @@ def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
 
 
 def members(groups: Groups, names: Sequence[str]) -> tuple[str, ...]:
-    """The planes of groups and planes of these names."""
+    """What planes groups and planes consist of.
+
+    Parameters
+    ----------
+    groups, names
+        As of `unknowns`.
+
+    Returns
+    -------
+    Each plane once.
+    """
     return tuple(dict.fromkeys(plane for name in names for plane in groups.get(name, (name,))))
 
 
 def in_planes(trials: Trials, groups: Groups) -> Trials:
-    """Runs with weights in planes, where they have some in groups."""
+    """Runs with all weights in planes.
+
+    Parameters
+    ----------
+    trials
+        With weights in planes or groups.
+    groups
+        As of `unknowns`.
+    """
     planes, columns = members(groups, trials.planes), [groups.get(n, {n: 1.0}) for n in trials.planes]
     shares = np.array([[column.get(plane, 0.0) for plane in planes] for column in columns])
     return replace(trials, planes=planes, weights=trials.weights @ shares) if columns else trials
