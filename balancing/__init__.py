@@ -20,7 +20,7 @@ from balancing.conventions import Labels
 from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
-from balancing.groups import Groups, Unknowns, held, in_planes, mapped, members, unknowns
+from balancing.groups import Groups, Unknowns, held, in_planes, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
     Influence,
@@ -101,7 +101,6 @@ __all__ = [
     "local_runs",
     "mapped",
     "match_speeds",
-    "members",
     "model_influence",
     "mount",
     "reading_of",

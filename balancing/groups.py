@@ -134,17 +134,7 @@ def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
 
 
 def members(groups: Groups, names: Sequence[str]) -> tuple[str, ...]:
-    """What planes groups and planes consist of.
-
-    Parameters
-    ----------
-    groups, names
-        As of `unknowns`.
-
-    Returns
-    -------
-    Each plane once.
-    """
+    """The planes of groups and planes."""
     return tuple(dict.fromkeys(plane for name in names for plane in groups.get(name, (name,))))
 
 

@@ -81,26 +81,14 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
 
 
 def counted(job: Job) -> Trials | None:
-    """The check runs with weights in what the trial runs have theirs in; None: there are none.
-
-    Raises
-    ------
-    ValueError
-        Where what was mounted is beside the groups of the trial weights.
-    """
+    """The check runs, with weights of what the trial weights are of; None: there are none."""
     return job.check if job.check is None or job.held is None else job.held.of_runs(job.check)
 
 
 def of_planes(
     job: Job, coefficients: tuple[Influence, Trials | None], names: Sequence[str] = ()
 ) -> tuple[Influence, Trials | None]:
-    """Coefficients of groups, and their runs, as those of planes: right for weights of these groups alone.
-
-    Raises
-    ------
-    ValueError
-        Where others of these names are asked for.
-    """
+    """Coefficients and runs of groups as those of planes; refuses names of which the groups do not tell."""
     import numpy as np
 
     from balancing import in_planes, mapped, unknowns

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Groups, Holes, Influence, Labels, Limits, Trials, Unknowns, held, in_planes, members
+from balancing import Groups, Holes, Influence, Labels, Limits, Trials, Unknowns, held, in_planes, unknowns
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
@@ -357,7 +357,7 @@ def _readings(
         groups = settings.shares(conventions.labels)
         trials = in_planes(trials, groups)
         tolerance = conventions.speed_tolerance_percent
-        planes = members(groups, influence.planes)
+        planes = unknowns(groups, influence.planes).planes
         influence = fit_to_readings(influence, trials, planes, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:
         return None

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials, from_list, held, in_planes, members
+from balancing import Holes, Influence, Labels, Limits, Trials, from_list, held, in_planes, unknowns
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -88,7 +88,8 @@ def planes_of(
     The weights are those of planes, or of groups where they do not tell planes apart.
     """
     stated, groups = settings.planes, settings.shares(trials.labels)
-    measured = members(groups, trials.planes if influence is None else influence.planes)
+    trials, of = in_planes(trials, groups), held(groups, trials.planes)
+    measured = trials.planes if influence is None else unknowns(groups, influence.planes).planes
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
@@ -110,7 +111,6 @@ def planes_of(
         if lost := [plane for plane in group.planes if plane not in planes]:
             expected = f"planes of the job, {listing(planes, 'and')}, not {lost[0]!r}"
             group.complain(problems, "planes", expected + did_you_mean(lost[0], planes))
-    trials, of = in_planes(trials, groups), held(groups, trials.planes)
     if not trials.labels.unbalances:
         trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
     try:

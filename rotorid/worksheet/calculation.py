@@ -141,9 +141,9 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
 
     parts = [] if "left_to_do" in document else document["parts"]
     columns = (
-        Column("part", [row["part"] for row in parts], title=""),
-        Column("mass", [row["mass"] for row in parts], figures, title=labels.weight_in),
-        Column("angle_deg", [row["angle_deg"] for row in parts], figures, title="at °"),
+        Column("part", [row["part"] for row in parts]),
+        Column(labels.weight_in, [row["mass"] for row in parts], figures),
+        Column("at °", [row["angle_deg"] for row in parts], figures),
     )
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {

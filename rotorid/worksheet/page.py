@@ -112,7 +112,7 @@ class View:
     ----------
     names, rows
         Of each table: its columns by what they hold, and its rows so, each with its `id` and `place`.
-    sensors, planes, runs, baseline, trials
+    sensors, planes, groups, runs, baseline, trials
         Names that occur; the run without weights, and the others.
     problems
         Of the files: words, and the cells that they are about, "" for none.
@@ -123,7 +123,10 @@ class View:
         self.names = {key: table.columns() for key, table in self.job.tables.items()}
         self.rows = {key: [*self._rows(key)] for key in self.job.tables}
         self.sensors = self.values("sensor", "runs", "check")
-        self.planes = _each([*self._stated("planes"), *self.values("plane", "weights")])
+        groups = self._stated("groups")
+        inside = [plane for name in groups for plane in self._stated("groups", name, "planes")]
+        weighed_planes = [name for name in self.values("plane", "weights") if name not in groups]
+        self.planes, self.groups = _each([*self._stated("planes"), *inside, *weighed_planes]), [*groups]
         self.runs, weighed = self.values("run", "runs", "weights"), self.values("run", "weights")
         self.baseline = next((run for run in self.runs if run not in weighed), "baseline")
         self.trials = [run for run in self.runs if run != self.baseline]
