@@ -20,6 +20,7 @@ from balancing.conventions import Labels
 from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
+from balancing.groups import Groups, Unknowns, held, in_planes, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
     Influence,
@@ -61,6 +62,7 @@ __all__ = [
     "Correction",
     "Discrete",
     "Gaussian",
+    "Groups",
     "Holes",
     "Influence",
     "Labels",
@@ -81,6 +83,7 @@ __all__ = [
     "Trials",
     "Unbalance",
     "UndeterminedError",
+    "Unknowns",
     "Verdict",
     "WhatIf",
     "Zones",
@@ -97,8 +100,11 @@ __all__ = [
     "estimate_unbalance",
     "expected_lag",
     "from_list",
+    "held",
+    "in_planes",
     "last_run",
     "local_runs",
+    "mapped",
     "match_speeds",
     "mode_made_worse",
     "model_influence",
@@ -113,6 +119,7 @@ __all__ = [
     "trial_from_coefficients",
     "trial_from_force",
     "unbalance_of_run",
+    "unknowns",
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",

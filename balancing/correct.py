@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
-from balancing.cones import Bounds, explain
+from balancing.cones import AT_LIMIT, Bounds, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
+from balancing.groups import Groups, Unknowns, mapped, unknowns
 from balancing.influence import Influence, Whitening, match_speeds, plane_indices
 from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL, real_parts
@@ -43,6 +45,7 @@ def correct(  # noqa: PLR0913
     row_weights: ArrayLike | None = None,
     strength: float | None = None,
     remove: Sequence[str] = (),
+    groups: Groups = MappingProxyType({}),
 ) -> Correction:
     """Correction weights over all chosen sensors and speeds.
 
@@ -54,7 +57,7 @@ def correct(  # noqa: PLR0913
         Vibration to correct, where it is not that of the trial runs: new runs (what is mounted in them is
         taken into account), or complex amplitudes of the bare rotor (S, C).
     planes
-        Names of the planes to use; default all. The others stay empty.
+        Names of the planes to use, or of groups; default all planes. The others stay empty.
     speeds
         rad/s, to use; default all.
     refuse
@@ -73,6 +76,8 @@ def correct(  # noqa: PLR0913
         Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …).
     remove
         Planes where material is taken away instead of added.
+    groups
+        Planes with weights of fixed ratios and angles: by group, the complex share of each of its planes.
 
     Returns
     -------
@@ -94,8 +99,23 @@ def correct(  # noqa: PLR0913
             "these influence coefficients are stored ones without a vibration to correct: "
             "give the readings of a baseline run"
         )
-    chosen = plane_indices(today, planes)
+    grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
+    chosen = plane_indices(today, planes if grouped is None else grouped.planes)
     used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
+    if grouped is not None and grouped.constrained:
+        every = range(len(today.speeds))
+        result = correct(
+            mapped(today.part(every, None, chosen), grouped.names, grouped.shares),
+            speeds=speeds,
+            refuse=refuse,
+            method=method,
+            limits=None if limits is None else grouped.limits(limits.pick(every, chosen)),
+            row_weights=row_weights,
+            strength=strength,
+        )
+        kept = None if result.limits is None or limits is None else limits.pick(used, chosen)
+        result = _in_planes(result, grouped, today.part(used, None, chosen), kept)
+        return replace(result, mounted=today.mounted, remove=tuple(p for p in grouped.planes if p in remove))
     part = today.part(used, None, chosen)
     W, Y = part.W.reshape(-1, len(chosen)), part.baseline.ravel()
     if not Y.any():
@@ -127,10 +147,20 @@ def correct(  # noqa: PLR0913
         row_weights=rows,
         limits=kept,
         remove=tuple(name for name in part.planes if name in remove),
+        unknowns=grouped,
     )
     if not result.told_apart:
         unclear = unclear or _alike(case, counts, stated=False)
     return replace(result, decision=decide(result, case, unclear, limits))
+
+
+def _in_planes(result: Correction, of: Unknowns, part: Influence, limits: Limits | None) -> Correction:
+    """A correction of unknowns as one of the planes that they put weights into."""
+    D = of.shares @ result.weights
+    most = np.full(len(D), np.inf) if limits is None else limits.max_weight
+    fitted = replace(result.fitted, weights=D, active_weights=np.abs(D) >= (1 - AT_LIMIT) * most)
+    draws = result.draws @ of.shares.T
+    return replace(result, influence=part, weights=D, draws=draws, fitted=fitted, limits=limits, unknowns=of)
 
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:

@@ -152,6 +152,8 @@ class Correction(Prediction, Answered):
         What the correction had to keep to; None: nothing.
     remove
         Planes where material is taken away, opposite to the weight that would be added.
+    unknowns
+        The groups and planes whose weights these are; None: of the planes.
     decision
         Whether to mount the weights, and what to do instead.
     convention_test
@@ -193,6 +195,7 @@ class Correction(Prediction, Answered):
         run, planes, weights = self.mounted
         there = bool(weights.any())
         mounted = {"run": run, "weights": weight_rows(self.labels, planes, weights)} if there else None
+        parts = () if self.parts is None else records(self.parts._weight_columns()[:-2])
         return plain(
             {
                 "judgement": self.decision.to_dict(self.labels),
@@ -200,6 +203,7 @@ class Correction(Prediction, Answered):
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
                 "corrections": records(self._weight_columns()),
+                "parts": [{"part": row.pop("plane"), **row} for row in parts],
                 "mounted_in_last_run": mounted,
                 "add_to_mounted": self.work_rows(planes, self.to_add) if there else None,
                 "residuals": records(residuals),
@@ -294,13 +298,15 @@ class Correction(Prediction, Answered):
         largest = largest_readings(
             self.labels, self.speeds, self.sensors, self.before, self.after, self.within
         )
-        tables = self._vibration_text(), self._quality_text()
+        parts = [] if self.parts is None else [self._parts_text(self.parts)]
+        tables = [self._vibration_text(), *([] if self.unknowns else parts), self._quality_text()]
+        numbers = [self._weights_text(), *(parts if self.unknowns else [])]
         return Answer(
             first,
-            f"{self._weights_text()}\n\nLargest left{largest}",
+            "\n".join([*numbers, "", f"Largest left{largest}"]),
             tuple(warnings),
             tuple(notes),
-            tables if predicted in first else (f"Predicted: {predicted}.", *tables),
+            tuple(tables if predicted in first else [f"Predicted: {predicted}.", *tables]),
             "every reading, method and errors",
             to_mount=True,
         )
@@ -336,11 +342,7 @@ class Correction(Prediction, Answered):
         if removed:
             columns.insert(1, Column("", ["(remove)" if p in removed else "(add)" for p in self.planes]))
         if self.region_known:
-            sizes, angles = self.half_widths()
-            widths = [f"± {figures(width * labels.weight_scale, 2)} {labels.weight_in}" for width in sizes]
-            for p in np.flatnonzero(self.held):
-                widths[p] = "at its limit"
-            turns = list(map(_angle_width, np.degrees(angles)))
+            widths, turns = self._widths()
             columns += [Column("95 %", widths), Column("", turns)]
         for other in self.others:  # the mass where that is another than the one shown
             places = map(degrees, other.places)
@@ -365,6 +367,28 @@ class Correction(Prediction, Answered):
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
         return "\n".join([text(columns, width=COLUMNS), *lines])
+
+    def _widths(self) -> tuple[list[str], list[str]]:
+        """Half of the 95 % intervals of the weights' sizes and angles, in words."""
+        sizes, angles = self.half_widths()
+        unit, scale = self.labels.weight_in, self.labels.weight_scale
+        widths = [f"± {figures(width * scale, 2)} {unit}" for width in sizes]
+        for p in np.flatnonzero(self.held):
+            widths[p] = "at its limit"
+        return widths, list(map(_angle_width, np.degrees(angles)))
+
+    def _parts_text(self, parts: Correction) -> str:
+        """Weights of groups, or of the static part and the couple."""
+        size, angle = self.labels.weight(parts.weights)
+        widths = parts._widths() if parts.region_known else [[""] * len(size)] * 2
+        each = "; ".join(
+            " ".join(f"{name} {figures(mass)} {self.labels.weight_in} {more} at {degrees(at)} {turn}".split())
+            for name, mass, more, at, turn in zip(
+                parts.planes, size, widths[0], angle, widths[1], strict=True
+            )
+        )
+        how = "" if self.unknowns else f" (the sum; half the difference, opposite in {self.planes[1]!r})"
+        return fill(f"In parts: {each}{how}.", WIDTH)
 
     def _vibration_text(self) -> str:
         columns = list(self.vibration_columns(INVISIBLE))

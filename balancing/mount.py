@@ -1,5 +1,7 @@
 """Pieces in holes that make a correction: chosen for all planes together, the fewest that are enough.
 
+Where groups hold planes together (`balancing.groups`), the pieces of each are the nearest to its weight.
+
 A set of pieces is enough where every reading passes its limit in a check run (`balancing.verdict`: all of its
 95 % region is within); without limits, where the bound of the root mean square of a check run is at most the
 larger of 1.2 times that of the exact weights and a fifth of the present vibration. Errors of a check run with
@@ -9,14 +11,16 @@ pieces are those with the exact weights.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
 from balancing.correction import Correction
 from balancing.decision import HARDLY_BELOW
+from balancing.groups import PIECES
 from balancing.holes import Holes, equal_together
 from balancing.influence import Influence, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
@@ -232,17 +236,28 @@ def mount(
     if c.method == "weighted" and c.errors_known:
         variance = np.trace(c.after_covariance, axis1=-2, axis2=-1).ravel()
         counts = (1.0 if counts is None else counts) / np.sqrt(variance.clip(1e-6 * variance.max()))
-    bound = _bound(c)
+    bound, limits, rows = _bound(c), c.limits, (W, Y.ravel())
+    wanted = c.weights - [there.get(plane, 0.0) for plane in planes]
+    enough = predicted = _enough(c, Y, bound)
+    together = c.unknowns is not None and c.unknowns.constrained
+    if together:
+        rows, counts = (np.eye(len(planes), dtype=complex), -wanted), None
+        limits = limits and replace(limits, residual=np.full((1, len(planes)), np.inf))
+
+        def enough(D: ComplexArray) -> bool:
+            return predicted(D) and bool(norm(D - wanted) <= PIECES * norm(wanted))
+
     discrete = solve_discrete(
-        W,
-        Y.ravel(),
+        *rows,
         each,
-        _enough(c, Y, bound),
-        wanted=c.weights - [there.get(plane, 0.0) for plane in planes],
-        method="minmax" if c.method == "minmax" else "least-squares",
+        enough,
+        wanted=wanted,
+        method="minmax" if c.method == "minmax" and not together else "least-squares",
         row_weights=counts,
-        limits=c.limits,
+        limits=limits,
     )
+    fewer = tuple(replace(one, residual=Y.ravel() + W @ one.weights) for one in discrete.fewer)
+    discrete = replace(discrete, fewer=fewer)
     after = Y + (W @ discrete.weights).reshape(Y.shape)
     check_rms = bound(after) if c.errors_known else np.nan
     return Mounted(

@@ -1,4 +1,4 @@
-"""One weight as it is mounted: in holes, as two fixed masses, or by drilling.
+"""One weight as it is mounted: in holes, as two fixed masses, in two planes along the shaft, or by drilling.
 
 Every weight is complex, kg or kg·m, its angle counted with the rotation. Taking the unbalance u away at the
 angle φ changes the rotor by −u e^{iφ}; so an added unbalance D is done by u = |D| at φ = arg D + 180°.
@@ -11,6 +11,9 @@ t/4 below its base:
 
 so that h² / 2 − h (R − t/3) + u/(ρ A) − (t/3)(R − t/4) = 0. The surface is taken as flat across the hole (the
 part missing is d²/(32 R) of depth).
+
+**Two planes** at z₁ and z₂ take weights wᵢ at zᵢ′ with the same force, Σ D = Σ w, and moment, Σ z D = Σ z′ w:
+D₂ = Σ wᵢ (zᵢ′ − z₁)/(z₂ − z₁), D₁ = Σ wᵢ − D₂. Beyond the planes one of them is opposite.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from rotorid.base.text import counted, percent
 __all__ = [
     "Removal",
     "Split",
+    "TwoPlanes",
     "TwoPositions",
     "combine",
     "drill",
@@ -261,6 +265,45 @@ def two_positions(target: complex, mass_a: float, mass_b: float) -> TwoPositions
     return TwoPositions(target, np.array([a, b]), np.angle(np.column_stack((first, target - first))))
 
 
+@dataclass(frozen=True, eq=False)
+class TwoPlanes:
+    """Weights along the shaft, and those in two planes with the same force and moment.
+
+    Attributes
+    ----------
+    given, at
+        kg or kg·m, and where they are along the shaft, m.
+    planes, positions
+        Names and places of two planes, m.
+    """
+
+    given: tuple[complex, ...]
+    at: tuple[float, ...]
+    planes: tuple[str, ...]
+    positions: tuple[float, ...]
+
+    def weights(self) -> ComplexArray:
+        """In both planes, (2,)."""
+        first, second = self.positions
+        w = np.array(self.given)
+        there = np.sum(w * (np.array(self.at) - first)) / (second - first)
+        return np.array([w.sum() - there, there])
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types."""
+        rows = zip(self.planes, self.positions, map(labels.weight_entry, self.weights()), strict=True)
+        each = [{"plane": plane, "position_m": z, **entry} for plane, z, entry in rows]
+        return {**_document("two planes", sum(self.given), labels), "planes": each}
+
+    def sentence(self, labels: Labels) -> str:
+        """What stands for what."""
+        given = zip(map(labels.weight_at, self.given), self.at, strict=True)
+        made = zip(map(labels.weight_at, self.weights()), self.planes, strict=True)
+        there = " and ".join(f"{words} in plane {plane!r}" for words, plane in made)
+        each = " and ".join(f"{words} at {1e3 * z:.6g} mm" for words, z in given)
+        return f"{there} have the force and the moment of {each}."
+
+
 def combine(weights: Iterable[complex]) -> complex:
     """The one weight that does what several mounted ones do together: their vector sum.
 
@@ -355,7 +398,7 @@ def drill(target: complex, radius: float, diameter: float, density: float = STEE
     return Removal(target, radius, area * (depth + tip / 3), diameter, depth, depth + tip)
 
 
-OneWeight = Split | TwoPositions | Removal
+OneWeight = Split | TwoPlanes | TwoPositions | Removal
 
 
 def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from balancing.conditioning import Conditioning
 from balancing.conventions import Labels
+from balancing.groups import Unknowns, mapped, static_and_couple
 from balancing.influence import Influence, Mounted
 from balancing.methods import Solution, method_words
 from balancing.regions import Region, half_width, reach
@@ -140,6 +141,7 @@ class Prediction(Outlook):
     method: str
     row_weights: FloatArray | None = None
     limits: Limits | None = None
+    unknowns: Unknowns | None = None
 
     @property
     def region_known(self) -> bool:
@@ -185,6 +187,20 @@ class Prediction(Outlook):
     def half_widths(self) -> tuple[FloatArray, FloatArray]:
         """Half widths (P,) of 95 % intervals of the weights' sizes and angles (rad); NaN: not known."""
         return half_width(self._off[0]), half_width(self._off[1])
+
+    @property
+    def parts(self) -> Self | None:
+        """The weights as those of groups, or of two planes as static part and couple; None: neither."""
+        of = self.unknowns or static_and_couple(self.planes)
+        if of is None:
+            return None
+        influence, (weights, draws) = (
+            mapped(self.influence, of.names, of.shares),
+            (each @ of.inverse.T for each in (self.weights, self.draws)),
+        )
+        return replace(
+            self, influence=influence, weights=weights, draws=draws, remove=(), limits=None, unknowns=None
+        )
 
     @property
     def told_apart(self) -> bool:

@@ -166,6 +166,7 @@ def weight_figure(
     holes: Holes | None = None,
     mounting: Mounting | None = None,
     remove: bool = False,
+    titles: Sequence[str] = (),
 ) -> Figure:
     """A new figure with a disc for each of several ways to place one weight; see `draw_disc`."""
     several = ways or ((),)
@@ -173,7 +174,7 @@ def weight_figure(
     figure = new_figure(ROW * rows + 0.5, 3.5 * max(columns, 1.3))
     axes = disc_axes(figure, len(several), labels)
     for k, (ax, loose) in enumerate(zip(axes, several, strict=True), start=1):
-        title = f"solution {k}" if len(several) > 1 else "weight"
+        title = titles[k - 1] if titles else f"solution {k}" if len(several) > 1 else "weight"
         draw_disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose)
     return figure
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotorid.commands.balance_solution import Solved, correct_job
-from rotorid.commands.coefficients import choose
+from rotorid.commands.coefficients import choose, of_planes
 
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
@@ -72,10 +72,10 @@ def left_to_do(
             if misplaced:  # what is really there is not known, what it leaves is
                 inputs = influence, last_run(runs)
             elif measured:
-                inputs = choose(job, options.coefficients, refined=True)
+                inputs = of_planes(job, choose(job, options.coefficients, refined=True))
             else:
                 inputs = influence, runs
-            result = correct_job(job, inputs, result.planes, options)
+            result = correct_job(job, inputs, solved.planes, options)
         except ValueError as error:
             stop = stop or f"with the check run counted, {str(error).splitlines()[0]}"
             there = runs.runs[-1], runs.planes, runs.weights[-1]

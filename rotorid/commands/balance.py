@@ -19,7 +19,7 @@ from rotorid.commands.balance_solution import (
     solve,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, needs_trial_run
+from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
 from rotorid.commands.quantities import one_of
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, provenance, table_of
@@ -134,7 +134,11 @@ def corrected(
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
     mounted, check, left = _pieces(read, result, solved, options), None, None
     if read.check is not None and not options.refine:
-        check = replace(compare_check(result, read.check, influence, runs), as_proposed=not stated)
+        compared = result, read.check, influence, runs
+        if read.held is not None and result.parts is not None and (there := counted(read)) is not None:
+            measured = as_measured(read, influence)
+            compared = result.parts, there, measured, runs and read.held.of_runs(runs)
+        check = replace(compare_check(*compared), as_proposed=not stated)
     tolerance = _tolerance(result.planes, options)
     verdict = _judge(result, influence, read, tolerance, mounted)
     if read.check is not None:
@@ -155,12 +159,12 @@ def corrected(
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
 
-        return influence_bytes(path, influence)
+        return influence_bytes(path, as_measured(read, influence))
 
     def solved_equations() -> Equations:
         from rotorid.report.equations_of_results import correction_equations
 
-        return correction_equations(result)
+        return correction_equations(result.parts or result if result.unknowns else result)
 
     outcome = Balance(
         result=result,

@@ -12,7 +12,7 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
-from rotorid.commands.coefficients import choose, used_planes
+from rotorid.commands.coefficients import choose, counted, of_planes, unknowns_of
 from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import Names, Speeds, names, speeds
@@ -58,7 +58,7 @@ class BalanceOptions:
     angles : DIRECTION
         with rotation, against rotation; where the job states its rotation, clockwise or counter-clockwise.
     planes : LIST
-        Use these planes only.
+        Use these planes or groups only.
     speeds : LIST
         Use these speeds only, as in the runs, or 20Hz,25Hz.
     max_mass : MASS
@@ -195,9 +195,9 @@ def _test(job: Job) -> ConventionTest:
     """What trial and check runs say of their conventions."""
     from balancing import convention_test, with_check_runs
 
-    runs, check = job.trials, job.check
-    if check is not None and check.planes:
-        with suppress(ValueError):  # of some sensors or speeds only: the trial runs alone
+    runs = job.trials
+    with suppress(ValueError):  # of some sensors or speeds only: the trial runs alone
+        if (check := counted(job)) is not None and check.planes:
             runs = with_check_runs(runs, check)
     return convention_test(runs)
 
@@ -221,7 +221,8 @@ def coefficients_of(
 
 def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
     coefficients, of_type = coefficients_of(job, options)
-    planes = planes or names(options.planes) or used_planes(job, coefficients[0])
+    planes = planes or names(options.planes) or unknowns_of(job, coefficients[0])
+    coefficients = of_planes(job, coefficients, planes)
     result = correct_job(job, coefficients, planes, options)
     if more := next_mode(job, result):
         decision = replace(result.decision, elsewhere=(*result.decision.elsewhere, *more))
@@ -247,6 +248,7 @@ def correct_job(
         row_weights=job.row_weights,
         strength=options.ridge,
         remove=[name for name, plane in job.planes.items() if plane.remove],
+        groups=job.groups,
     )
 
 

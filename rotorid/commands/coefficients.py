@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rotorid.base.text import listing
 from rotorid.files.disk import sha256
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from balancing import Influence, Trials
     from rotorid.files import Job
@@ -32,6 +34,10 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     refined
         By the check runs of the job.
 
+    Returns
+    -------
+    Of groups where the trial weights tell these alone, else of planes.
+
     Raises
     ------
     ValueError
@@ -39,7 +45,14 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     UndeterminedError
         Where the runs do not determine the coefficients.
     """
-    from balancing import UndeterminedError, combine, estimate_influence, refine
+    from balancing import (
+        UndeterminedError,
+        combine,
+        estimate_influence,
+        in_planes,
+        refine,
+        unknowns,
+    )
 
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
@@ -52,17 +65,55 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
         if has_trials and job.rotor is not None and job.rotor.calibration and job.plane_nodes:
             kind = "computed" if counted_before(job) or not _separate(job.trials) else "combined"
-    check = job.check if refined else None
+    check = counted(job) if refined else None
     if check is not None and (kind == "computed" or job.influence is not None):
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     if kind == "computed":
-        return computed(job, 0.0), job.trials
+        return computed(job, 0.0), in_planes(job.trials, job.groups)
     baseline = None if job.influence is None else job.trials
+    if job.influence is not None and job.groups.keys() & job.influence.planes:
+        baseline = unknowns(job.groups, job.influence.planes).of_runs(job.trials)
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
         calibrated = job.rotor is not None and job.rotor.calibration
-        measured = combine(measured, computed(job, 0.0 if calibrated else MODEL_ERROR))
+        measured = combine(measured, as_measured(job, computed(job, 0.0 if calibrated else MODEL_ERROR)))
     return measured, baseline
+
+
+def counted(job: Job) -> Trials | None:
+    """The check runs, with weights of what the trial weights are of; None: there are none."""
+    return job.check if job.check is None or job.held is None else job.held.of_runs(job.check)
+
+
+def of_planes(
+    job: Job, coefficients: tuple[Influence, Trials | None], names: Sequence[str] = ()
+) -> tuple[Influence, Trials | None]:
+    """Coefficients and runs of groups as those of planes; refuses names of which the groups do not tell."""
+    import numpy as np
+
+    from balancing import in_planes, mapped, unknowns
+
+    influence, runs = coefficients
+    if job.groups.keys().isdisjoint(influence.planes):
+        return coefficients
+    of = unknowns(job.groups, influence.planes)
+    if of.constrained and (lost := [name for name in names if name not in of.names]):
+        raise ValueError(
+            f"the trial weights were in {listing(map(repr, of.names), 'and')} only, which does not tell what "
+            f"{lost[0]!r} would do: choose of these, or add trial runs"
+        )
+    influence = mapped(influence, of.planes, of.inverse)
+    if of.constrained:
+        words = f"the trial weights were in {listing(map(repr, of.names), 'and')} only"
+        words += ": what weights beside these do, such as the rounding of pieces, is not known"
+        notes = (*influence.remarks.notes, words)
+        influence = replace(influence, remarks=influence.remarks._replace(notes=notes))
+    if job.check is not None and job.check.planes and influence.mounted.run == job.check.runs[-1]:
+        there = dict(zip(job.check.planes, job.check.weights[-1], strict=True))
+        weights = np.array([there.get(plane, 0.0) for plane in of.planes])  # all of it, whatever counted
+        mounted = influence.mounted._replace(weights=weights)
+        influence = replace(influence, errors=influence.errors._replace(mounted=mounted))
+    return influence, runs and in_planes(runs, job.groups)
 
 
 def _separate(trials: Trials) -> bool:
@@ -90,9 +141,30 @@ def needs_trial_run(job: Job, influence: Influence) -> bool:
     return calibration is not None and calibration.needs_trial_run and alone
 
 
+def as_measured(job: Job, influence: Influence) -> Influence:
+    """Coefficients of planes as those of the groups that do not tell planes apart."""
+    from balancing import mapped
+
+    of = job.held
+    return influence if of is None else mapped(influence, of.names, of.shares)
+
+
 def used_planes(job: Job, influence: Influence) -> list[str]:
-    """Planes of these coefficients that the job does not leave out."""
-    return [plane for plane in influence.planes if plane in job.used or plane not in job.planes]
+    """Planes and groups of these coefficients of which the job does not leave out a plane."""
+    left_out = job.planes.keys() - job.used
+    return [name for name in influence.planes if left_out.isdisjoint(job.groups.get(name, (name,)))]
+
+
+def unknowns_of(job: Job, influence: Influence) -> list[str]:
+    """The groups of the job, where they are as many as the planes in use and tell them apart; else these."""
+    from balancing import unknowns
+
+    planes, names = used_planes(job, influence), [*job.groups]
+    with suppress(ValueError):
+        of = unknowns(job.groups, names, planes) if names else None
+        if of is not None and not of.constrained and of.planes == tuple(planes):
+            return names
+    return planes
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

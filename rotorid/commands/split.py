@@ -1,4 +1,4 @@
-"""`split`: one given weight in holes, as two fixed weights at free angles, or drilled away."""
+"""`split`: one given weight in holes, as two fixed weights, in two planes along the shaft, or drilled."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.tables import Column, Table
-from rotorid.commands.option_quantities import size, vectors, weight, weights
+from rotorid.commands.option_quantities import length, positions, size, vectors, weight, weights
 from rotorid.commands.quantities import degrees, pairs
 from rotorid.report.options import changed, refuse
 from rotorid.report.outcome import Outcome, command
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from balancing import Holes, Labels
     from balancing.one_weight import OneWeight
-    from rotorid.commands.option_quantities import Amount, Vector
+    from rotorid.commands.option_quantities import Amount, Positions, Vector
 
-_WAYS = ("holes", "two", "drill")
+_WAYS = ("holes", "two", "drill", "planes")
 _OF_HOLES = ("pieces", "per_hole", "taken")
 _APART, _MOST = 1e-3, 1000
 """Degrees between holes that count as one; holes at most."""
@@ -46,6 +46,11 @@ class SplitOptions:
         Angles of two fixed weights instead of holes.
     drill : DIAMETER
         Drill one radial hole in steel opposite to VECTOR instead, such as 8mm.
+    planes : PLANE=POSITION,PLANE=POSITION
+        Share it between two planes along the shaft.
+    at : POSITION,…
+        Where it is, or each of several, along the shaft; of one at two positions: a couple, opposite at the
+        second.
     radius : LENGTH
         Where the masses stand; the surface that is drilled.
     angles : WAY
@@ -58,25 +63,29 @@ class SplitOptions:
     taken: str | Mapping[str, float] | None = None
     two: str | Sequence[float] | None = None
     drill: Amount | None = None
+    planes: Positions | None = None
+    at: str | Sequence[float] | None = None
     radius: Amount | None = None
     angles: str = "with rotation"
     panels: ClassVar[Mapping[str, str]] = {
         "Input": "radius angles",
         "Holes": "holes pieces per_hole taken",
-        "Instead of holes": "two drill",
+        "Instead of holes": "two drill planes at",
     }
     to = ("plot", "json")
 
 
 @command
 def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
-    """Mount one given weight: in holes, as two weights, or by drilling.
+    """Mount one given weight: in holes, as two weights, in two planes, or by drilling.
 
     Example: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
 
     Example: rotorid split 35g@120 --two 20g,30g
 
     Example: rotorid split 3g@120 --drill 8mm --radius 100mm
+
+    Example: rotorid split 35g@120 --at 250mm --planes left=100mm,right=600mm
 
     Parameters
     ----------
@@ -97,15 +106,17 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     labels, each = vectors(vector, options.angles)
     ways = [name for name in _WAYS if name in changed(options)]
     if len(ways) != 1:
-        raise ValueError("say how to mount the weight, in one way: --holes, --two or --drill")
+        raise ValueError("say how to mount the weight, in one way: --holes, --two, --planes or --drill")
     if ways != ["holes"]:
         refuse(options, _OF_HOLES, "means something only with --holes")
+    if ways != ["planes"]:
+        refuse(options, ("at",), "means something only with --planes")
     target = combine(each)
-    if target == 0:
+    if target == 0 and ways != ["planes"]:
         raise ValueError("there is nothing to mount: the weight is 0")
     radius = None if options.radius is None else size(options.radius, "--radius")
-    how = {"holes": _in_holes, "two": _at_two_angles, "drill": _drilled}[ways[0]]
-    placed = how(target, labels, radius, options)
+    how = {"holes": _in_holes, "two": _at_two_angles, "drill": _drilled}.get(ways[0])
+    placed = how(target, labels, radius, options) if how else _in_planes(each, options)
     keys = placed.to_dict(labels)
     rows, below = _rows(keys), placed.lines(labels) if isinstance(placed, Split) else []
     return Outcome(
@@ -137,6 +148,24 @@ def _at_two_angles(target: complex, labels: Labels, radius: float | None, option
         raise ValueError(
             f"--two: these together make from {low} to {high}, not {wanted}; use other weights"
         ) from None
+
+
+def _in_planes(given: list[complex], options: SplitOptions) -> OneWeight:
+    from balancing.one_weight import TwoPlanes
+
+    planes = positions(options.planes or "", "--planes")
+    places = {name: place for name, place in planes.items() if place is not None}
+    if len(planes) != 2 or len({*places.values()}) != 2:
+        raise ValueError("--planes needs two at different positions, such as left=100mm,right=600mm")
+    parts = options.at.split(",") if isinstance(options.at, str) else options.at or ()
+    at = tuple(length(part, "--at", "250mm") for part in parts)
+    if (len(given), len(at)) == (1, 2):
+        given = [given[0], -given[0]]
+    if len(at) != len(given):
+        raise ValueError(
+            f"--at needs the position of each weight, {len(given)} in all; of one weight two make a couple"
+        )
+    return TwoPlanes(tuple(given), at, tuple(places), tuple(places.values()))
 
 
 def _drilled(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
@@ -206,6 +235,11 @@ def _rows(answer: Mapping[str, Any]) -> list[dict[str, Any]]:
             {"hole": row["hole"], "angle_deg": row["angle_deg"], mass: row["mass"], "pieces": words}
             for row, words in zip(answer["holes"], pieces, strict=True)
         ]
+    if "planes" in answer:
+        return [
+            {"plane": row["plane"], "angle_deg": row["angle_deg"], mass: row["mass"]}
+            for row in answer["planes"]
+        ]
     if "solutions" in answer:
         return [
             {"solution": k, "angle_deg": angle, mass: size}
@@ -218,11 +252,14 @@ def _rows(answer: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:
     """A disc for each solution."""
-    from balancing.one_weight import Split, TwoPositions
+    from balancing.one_weight import Split, TwoPlanes, TwoPositions
     from balancing.plots import weight_figure
 
     if isinstance(placed, Split):
         return weight_figure(labels, target, holes=placed.holes, mounting=placed.mounting)
     if isinstance(placed, TwoPositions):
         return weight_figure(labels, target, *map(tuple, placed.weights()))
+    if isinstance(placed, TwoPlanes):
+        each = ((weight,) for weight in placed.weights().tolist())
+        return weight_figure(labels, target, *each, titles=placed.planes)
     return weight_figure(labels, target, (target,), remove=True)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Influence, Trials
+from balancing import Groups, Influence, Trials, in_planes
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -193,6 +193,7 @@ def check_runs(
     sources: tuple[Source, Source | None],
     job: Trials,
     planes: Sequence[str],
+    groups: Groups,
     conventions: Conventions,
     errors: Errors | None,
     slow_roll: ComplexArray | None,
@@ -200,11 +201,12 @@ def check_runs(
 ) -> Trials | None:
     """Check runs at the speeds and with the labels of a job, and of its planes, or None and problems.
 
-    `sources` are tables of runs and weights.
+    `sources` are tables of runs and weights, these of planes or groups.
     """
     check = make_trials(*sources, replace(conventions, run="check"), errors, problems)
     if check is None:
         return None
+    check = in_planes(check, groups)
     before, band, runs = len(problems), conventions.speed_tolerance_percent, source_name(sources[0])
     weights = source_name(sources[1] or sources[0])
     _complain(outside(check, job, planes, band), runs, weights, problems)

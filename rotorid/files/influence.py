@@ -32,7 +32,7 @@ from rotorid.files.runs import SPEED, nearest_speed, show_speed
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
@@ -340,14 +340,20 @@ def influence_bytes(path: str | Path, influence: Influence) -> bytes:
 
 
 def fit_to_readings(
-    influence: Influence, trials: Trials, tolerance_percent: float, source: str, problems: Problems
+    influence: Influence,
+    trials: Trials,
+    planes: Sequence[str],
+    tolerance_percent: float,
+    source: str,
+    problems: Problems,
 ) -> Influence | None:
     """The part of stored coefficients that belongs to the readings, in their order, or None and problems.
 
-    Every speed and sensor of the readings must be there; further ones are left out.
+    Every speed and sensor of the readings must be there, and their planes among these; further ones are left
+    out.
     """
     before = len(problems)
-    for column, shown, there in outside(trials, influence, influence.planes, tolerance_percent):
+    for column, shown, there in outside(trials, influence, planes, tolerance_percent):
         expected = f"coefficients for {column} {shown!r}, which the readings have; there are {there}"
         column = "influence" if column in ("amplitude", "weight") else column
         problems.add(expected, source, None, column)

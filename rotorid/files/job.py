@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials
+from balancing import Groups, Holes, Influence, Labels, Limits, Trials, Unknowns, held, in_planes, unknowns
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
@@ -61,6 +61,8 @@ class Job:
     planes
         By name, what the job says of each (P): those of stored coefficients or else of the weights, then
         those that only the rotor model knows. A `node` is a number; lengths in m, angles as the job counts.
+    groups
+        The weight of each plane of each group where that of the group is 1.
     sensors
         The same for each sensor of the readings (C).
     limits
@@ -94,6 +96,7 @@ class Job:
     conventions: Conventions
     files: tuple[Path, ...]
     planes: dict[str, Plane] = field(default_factory=dict)
+    groups: Groups = field(default_factory=dict)
     sensors: dict[str, Sensor] = field(default_factory=dict)
     limits: Limits | None = None
     zones: Mapping[str, Sequence[float]] = field(default_factory=dict)
@@ -111,6 +114,11 @@ class Job:
     def check_of_weights(self) -> bool:
         """Whether the weights were mounted for the check, although there are holes for pieces."""
         return self.settings.check_weights == WEIGHTS and not self.check_mounted
+
+    @property
+    def held(self) -> Unknowns | None:
+        """The groups of stored coefficients or of trial weights, where these do not tell planes apart."""
+        return held(self.groups, (self.trials if self.influence is None else self.influence).planes)
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -256,6 +264,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
     trials, planes = planes_of(settings, trials, influence, rotor, problems)
+    groups = settings.shares(trials.labels)
     limits = make_limits(settings, planes, trials, problems)
     zones = make_zones(settings, trials, problems)
     weights = row_weights(settings, trials, problems)
@@ -265,7 +274,10 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         from rotorid.files.check_and_slow_roll import check_runs
 
         sources = tables["check"], mounted
-        check = check_runs(sources, trials, [*planes], conventions, settings.errors, slow_roll, problems)
+        stated_errors = settings.errors
+        check = check_runs(
+            sources, trials, [*planes], groups, conventions, stated_errors, slow_roll, problems
+        )
         if check is not None and mounted is not None:
             holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
@@ -276,7 +288,9 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     degrees = [angle for plane in planes.values() for angle in plane.angles]
     if rotor is not None:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
-    vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
+    shares = np.array([share for group in groups.values() for share in group.values()], dtype=complex)
+    vectors = [trials.weights, shares, np.exp(1j * np.radians(degrees))]
+    vectors += [] if check is None else [check.weights]
     matters = {"phase": True, "angles": any(map(off_axis, vectors))}
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
@@ -285,6 +299,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         conventions=conventions,
         files=tuple(file for file in files if isinstance(file, Path)),
         planes=planes,
+        groups=groups,
         sensors=sensors,
         limits=limits,
         zones=zones,
@@ -353,8 +368,11 @@ def _readings(
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
     if source is not None and influence is not None and trials is not None:
+        groups = settings.shares(conventions.labels)
+        trials = in_planes(trials, groups)
         tolerance = conventions.speed_tolerance_percent
-        influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)
+        planes = unknowns(groups, influence.planes).planes
+        influence = fit_to_readings(influence, trials, planes, tolerance, source_name(source), problems)
     if trials is None or len(problems) > before:
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels

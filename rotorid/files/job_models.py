@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from balancing import Placement, ReadingErrors, RunScatter, Trials
+from balancing import Labels, Placement, ReadingErrors, RunScatter, Trials
 from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
+from rotorid.files.cells import NotANumber, parse_number
 from rotorid.files.columns import Source
 from rotorid.files.layout import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
 from rotorid.files.problems import InputError, Problems, refusal
@@ -98,6 +99,18 @@ def _or_one(value: object) -> object:
     return value if isinstance(value, dict) or ":" in str(value) else {"": value}
 
 
+def _share(value: object) -> tuple[float, float]:
+    """A ratio at an angle in degrees, "0.8@180"; without an angle at 0."""
+    ratio, _, angle = str(value).partition("@")
+    try:
+        size, degrees = (parse_number(part.strip().removesuffix("°")) for part in (ratio, angle or "0"))
+    except NotANumber:
+        size, degrees = 0.0, 0.0
+    if not (size and abs(degrees) <= 360.0):
+        raise ValueError('a ratio other than 0 at an angle from -360 to 360 degrees, such as "1@180"')
+    return size, degrees
+
+
 def _kind(value: object) -> str:
     return "file" if isinstance(value, str) else "vectors"
 
@@ -114,6 +127,8 @@ Limits: Any = Annotated[
 ]
 Boundaries = Annotated[Quantity, of(listed(Positive, _rising))]
 Weight = Annotated[Quantity, of(Positive)]
+Share = Annotated[tuple[float, float], BeforeValidator(_share, json_schema_input_type=str | float)]
+"""Ratio and angle, degrees."""
 File = Annotated[Text, AfterValidator(_printable)]
 
 
@@ -238,6 +253,15 @@ class Plane(_Placed):
                 yield "per_hole", "the weights that are available too, available_g = [5, 10]"
             for name in self.taken.keys() - names:
                 yield "taken", f"holes of the plane, {names[0]} … {names[-1]}, not {name!r}"
+
+
+class Group(Settings):
+    """`[groups.NAME]`."""
+
+    planes: by_name(Share) = key(  # type: ignore[valid-type]
+        "the weights of its planes as ratio@angle, the angle in the job's direction",
+        example='{ P1 = "1@0", P2 = "1@180" }',
+    )
 
 
 class Sensor(_Placed):
@@ -417,6 +441,10 @@ class JobSettings(Settings):
     planes: dict[str, Plane] = key("see below", default={})
     sensors: dict[str, Sensor] = key("see below", default={})
     zones: Zones | None = optional("zones by which readings are judged, see below")
+    groups: dict[str, Group] = key(
+        "planes with weights of fixed ratios and angles, such as static and couple, see below",
+        default={},
+    )
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
     machine_type: Label = key("its type, for `rotorid fleet`", default="")
     date: Date | None = optional("when it was balanced", example="2026-03-17")
@@ -426,6 +454,16 @@ class JobSettings(Settings):
         """A direction without the rotation that is seen against it."""
         if self.rotation is None and (self.view or self.angles in ROTATIONS):
             yield "rotation", f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end"
+        inside = {*self.planes, *(plane for group in self.groups.values() for plane in group.planes)}
+        for name in self.groups.keys() & inside:
+            yield "groups", f"names of groups that no plane has, not {name!r}"
+
+    def shares(self, labels: Labels) -> dict[str, dict[str, complex]]:
+        """The weight of each plane of each group where that of the group is 1."""
+        return {
+            name: {p: complex(labels.weight_from(size, radians(at))) for p, (size, at) in one.planes.items()}
+            for name, one in self.groups.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials, from_list
+from balancing import Holes, Influence, Labels, Limits, Trials, from_list, held, in_planes, unknowns
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -83,9 +83,13 @@ def planes_of(
     rotor: Rotor | None,
     problems: Problems,
 ) -> tuple[Trials, dict[str, Plane]]:
-    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone."""
-    stated = settings.planes
-    measured = trials.planes if influence is None else influence.planes
+    """Readings with weights at the correction radius, and planes: of the tables, then of the model alone.
+
+    The weights are those of planes, or of groups where they do not tell planes apart.
+    """
+    stated, groups = settings.planes, settings.shares(trials.labels)
+    trials, of = in_planes(trials, groups), held(groups, trials.planes)
+    measured = trials.planes if influence is None else unknowns(groups, influence.planes).planes
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
@@ -96,15 +100,23 @@ def planes_of(
         trials = replace(trials, labels=labels)
     if planes and not any(plane.use for plane in planes.values()):
         settings.complain(problems, "planes", "at least one plane without use = false")
-    for kind, names in (("planes", [*planes]), ("sensors", trials.sensors)):
-        for name, part in getattr(settings, kind).items() if names else ():
-            if name not in names:
-                expected = f"one of the job's {kind}, {listing(names, 'and')}{did_you_mean(name, names)}"
+    for kind, there in (("planes", [*planes]), ("sensors", trials.sensors)):
+        for name, part in getattr(settings, kind).items() if there else ():
+            if name not in there:
+                expected = f"one of the job's {kind}, {listing(there, 'and')}{did_you_mean(name, there)}"
                 if kind == "planes":
                     expected += f"; there is no trial weight in plane {name!r}: is its row missing?"
                 problems.append(replace(part.problem("", expected), value=name))
+    for group in settings.groups.values() if planes else ():
+        if lost := [plane for plane in group.planes if plane not in planes]:
+            expected = f"planes of the job, {listing(planes, 'and')}, not {lost[0]!r}"
+            group.complain(problems, "planes", expected + did_you_mean(lost[0], planes))
     if not trials.labels.unbalances:
         trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
+    try:
+        trials = trials if of is None else of.of_runs(trials, 0.0)
+    except ValueError as error:
+        settings.complain(problems, "groups", f"planes with the same trial_radius_mm / radius_mm: {error}")
     return trials, planes
 
 

@@ -242,7 +242,7 @@ def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tu
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
     """R with R Rᵀ = C, (…, n, n), without what is negative of it; in units of a variance (…, n).
 
-    R is symmetric in these units: so it is the same whatever eigenvectors a library returns of equal variances.
+    R is symmetric in these units: the same whatever eigenvectors a library returns of equal variances.
     """
     size = np.sqrt(np.maximum(variance, 0.0))
     scale = np.where(size > 0, size, 1.0)

@@ -129,6 +129,8 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
     """The answer: what to do, its tables as HTML, what there is to mount."""
     from markupsafe import Markup
 
+    from rotorid.base.tables import Column, Table, html
+    from rotorid.base.text import figures
     from rotorid.report.balance import to_do
 
     made, read = _balance(*asked)
@@ -139,10 +141,17 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         drilled = row.get("remove_at_deg")
         return float(row["angle_deg"] if drilled is None else drilled)
 
+    parts = [] if "left_to_do" in document else document["parts"]
+    columns = (
+        Column("part", [row["part"] for row in parts]),
+        Column(labels.weight_in, [row["mass"] for row in parts], figures),
+        Column("at °", [row["angle_deg"] for row in parts], figures),
+    )
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
         "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
+        "parts": html(Table("parts", columns)) if parts else "",
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
         "to_mount": [{**row, "at": at(row)} for row in rows],

@@ -112,7 +112,7 @@ class View:
     ----------
     names, rows
         Of each table: its columns by what they hold, and its rows so, each with its `id` and `place`.
-    sensors, planes, runs, baseline, trials
+    sensors, planes, groups, runs, baseline, trials
         Names that occur; the run without weights, and the others.
     problems
         Of the files: words, and the cells that they are about, "" for none.
@@ -123,7 +123,10 @@ class View:
         self.names = {key: table.columns() for key, table in self.job.tables.items()}
         self.rows = {key: [*self._rows(key)] for key in self.job.tables}
         self.sensors = self.values("sensor", "runs", "check")
-        self.planes = _each([*self._stated("planes"), *self.values("plane", "weights")])
+        groups = self._stated("groups")
+        inside = [plane for name in groups for plane in self._stated("groups", name, "planes")]
+        weighed_planes = [name for name in self.values("plane", "weights") if name not in groups]
+        self.planes, self.groups = _each([*self._stated("planes"), *inside, *weighed_planes]), [*groups]
         self.runs, weighed = self.values("run", "runs", "weights"), self.values("run", "weights")
         self.baseline = next((run for run in self.runs if run not in weighed), "baseline")
         self.trials = [run for run in self.runs if run != self.baseline]
@@ -150,10 +153,11 @@ class View:
         return self.names.get(key, {}).get(what, {"weight": "mass_g"}.get(what, ""))
 
     def readings(self, key: str, run: str) -> list[Line]:
-        """Amplitude and phase of each sensor, a line for each speed."""
+        """Amplitude and phase, if there is one, of each sensor, a line for each speed."""
         rows = self.of_run(key, run)
         at = {(row["place"], row["sensor"]): row for row in rows}
-        pairs = [(sensor, what) for sensor in self.sensors for what in ("amplitude", "phase")]
+        read = [what for what in ("amplitude", "phase") if what in self.names[key]]
+        pairs = [(sensor, what) for sensor in self.sensors for what in read]
         return [
             (place, [self._cell(key, at.get((place, s)), what, f"{s}, {place}") for s, what in pairs], "")
             for place in _each(row["place"] for row in rows)
@@ -247,7 +251,8 @@ def setup(view: View, fields: Fields) -> list[Edit]:
     speeds, sensors = (_each(re.split(r"\s*[,;]\s*", fields[name].strip())) for name in ("speeds", "sensors"))
     names, made = view.names.get("runs"), list[Edit]()
     if names is None:
-        header = ["run", fields["speed_unit"], "sensor", fields["amplitude_unit"], "phase_deg"]
+        header = ["run", fields["speed_unit"], "sensor", fields["amplitude_unit"]]
+        header += [] if "no_phase" in fields else ["phase_deg"]
         names = {content(name): name for name in header}
         made.append({"create": "runs", "header": header})
     places = [(speed, sensor) for speed in speeds for sensor in sensors]

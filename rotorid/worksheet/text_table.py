@@ -162,7 +162,7 @@ def shown(path: Path, key: str, grid: Grid) -> Table:
     if key not in READINGS:
         form = ["run", "plane", "weight", "angle"]
     names = table.columns()
-    if not names.keys() >= {*form} or len(names) < len(grid.header):
+    if not {*names, "phase"} >= {*form} or len(names) < len(grid.header):  # some instruments show no phase
         why = f"{path.name} has other columns than {', '.join(form)}"
         table.read_only = f"{why}: it is read as it is, edit it where it comes from"
     table.name_rows()

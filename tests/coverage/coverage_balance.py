@@ -19,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import (
+    Groups,
     ReadingErrors,
     RunScatter,
     Trials,
     UndeterminedError,
     correct,
     estimate_influence,
+    unknowns,
 )
 from balancing.errors import ASSUMED_RUN as ASSUMED
 
@@ -38,6 +40,8 @@ KINDS = ("independent", "half of each", "common at a speed", "common to a run", 
 PHASE = np.deg2rad(2.0) / 0.02
 """Phase error over amplitude error, as they are assumed."""
 TIMES = (0.5, 1.0, 1.5, 2.5)
+GROUPS = {"skew": {"A": 1.0, "C": -0.4j}, "B and C": {"B": 2.0, "C": 0.7 + 0.2j}}
+"""Three planes whose weights are held together."""
 
 
 class Job(NamedTuple):
@@ -85,15 +89,20 @@ def draw(
     errors: tuple[float, float],
     told: float = 1.0,
     trial: float = 0.3,
+    shares: ComplexArray | None = None,
 ) -> Job:
-    """An ordinary job with errors of a reading and between runs, `told` times as large as stated."""
+    """An ordinary job with errors of a reading and between runs, `told` times as large as stated.
+
+    With `shares` the correction is one of groups, each of size 1.
+    """
     reading, run = errors
     tangential = reading * (PHASE if source == "assumed" else 1.0)
-    P, S, C = int(rng.integers(1, 5)), int(rng.integers(1, 6)), int(rng.integers(2, 9))
+    P = int(rng.integers(1, 5)) if shares is None else len(shares)
+    S, C = int(rng.integers(1, 6)), int(rng.integers(2, 9))
     C = max(C, P // S + 1)
     W = normal(rng, S, C, P)
     W *= np.exp(0.5 * rng.standard_normal((S, 1, 1)) + 0.3 * rng.standard_normal((1, C, 1)))
-    D = normal(rng, P)
+    D = normal(rng, P) if shares is None else shares @ normal(rng, shares.shape[1])
     spare = int(rng.integers(1, 5)) if "spare" in source else 0
     planes = [-1, *range(P), *rng.choice([-1, *range(P)], spare)]
     T = np.zeros((len(planes), P), dtype=complex)
@@ -121,10 +130,11 @@ def draw(
     return Job(trials, D, 2 * (S * C * (spare + 1) - P), W)
 
 
-def outcome(job: Job, method: str | None = None) -> Outcome:
+def outcome(job: Job, method: str | None = None, groups: Groups | None = None) -> Outcome:
     """Balance a job and see."""
     try:
-        found = correct(estimate_influence(job.trials), method=method)
+        influence = estimate_influence(job.trials)
+        found = correct(influence, method=method, planes=groups and [*groups], groups=groups or {})
     except UndeterminedError as error:
         return Outcome(None, (str(error),), job.redundant)
     size = np.sqrt(np.mean(np.abs(found.weights) ** 2))
@@ -144,6 +154,13 @@ def simulate(
     """So many jobs of a class."""
     rng = np.random.default_rng([seed, SOURCES.index(source) if source in SOURCES else 9, KINDS.index(kind)])
     return [outcome(draw(rng, source, kind, errors(rng), told)) for _ in range(jobs)]
+
+
+def held_together(jobs: int, kind: str) -> list[Outcome]:
+    """So many jobs with the weights of three planes in two groups."""
+    rng, shares = np.random.default_rng([3, KINDS.index(kind)]), unknowns(GROUPS, [*GROUPS], "ABC").shares
+    drawn = (draw(rng, SOURCES[0], kind, ordinary(rng), shares=shares) for _ in range(jobs))
+    return [outcome(job, groups=GROUPS) for job in drawn]
 
 
 def every_kind(
@@ -209,6 +226,9 @@ def main(jobs: int = 2500) -> None:
             at = [one.inside for one in drawn if one.inside is not None and low <= one.relative < high]
             name = f"{method}: relative error of the weights {low:g} … {high:g}"
             print(f"{name:<60}{percent(at):>6} of {len(at)}")
+
+    print(f"\ne. Weights of three planes that two groups hold together; errors stated\n{head}")
+    print(line("all", [one for kind in KINDS for one in held_together(jobs // 5, kind)]))
 
 
 def assumed(times: float) -> tuple[float, float]:

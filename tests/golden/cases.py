@@ -168,6 +168,8 @@ bk-errors                   balance sample_data/bk_two_plane/job.toml --errors 2
 bk-minmax                   balance sample_data/bk_two_plane/job.toml --method minmax
 bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method weighted
 bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --errors 2,1
+static-couple               balance sample_data/bk_two_plane/static_couple.toml
+couple-alone                balance sample_data/bk_two_plane/static_couple.toml --planes couple
 left-in                     balance sample_data/left_in/job.toml
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
@@ -195,6 +197,7 @@ split-taken                 split 35g@120 --holes 24 --pieces 10g,20g --taken 3:
 split-two                   split 35g@120 --two 20g,30g
 split-sum                   split 35g@120+5g@200 --holes 24
 split-drill                 split 3g@120 --drill 8mm --radius 100mm
+split-planes                split 35g@120+10g@30 --at 250mm,700mm --planes left=100mm,right=600mm --plot s.png
 split-wrong                 split 35g120 --holes 24
 tolerance                   tolerance --mass 500kg --speed 3000rpm --grade G2.5
 tolerance-positions         tolerance --mass 500kg --speed 3000rpm --grade G2.5 --planes left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm --plot t.png
@@ -500,8 +503,10 @@ STORED = (
     "simulate-modes",
     "simulate-record",
     "simulate-record-errors",
+    "static-couple",
     "split-drill",
     "split-holes",
+    "split-planes",
     "split-sum",
     "split-two",
     "study",
