@@ -18,22 +18,22 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("fem", "balancing", "rotorid")
 CEILINGS = (  # places, units, issue whose end puts it in force; only an issue that says so raises one
     ("fem", 35_500, "23"),
-    ("balancing", 52_500, "24b"),
+    ("balancing", 57_500, "29"),
     ("rotorid/identify", 41_500, "25a"),
     ("rotorid/reduction rotorid/motion", 33_500, "25b"),
     ("rotorid/calibration rotorid/waveforms", 12_500, "25c"),
-    ("rotorid/cli rotorid/commands rotorid/report", 48_000, "26"),
-    ("rotorid/files", 47_500, "27"),
-    ("rotorid/worksheet", 12_500, "28"),
+    ("rotorid/cli rotorid/commands rotorid/report", 49_000, "29"),
+    ("rotorid/files", 48_700, "29"),
+    ("rotorid/worksheet", 12_800, "29"),
     ("rotorid/fleet rotorid/study", 7_000, "28b"),
     ("rotorid/base rotorid/regression rotorid/validation", 11_500, "28b"),
     ("rotorid/__init__.py rotorid/__main__.py rotorid/plots.py rotorid/samples.py", 1_200, "28"),
-    ("fem balancing rotorid", 303_000, "28"),
+    ("fem balancing rotorid", 310_500, "29"),
     ("tests", 430_000, "22b"),
     ("tests", 260_000, "28"),
     ("benchmarks examples docs", 37_500, "22b"),
 )
-RESOLVED = {"22", "22a", "22b", "23", "24b", "25a", "25b", "25c", "26", "27", "28"}
+RESOLVED = {"22", "22a", "22b", "23", "25a", "25b", "25c", "28", "29"}
 """Issues whose ceilings hold: the one that resolves another adds it here; 28b is what 28 has not reached."""
 
 LAYOUT = (
