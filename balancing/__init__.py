@@ -21,6 +21,14 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.holes import Holes, equal_holes, from_list
+from balancing.index import (
+    ArborCorrection,
+    RotorAndArbor,
+    machine_influence,
+    rotor_and_arbor,
+    turned,
+    with_arbor,
+)
 from balancing.influence import (
     Influence,
     Remarks,
@@ -35,6 +43,7 @@ from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
 from balancing.regions import Region, real_parts, region_edge
+from balancing.relative import RelativeCorrection, relative_to
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -42,7 +51,7 @@ from balancing.trial_weight import (
     trial_from_coefficients,
     trial_from_force,
 )
-from balancing.trials import Limits, Placement, ReadingErrors, RunScatter, Trials
+from balancing.trials import TRIAL_WEIGHTS, Limits, Placement, ReadingErrors, Relative, RunScatter, Trials
 from balancing.trim import LeftToDo, after_check_run
 from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
@@ -51,7 +60,9 @@ from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
 __all__ = [
     "GRADES",
     "METHODS",
+    "TRIAL_WEIGHTS",
     "UNBALANCE_METHODS",
+    "ArborCorrection",
     "CheckComparison",
     "Conditioning",
     "ConventionTest",
@@ -69,7 +80,10 @@ __all__ = [
     "Reading",
     "ReadingErrors",
     "Region",
+    "Relative",
+    "RelativeCorrection",
     "Remarks",
+    "RotorAndArbor",
     "RunErrors",
     "RunScatter",
     "Solution",
@@ -94,6 +108,7 @@ __all__ = [
     "from_list",
     "last_run",
     "local_runs",
+    "machine_influence",
     "match_speeds",
     "model_influence",
     "mount",
@@ -101,15 +116,19 @@ __all__ = [
     "real_parts",
     "refine",
     "region_edge",
+    "relative_to",
+    "rotor_and_arbor",
     "solve",
     "solve_discrete",
     "tolerance",
     "trial_from_coefficients",
     "trial_from_force",
+    "turned",
     "unbalance_of_run",
     "usual_run_errors",
     "verdict_of_check",
     "verdict_of_prediction",
+    "with_arbor",
     "with_check_runs",
     "with_parameters",
 ]

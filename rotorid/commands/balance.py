@@ -21,6 +21,7 @@ from rotorid.commands.balance_solution import (
 )
 from rotorid.commands.coefficients import KINDS
 from rotorid.commands.quantities import one_of
+from rotorid.commands.special_runs import refuse, special
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
@@ -93,6 +94,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
+    refuse(read, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -103,6 +105,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
+    result = special(result, read, options.coefficients)
     mounted, check, left = None, None, None
     if options.split and read.check_pieces is not None and not options.refine:
         mounted = read.check_pieces

@@ -36,7 +36,10 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     """
     from balancing import UndeterminedError, combine, estimate_influence, refine
     from rotorid.commands.one_shot import counted_before
+    from rotorid.commands.special_runs import coefficients
 
+    if (special := coefficients(job, kind)) is not None:
+        return special, None
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
     if nothing and kind is None and job.settings.machine_type:

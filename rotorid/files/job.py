@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials
+from balancing import Holes, Influence, Labels, Limits, Trials, machine_influence
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
+from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.job_models import (
     READINGS,
@@ -239,6 +240,10 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
+    if trials.relative is not None or trials.index is not None:
+        from rotorid.files.unknown_weights import refuse
+
+        refuse(settings, trials, tables, problems)
     trials, planes = planes_of(settings, trials, influence, rotor, problems)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)
@@ -260,7 +265,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     if rotor is not None:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
     vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
-    matters = {"phase": True, "angles": any(map(off_axis, vectors))}
+    machine = units.vibration(trials.labels.vibration_unit).kind == "unbalance"  # phases are angles then
+    matters = {"phase": not machine, "angles": machine or any(map(off_axis, vectors))}
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
         trials=replace(trials, labels=labels),
@@ -314,12 +320,6 @@ def _readings(
     if "check" not in tables and ("check_weights" in tables or settings.check_weights):
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
-    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type):
-        expected = (
-            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
-            "whose coefficients come with balance --type"
-        )
-        settings.complain(problems, "weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
     phase, angles = settings.phase or stated_phase(runs), settings.angles
     stated = dict[str, Any]()
@@ -331,6 +331,15 @@ def _readings(
         influence, stated = load_influence(source, phase, resolved, problems) or (None, stated)
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
+    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type):
+        if trials is not None and units.vibration(trials.labels.vibration_unit).kind == "unbalance":
+            influence = machine_influence(trials)
+        else:
+            expected = (
+                "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
+                "whose coefficients come with balance --type"
+            )
+            settings.complain(problems, "weights", expected)
     if source is not None and influence is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
         influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)

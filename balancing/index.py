@@ -1,0 +1,198 @@
+"""Runs with the rotor turned on its arbor (index balancing): what the rotor does, and what its arbor does.
+
+The phase mark is the arbor's. At index θ the rotor stands turned by θ, with the rotation, and so do the
+weights d on it:
+
+    y(θ) = A + R e^{iθ} + W d e^{iθ} = Y₀ + R (e^{iθ} − 1) + W (d e^{iθ}),    Y₀ = A + R.
+
+That is a rotor with one plane more, whose trial weight is e^{iθ} − 1 and whose coefficient is R: what fits
+trial runs fits these, with its errors. No run need stand at index 0. Two positions, 0° and 180°, have the
+closed form R = (y(0) − y(180))/2, A = (y(0) + y(180))/2. Weights on the rotor cannot mend its arbor: they are
+to make |R + W d| small. A is all that turns with the arbor: its unbalance, the rotor's mass on a seat that
+runs out, run-out of what the sensors see.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from balancing.conditioning import UndeterminedError, check_effects, check_runs
+from balancing.correct import correct
+from balancing.correction import Correction
+from balancing.influence import Influence, Mounted, fit_runs
+from balancing.noise import Gaussian
+from balancing.tables import degrees, reading_columns, vector_columns
+from balancing.trials import TURNED, Trials
+from rotorid.base.arrays import ComplexArray
+from rotorid.base.json import plain
+from rotorid.base.tables import Column, records
+from rotorid.base.text import figures, listing
+
+_SAME = 1e-6
+
+
+class RotorAndArbor(NamedTuple):
+    """Coefficients of weights on the rotor, and what the rotor, and its arbor, do alone as baseline."""
+
+    rotor: Influence
+    arbor: Influence
+
+
+def turned(trials: Trials) -> Trials:
+    """Runs at several indices as runs with one plane more, first, that stands for the turned rotor."""
+    assert trials.index is not None
+    turn = np.exp(1j * trials.index)
+    weights = np.column_stack((turn - 1, trials.weights * turn[:, None]))
+    return replace(trials, planes=(TURNED, *trials.planes), weights=weights, index=None)
+
+
+def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAndArbor:
+    """Rotor and arbor apart.
+
+    Parameters
+    ----------
+    trials
+        R runs with `index`, of at least two positions: without weights, and with one trial weight for each
+        plane, or without weights alone where coefficients are stored.
+    stored
+        Coefficients at the speeds and of the sensors of the runs.
+
+    Raises
+    ------
+    UndeterminedError
+        For one position only, and for runs that do not tell rotor, arbor and trial weights apart.
+    ValueError
+        For trial weights beside stored coefficients.
+    """
+    turn = np.exp(1j * (np.zeros(1) if trials.index is None else trials.index))
+    if np.abs(turn - turn[0]).max() < _SAME:
+        raise UndeterminedError(
+            "the rotor stood at one index only, which does not tell it from its arbor: turn it on the arbor, "
+            "best by 180°, and measure again"
+        )
+    if stored is not None and trials.weights.any():
+        raise ValueError(
+            "runs at several indices with stored coefficients are runs without weights: leave these runs "
+            "out, or the coefficients"
+        )
+    runs = turned(trials if stored is None else replace(trials, planes=(), weights=trials.weights[:, :0]))
+    try:
+        check_runs(runs.runs, runs.planes, runs.weights)
+    except UndeterminedError:
+        raise UndeterminedError(
+            "these runs do not tell the rotor, its arbor and the trial weights apart: two runs without "
+            "weights, at indices such as 0° and 180°, and one with a trial weight for each plane do"
+        ) from None
+    fitted = fit_runs(runs)
+    if stored is None:
+        own = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
+        check_effects(
+            replace(runs, planes=runs.planes[1:], weights=runs.weights[:, 1:]),
+            own.W,
+            own.channels(known=True),
+            fitted.remarks.contradictions,
+        )
+    W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
+    R, P, warnings = fitted.W[..., 0], len(planes), fitted.remarks.warnings
+    weights = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
+    if stored is not None and not stored.known_errors and fitted.reading.source != "assumed":
+        warnings += ("± leave out the errors of the influence coefficients, which are not known",)
+
+    def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
+        """The coefficients with this combination of Y₀ and R as baseline."""
+        change = np.zeros((P + 1, fitted.W.shape[-1] + 1), dtype=complex)
+        change[0, :2] = combination
+        if stored is None:
+            change[1:, 2:] = np.eye(P)
+        noise = fitted.errors.noise.changed(change)
+        if stored is not None:
+            noise = noise.plus(stored.errors.noise.changed(np.diag([0.0, *np.ones(P)]).astype(complex)))
+        mounted = Mounted(trials.runs[-1], planes, weights)
+        errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
+        remarks = fitted.remarks._replace(warnings=warnings)
+        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, remarks=remarks)
+
+    return RotorAndArbor(part((0, 1), R), part((1, -1), fitted.baseline - R))
+
+
+def machine_influence(trials: Trials) -> Influence:
+    """Coefficients of a calibrated balancing machine, whose readings are the unbalances of its planes."""
+    S, C = trials.mean.shape[1:]
+    one = np.broadcast_to(np.eye(C, dtype=complex), (S, C, C))
+    labels = replace(
+        trials.labels,
+        weight_unit=trials.labels.vibration_unit,
+        weight_scale=trials.labels.vibration_scale,
+    )
+    nothing = np.full((S, C), np.nan + 0j)
+    errors = Gaussian.none(S, C, C)
+    return Influence(trials.speeds, trials.sensors, trials.sensors, one, nothing, errors, labels)
+
+
+@dataclass(frozen=True, eq=False)
+class ArborCorrection(Correction):
+    """A correction of the rotor alone, with its unbalance and that of its arbor.
+
+    Attributes
+    ----------
+    parts
+        What would correct the rotor, and its arbor, free of limits: opposite to their unbalances.
+    """
+
+    parts: tuple[Correction, ...] = ()
+
+    @property
+    def unbalances(self) -> tuple[Correction, ...]:
+        """Weights that do what the rotor does, and what its arbor does, with their draws."""
+        return tuple(replace(c, weights=-c.weights, draws=-c.draws, remove=()) for c in self.parts)
+
+    def _what(self) -> str:
+        return (
+            super()._what().replace("material", "material of the rotor").replace("weights", "weights on it")
+        )
+
+    def _left(self) -> str:
+        """What is left of the rotor's part."""
+        return f"the rotor's part, {super()._left()}".replace("a check run stays", "it stays")
+
+    def _weights_text(self) -> str:
+        lines = [super()._weights_text()]
+        for name, part in zip(("Rotor's", "Arbor's"), self.unbalances, strict=True):
+            sizes, turns = part.half_widths()
+            each = zip(part.planes, *part.labels.weight(part.weights), sizes, np.degrees(turns), strict=True)
+            unit, scale = f" {part.labels.weight_in}", part.labels.weight_scale
+            words = [
+                f"{figures(size)}{unit}{_width(dm * scale, unit)} at {degrees(at)}{_width(da, '°')} in {p!r}"
+                for p, size, at, dm, da in each
+            ]
+            lines.append(f"{name} unbalance: {listing(words, 'and')}.")
+        lines[-1] = f"{lines[-1][:-1]}, with all run-out that turns with it, which is not separable."
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """That of the correction with rotor_unbalance, arbor_unbalance and on_arbor_at_index_0."""
+        columns: tuple[Column, ...] = reading_columns(self.labels, self.speeds, self.sensors)
+        for name, readings in (("before", self.before), ("after", self.after)):
+            columns += vector_columns(self.labels, name, readings + self.parts[1].before)
+        rotor, arbor = (records(part._weight_columns()[:6]) for part in self.unbalances)
+        further = {
+            "rotor_unbalance": rotor,
+            "arbor_unbalance": arbor,
+            "on_arbor_at_index_0": records(columns),
+        }
+        return super().to_dict() | plain(further)
+
+
+def _width(half: float, unit: str) -> str:
+    return f" ± {figures(half, 2)}{unit}" if np.isfinite(half) else ""
+
+
+def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
+    """A correction of `both.rotor` with the unbalances of rotor and arbor."""
+    at = result.planes, result.speeds
+    parts = tuple(correct(part, None, *at, refuse=False) for part in both)
+    fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
+    return ArborCorrection(**fields, parts=parts)
