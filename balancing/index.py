@@ -98,7 +98,7 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
     R, P, warnings = fitted.W[..., 0], len(planes), fitted.remarks.warnings
     weights = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
-    if stored is not None and not stored.known_errors and fitted.reading.source != "assumed":
+    if stored is not None and not stored.known_errors and not np.array_equal(stored.W[0], np.eye(P)):
         warnings += ("± leave out the errors of the influence coefficients, which are not known",)
 
     def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
@@ -113,7 +113,8 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         mounted = Mounted(trials.runs[-1], planes, weights)
         errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
         remarks = fitted.remarks._replace(warnings=warnings)
-        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, remarks=remarks)
+        made = replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, remarks=remarks)
+        return made if stored is None else replace(made, labels=stored.labels)
 
     return RotorAndArbor(part((0, 1), R), part((1, -1), fitted.baseline - R))
 
@@ -150,13 +151,10 @@ class ArborCorrection(Correction):
         return tuple(replace(c, weights=-c.weights, draws=-c.draws, remove=()) for c in self.parts)
 
     def _what(self) -> str:
-        return (
-            super()._what().replace("material", "material of the rotor").replace("weights", "weights on it")
-        )
+        return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
 
     def _left(self) -> str:
-        """What is left of the rotor's part."""
-        return f"the rotor's part, {super()._left()}".replace("a check run stays", "it stays")
+        return f"{super()._left()}, beside the arbor's part"
 
     def _weights_text(self) -> str:
         lines = [super()._weights_text()]
@@ -169,7 +167,7 @@ class ArborCorrection(Correction):
                 for p, size, at, dm, da in each
             ]
             lines.append(f"{name} unbalance: {listing(words, 'and')}.")
-        lines[-1] = f"{lines[-1][:-1]}, with all run-out that turns with it, which is not separable."
+        lines.append("The arbor's is one with all run-out that turns with it: no index tells them apart.")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:

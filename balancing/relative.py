@@ -66,7 +66,9 @@ class RelativeCorrection(Correction):
         columns.append(Column("place", [self._place(turn, labels.angle_sign) for turn in self.turns]))
         if self.region_known:
             sizes, angles = self.half_widths()
-            turns = ["not determined" if np.isnan(a) else f"± {figures(float(np.degrees(a)), 2)}°" for a in angles]
+            turns = [
+                "not determined" if np.isnan(a) else f"± {figures(float(np.degrees(a)), 2)}°" for a in angles
+            ]
             columns += [Column("95 %", sizes, lambda w: f"± {figures(w, 2)}"), Column("", turns)]
         for other in self.others:
             sign = labels.angle_sign * (1 if other.rows[0]["angles"] == labels.angle_words else -1)

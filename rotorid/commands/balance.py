@@ -21,7 +21,7 @@ from rotorid.commands.balance_solution import (
 )
 from rotorid.commands.coefficients import KINDS
 from rotorid.commands.quantities import one_of
-from rotorid.commands.special_runs import refuse, special
+from rotorid.commands.special_runs import special
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
@@ -60,8 +60,11 @@ class Balance(Outcome):
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
+        from balancing import ArborCorrection, RelativeCorrection
         from rotorid.report.balance import balance_report
 
+        if isinstance(self.result, (ArborCorrection, RelativeCorrection)):
+            return super().sheet()  # what these say stands in no form
         made = self.result, self.mounted, self.check, self.left, self.verdict
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
@@ -94,7 +97,6 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
-    refuse(read, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)
@@ -133,6 +135,8 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
 
+        if read.trials.relative is not None:
+            raise ValueError(f"{path.name}: coefficients need trial weights that are known, without ?")
         return influence_bytes(path, influence)
 
     def solved_equations() -> Equations:

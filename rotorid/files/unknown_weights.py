@@ -83,7 +83,8 @@ def relative_weights(
                 words += (
                     "determined; the same one moved by 90° is ?+90 (stays there: ?+0), twice as heavy 2x?"
                 )
-                table.complain(plain[b], "angle" if "angle" in of_plane else "mass", words)
+                where = table.grid.source, table.rows[plain[b]]
+                table.problems.add(words, *where, "angle" if "angle" in of_plane else "mass", "?")
         first = next(filter(None, total[:, p].tolist()), 1.0)
         sizes[plane] = np.nan if "mass" in of_plane else abs(first) * unit.scale
         scale = unit.to_si(1.0) if "mass" in of_plane else abs(first)
