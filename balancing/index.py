@@ -24,12 +24,11 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
-from balancing.tables import degrees, reading_columns, vector_columns
+from balancing.tables import reading_columns, vector_columns
 from balancing.trials import TURNED, Trials
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records
-from rotorid.base.text import figures, listing
 
 _SAME = 1e-6
 
@@ -96,10 +95,8 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             fitted.remarks.contradictions,
         )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
-    R, P, warnings = fitted.W[..., 0], len(planes), fitted.remarks.warnings
-    weights = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
-    if stored is not None and not stored.known_errors and not np.array_equal(stored.W[0], np.eye(P)):
-        warnings += ("± leave out the errors of the influence coefficients, which are not known",)
+    P = len(planes)
+    on = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
 
     def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
         """The coefficients with this combination of Y₀ and R as baseline."""
@@ -110,13 +107,15 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         noise = fitted.errors.noise.changed(change)
         if stored is not None:
             noise = noise.plus(stored.errors.noise.changed(np.diag([0.0, *np.ones(P)]).astype(complex)))
-        mounted = Mounted(trials.runs[-1], planes, weights)
+        mounted = Mounted(trials.runs[-1], planes, on)
         errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
-        remarks = fitted.remarks._replace(warnings=warnings)
-        made = replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, remarks=remarks)
-        return made if stored is None else replace(made, labels=stored.labels)
+        labels = (stored or fitted).labels
+        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, labels=labels)
 
-    return RotorAndArbor(part((0, 1), R), part((1, -1), fitted.baseline - R))
+    R = fitted.W[..., 0]
+    A = fitted.baseline - R
+    least = 0.0 if A.any() else 1e-12 * np.abs(R).max()  # a correction of nothing at all is refused
+    return RotorAndArbor(part((0, 1), R), part((1, -1), A + least))
 
 
 def machine_influence(trials: Trials) -> Influence:
@@ -148,7 +147,9 @@ class ArborCorrection(Correction):
     @property
     def unbalances(self) -> tuple[Correction, ...]:
         """Weights that do what the rotor does, and what its arbor does, with their draws."""
-        return tuple(replace(c, weights=-c.weights, draws=-c.draws, remove=()) for c in self.parts)
+        nothing = Mounted("", (), np.zeros(0, dtype=complex))
+        bare = [replace(c, remove=(), mounted=nothing) for c in self.parts]
+        return tuple(replace(c, weights=-c.weights, draws=-c.draws) for c in bare)
 
     def _what(self) -> str:
         return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
@@ -157,18 +158,9 @@ class ArborCorrection(Correction):
         return f"{super()._left()}, beside the arbor's part"
 
     def _weights_text(self) -> str:
-        lines = [super()._weights_text()]
-        for name, part in zip(("Rotor's", "Arbor's"), self.unbalances, strict=True):
-            sizes, turns = part.half_widths()
-            each = zip(part.planes, *part.labels.weight(part.weights), sizes, np.degrees(turns), strict=True)
-            unit, scale = f" {part.labels.weight_in}", part.labels.weight_scale
-            words = [
-                f"{figures(size)}{unit}{_width(dm * scale, unit)} at {degrees(at)}{_width(da, '°')} in {p!r}"
-                for p, size, at, dm, da in each
-            ]
-            lines.append(f"{name} unbalance: {listing(words, 'and')}.")
-        lines.append("The arbor's is one with all run-out that turns with it: no index tells them apart.")
-        return "\n".join(lines)
+        arbor = Correction._weights_text(self.unbalances[1]).rpartition("\n")[0]
+        head = "Unbalance of the arbor, and all run-out that turns with it, which no index tells from it:"
+        return f"{super()._weights_text()}\n{head}\n{arbor}"
 
     def to_dict(self) -> dict[str, Any]:
         """That of the correction with rotor_unbalance, arbor_unbalance and on_arbor_at_index_0."""
@@ -182,10 +174,6 @@ class ArborCorrection(Correction):
             "on_arbor_at_index_0": records(columns),
         }
         return super().to_dict() | plain(further)
-
-
-def _width(half: float, unit: str) -> str:
-    return f" ± {figures(half, 2)}{unit}" if np.isfinite(half) else ""
 
 
 def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:

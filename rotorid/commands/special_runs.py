@@ -21,6 +21,10 @@ def refuse(job: Job, options: BalanceOptions) -> None:
             option = "type" if name == "machine_type" else name.replace("_", "-")
             why = "the trial weights of this job are not known (?)" if relative else "this job has an index"
             raise ValueError(f"--{option} does not go with it: {why}")
+    if job.trials.relative and job.trials.relative.angle and job.limits and any(job.limits.forbidden):
+        raise ValueError("forbidden_deg does not go with it: the places of trial weights are not known (?)")
+    if relative and index:
+        raise ValueError("runs at several indices need trial weights that are known, without ?")
 
 
 def coefficients(job: Job, kind: str | None) -> Influence | None:

@@ -240,10 +240,10 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
-    if trials.relative is not None or trials.index is not None:
-        from rotorid.files.unknown_weights import refuse
-
-        refuse(settings, trials, tables, problems)
+    if "check" in tables and (trials.relative or trials.index is not None):
+        words = "no check run beside trial weights of unknown mass or place, or an index: it is a further run"
+        settings.complain(problems, "check", words)
+        problems.stop()
     trials, planes = planes_of(settings, trials, influence, rotor, problems)
     limits = make_limits(settings, planes, trials, problems)
     weights = row_weights(settings, trials, problems)

@@ -24,7 +24,7 @@ from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.layout import NUMBER, Conventions, long_rows
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
-from rotorid.files.unknown_weights import Marks, relative_weights, without_marks
+from rotorid.files.unknown_weights import Unknown, relative_weights, without_marks
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
 COLUMNS = (
@@ -70,9 +70,11 @@ def read_weights(
     """
     find, before = partial(find_header, weights=True), len(problems)
     grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
-    marks = Marks()
+    unknown = Unknown()
     try:
-        grid = None if grid is None else _one_weight_a_row(without_marks(grid, marks), conventions)
+        if grid is not None:
+            grid, unknown = without_marks(grid)
+            grid = _one_weight_a_row(grid, conventions)
     except InputError as error:
         problems.extend(error.problems)
     if grid is None or len(problems) > before:
@@ -105,12 +107,11 @@ def read_weights(
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
     for name, its, value in rows if runs and len(problems) == before else ():
         total[(runs or ()).index(name), planes.index(its)] += value
-    unit = table.unit("mass")
-    made = Weights(planes, total, unit, tuple(rows))
-    if not marks or len(problems) > before:
+    made = Weights(planes, total, table.unit("mass"), tuple(rows))
+    if not unknown or len(problems) > before:
         return made
-    total, relative = relative_weights(table, marks, run, runs or (), total)
-    return replace(made, weights=total, unit=Unit(TRIAL_WEIGHTS, "mass"), relative=relative)
+    total, relative = relative_weights(table, unknown, run, runs or (), total)
+    return replace(made, weights=total, unit=Unit(TRIAL_WEIGHTS, "multiple"), relative=relative)
 
 
 def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:

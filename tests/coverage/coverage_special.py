@@ -17,7 +17,6 @@ from coverage_balance import (
     KINDS,
     SOURCES,
     ComplexArray,
-    Job,
     Outcome,
     between_runs,
     draw,
