@@ -331,15 +331,15 @@ def _readings(
         influence, stated = load_influence(source, phase, resolved, problems) or (None, stated)
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
-    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type):
-        if trials is not None and units.vibration(trials.labels.vibration_unit).kind == "unbalance":
-            influence = machine_influence(trials)
-        else:
-            expected = (
-                "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
-                "whose coefficients come with balance --type"
-            )
-            settings.complain(problems, "weights", expected)
+    machine = trials is not None and units.vibration(trials.labels.vibration_unit).kind == "unbalance"
+    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type or machine):
+        expected = (
+            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
+            "whose coefficients come with balance --type"
+        )
+        settings.complain(problems, "weights", expected)
+    elif machine and trials is not None and not trials.planes:
+        influence = machine_influence(trials)
     if source is not None and influence is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
         influence = fit_to_readings(influence, trials, tolerance, source_name(source), problems)

@@ -200,7 +200,7 @@ def read_runs(
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
     turn, labels = None, conventions.labels
     if "index" in table and len(problems) == start:
-        by_run = dict(zip(run, table.numbers("index").tolist(), strict=True))
+        by_run = dict(zip(run[::-1], table.numbers("index")[::-1], strict=True))
         turn = labels.with_rotation(np.array([by_run[name] for name in runs]))
         same = np.array([by_run[name] for name in run]) == table.numbers("index")
         table.complain_where(~same, "index", "one index a run, the same in all its rows")
