@@ -423,10 +423,8 @@ def estimate_influence(trials: Trials, *, relative: bool = False) -> Influence:
     Runs over-determine the coefficients where R > P + 1. Rows are then weighted by the variance of their
     readings where it is known, else alike.
     """
-    unknown = trials.relative is not None and not relative
-    if unknown or trials.index is not None:
-        why = "a trial weight is not known" if unknown else "the rotor stands turned on its arbor"
-        raise UndeterminedError(f"{why}: that gives a correction (rotorid balance), but no coefficients")
+    if trials.index is not None or (trials.relative is not None and not relative):
+        raise UndeterminedError(trials.special)
     influence = fit_runs(trials)
     check_effects(trials, influence.W, influence.channels(known=True), influence.remarks.contradictions)
     return influence

@@ -216,6 +216,13 @@ class Trials:
             )
 
     @property
+    def special(self) -> str:
+        """Why the runs give a correction and nothing else; empty: they are ordinary ones."""
+        if self.relative is not None:
+            return "a trial weight is not known: that gives a correction, and nothing else"
+        return "" if self.index is None else "an index gives the rotor's correction, and nothing else"
+
+    @property
     def repeats(self) -> IntArray:
         """How many times each reading was taken, shape (R, S, C)."""
         return np.asarray(np.sum(~np.isnan(self.readings), axis=0), dtype=np.int64)

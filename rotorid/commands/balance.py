@@ -60,10 +60,9 @@ class Balance(Outcome):
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
-        from balancing import ArborCorrection, RelativeCorrection
         from rotorid.report.balance import balance_report
 
-        if isinstance(self.result, (ArborCorrection, RelativeCorrection)):
+        if self.job.trials.special:
             return super().sheet()  # what these say stands in no form
         made = self.result, self.mounted, self.check, self.left, self.verdict
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
@@ -136,7 +135,7 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
         from rotorid.files.influence import influence_bytes
 
         if read.trials.relative is not None:
-            raise ValueError(f"{path.name}: coefficients need trial weights that are known, without ?")
+            raise ValueError(f"{path.name}: {read.trials.special}")
         return influence_bytes(path, influence)
 
     def solved_equations() -> Equations:

@@ -164,7 +164,7 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, tuple[Path, ...
 
 def _limited(job: Job, options: BalanceOptions) -> Job:
     """The job with the limits of the options, if these go with its runs."""
-    refuse(job, options)
+    refuse(job, vars(options))
     return limited(job, options.max_mass, options.limit)
 
 

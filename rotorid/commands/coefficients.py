@@ -34,12 +34,13 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
     UndeterminedError
         Where the runs do not determine the coefficients.
     """
-    from balancing import UndeterminedError, combine, estimate_influence, refine
+    from balancing import UndeterminedError, combine, estimate_influence, refine, rotor_and_arbor
     from rotorid.commands.one_shot import counted_before
-    from rotorid.commands.special_runs import coefficients
 
-    if (special := coefficients(job, kind)) is not None:
-        return special, None
+    if job.trials.relative is not None:
+        return estimate_influence(job.trials, relative=True), None
+    if job.trials.index is not None:
+        return rotor_and_arbor(job.trials, stored(job, kind)).rotor, None
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
     if nothing and kind is None and job.settings.machine_type:
@@ -64,6 +65,13 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         calibrated = job.rotor is not None and job.rotor.calibration
         measured = combine(measured, computed(job, 0.0 if calibrated else MODEL_ERROR))
     return measured, baseline
+
+
+def stored(job: Job, kind: str | None) -> Influence | None:
+    """Coefficients that no runs of the job need tell: stored ones, or computed ones where these are meant."""
+    if kind != "computed":
+        return job.influence
+    return computed(job, 0.0 if job.rotor and job.rotor.calibration else MODEL_ERROR)
 
 
 def _separate(trials: Trials) -> bool:

@@ -137,10 +137,13 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         drilled = row.get("remove_at_deg")
         return float(row["angle_deg"] if drilled is None else drilled)
 
+    tables = str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values()))
+    if made.job.trials.special:  # the columns of these are others
+        rows, tables = [], str(Markup("<pre>{}</pre>").format(answer.numbers))
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
-        "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
+        "tables": tables,
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
         "to_mount": [{**row, "at": at(row)} for row in rows],
