@@ -22,11 +22,8 @@ from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.index import (
-    ArborCorrection,
-    RotorAndArbor,
     machine_influence,
     rotor_and_arbor,
-    turned,
     with_arbor,
 )
 from balancing.influence import (
@@ -43,7 +40,7 @@ from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
 from balancing.regions import Region, real_parts, region_edge
-from balancing.relative import RelativeCorrection, relative_to
+from balancing.relative import relative_to
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -62,7 +59,6 @@ __all__ = [
     "METHODS",
     "TRIAL_WEIGHTS",
     "UNBALANCE_METHODS",
-    "ArborCorrection",
     "CheckComparison",
     "Conditioning",
     "ConventionTest",
@@ -81,9 +77,7 @@ __all__ = [
     "ReadingErrors",
     "Region",
     "Relative",
-    "RelativeCorrection",
     "Remarks",
-    "RotorAndArbor",
     "RunErrors",
     "RunScatter",
     "Solution",
@@ -123,7 +117,6 @@ __all__ = [
     "tolerance",
     "trial_from_coefficients",
     "trial_from_force",
-    "turned",
     "unbalance_of_run",
     "usual_run_errors",
     "verdict_of_check",

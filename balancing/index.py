@@ -25,7 +25,7 @@ from balancing.correction import Correction
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
 from balancing.tables import reading_columns, vector_columns
-from balancing.trials import TURNED, Trials
+from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records
@@ -34,18 +34,10 @@ _SAME = 1e-6
 
 
 class RotorAndArbor(NamedTuple):
-    """Coefficients of weights on the rotor, and what the rotor, and its arbor, do alone as baseline."""
+    """Coefficients with what the rotor does alone as baseline, and with what its arbor does."""
 
     rotor: Influence
     arbor: Influence
-
-
-def turned(trials: Trials) -> Trials:
-    """Runs at several indices as runs with one plane more, first, that stands for the turned rotor."""
-    assert trials.index is not None
-    turn = np.exp(1j * trials.index)
-    weights = np.column_stack((turn - 1, trials.weights * turn[:, None]))
-    return replace(trials, planes=(TURNED, *trials.planes), weights=weights, index=None)
 
 
 def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAndArbor:
@@ -65,6 +57,11 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         For one position only, and for runs that do not tell rotor, arbor and trial weights apart.
     ValueError
         For trial weights beside stored coefficients.
+
+    Returns
+    -------
+    RotorAndArbor
+        Coefficients of weights on the rotor, with what the `rotor`, or the `arbor`, does alone as baseline.
     """
     turn = np.exp(1j * (np.zeros(1) if trials.index is None else trials.index))
     if np.abs(turn - turn[0]).max() < _SAME:
@@ -77,7 +74,7 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             "runs at several indices with stored coefficients are runs without weights: leave these runs "
             "out, or the coefficients"
         )
-    runs = turned(trials if stored is None else replace(trials, planes=(), weights=trials.weights[:, :0]))
+    runs = (trials if stored is None else replace(trials, planes=(), weights=trials.weights[:, :0])).turned
     try:
         check_runs(runs.runs, runs.planes, runs.weights)
     except UndeterminedError:
@@ -119,7 +116,18 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
 
 
 def machine_influence(trials: Trials) -> Influence:
-    """Coefficients of a calibrated balancing machine, whose readings are the unbalances of its planes."""
+    """Coefficients of a calibrated balancing machine, whose readings are the unbalances of its planes: 1.
+
+    Parameters
+    ----------
+    trials
+        Its readings, kg·m; its sensors are named as the planes.
+
+    Returns
+    -------
+    Influence
+        Exact, without a baseline.
+    """
     S, C = trials.mean.shape[1:]
     one = np.broadcast_to(np.eye(C, dtype=complex), (S, C, C))
     labels = replace(
@@ -177,7 +185,20 @@ class ArborCorrection(Correction):
 
 
 def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
-    """A correction of `both.rotor` with the unbalances of rotor and arbor."""
+    """The correction of a rotor, with the unbalances of rotor and arbor.
+
+    Parameters
+    ----------
+    result
+        Correction of `both.rotor`.
+    both
+        From `rotor_and_arbor`.
+
+    Returns
+    -------
+    ArborCorrection
+        Whose JSON has rotor_unbalance, arbor_unbalance and on_arbor_at_index_0.
+    """
     at = result.planes, result.speeds
     parts = tuple(correct(part, None, *at, refuse=False) for part in both)
     fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}

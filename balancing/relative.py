@@ -104,6 +104,19 @@ class RelativeCorrection(Correction):
 
 
 def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
-    """A correction of runs whose weights are multiples of trial weights."""
+    """A correction of runs whose weights are multiples of trial weights, told as such.
+
+    Parameters
+    ----------
+    result
+        The correction.
+    relative
+        `Trials.relative` of the runs.
+
+    Returns
+    -------
+    RelativeCorrection
+        Whose JSON has times_trial and turn_deg of every plane.
+    """
     fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
     return RelativeCorrection(**fields, relative=relative)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -214,6 +214,15 @@ class Trials:
                 f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
                 "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
+
+    @property
+    def turned(self) -> Trials:
+        """The runs of a rotor with one plane more, the first, that stands for the index: `balancing.index`."""
+        if self.index is None:
+            return self
+        turn = np.exp(1j * self.index)
+        weights = np.column_stack((turn - 1, self.weights * turn[:, None]))
+        return replace(self, planes=(TURNED, *self.planes), weights=weights, index=None)
 
     @property
     def special(self) -> str:

@@ -196,13 +196,13 @@ def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None
 
 def _test(job: Job) -> ConventionTest:
     """What trial and check runs say of their conventions."""
-    from balancing import convention_test, turned, with_check_runs
+    from balancing import convention_test, with_check_runs
 
     runs, check = job.trials, job.check
     if check is not None and check.planes:
         with suppress(ValueError):  # of some sensors or speeds only: the trial runs alone
             runs = with_check_runs(runs, check)
-    return convention_test(runs if runs.index is None else turned(runs))
+    return convention_test(runs)
 
 
 def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
