@@ -217,7 +217,7 @@ class Trials:
 
     @property
     def turned(self) -> Trials:
-        """The runs of a rotor with one plane more, the first, that stands for the index: `balancing.index`."""
+        """The runs with one plane more, the first, that stands for the index: see `balancing.index`."""
         if self.index is None:
             return self
         turn = np.exp(1j * self.index)
