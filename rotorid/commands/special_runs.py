@@ -25,6 +25,8 @@ def refuse(job: Job, options: Mapping[str, Any]) -> None:
             raise ValueError(f"--{option} does not go with it: {why}")
     if relative and relative.angle and job.limits and any(job.limits.forbidden):
         raise ValueError("forbidden_deg does not go with it: the places of trial weights are not known (?)")
+    if index is not None and options["coefficients"] == "combined":
+        raise ValueError("--coefficients combined does not go with it: this job has an index")
     if relative and index is not None:
         raise ValueError("runs at several indices need trial weights that are known, without ?")
 

@@ -60,10 +60,9 @@ def relative_weights(
             first = alike.setdefault(tuple(weights.tolist()), run_of[row])
             if first != run_of[row]:
                 words = (
-                    f"one run of an unknown weight in plane {plane!r}, which stood in {first!r}: two such "
-                )
-                words += (
-                    "weights are not determined; of one that was moved, count angles from its first place"
+                    f"one run of an unknown weight in plane {plane!r}, which stood in {first!r}: two are not "
+                    "determined; the same one read again is a repeat of that run, and of one that was moved "
+                    "angles count from its first place"
                 )
                 table.problems.add(words, table.grid.source, table.rows[row], stems[-1], "?")
         size = next(filter(None, total[:, p].tolist()), 1.0)
