@@ -22,6 +22,11 @@ from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.groups import Groups, Unknowns, held, in_planes, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
+from balancing.index import (
+    machine_influence,
+    rotor_and_arbor,
+    with_arbor,
+)
 from balancing.influence import (
     Influence,
     Remarks,
@@ -37,6 +42,7 @@ from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
 from balancing.regions import Region, real_parts, region_edge
+from balancing.relative import relative_to
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -44,7 +50,7 @@ from balancing.trial_weight import (
     trial_from_coefficients,
     trial_from_force,
 )
-from balancing.trials import Limits, Placement, ReadingErrors, RunScatter, Trials
+from balancing.trials import TRIAL_WEIGHTS, Limits, Placement, ReadingErrors, Relative, RunScatter, Trials
 from balancing.trim import LeftToDo, after_check_run
 from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
@@ -55,6 +61,7 @@ from balancing.zones import Zones, zones_of
 __all__ = [
     "GRADES",
     "METHODS",
+    "TRIAL_WEIGHTS",
     "UNBALANCE_METHODS",
     "CheckComparison",
     "Conditioning",
@@ -74,6 +81,7 @@ __all__ = [
     "Reading",
     "ReadingErrors",
     "Region",
+    "Relative",
     "Remarks",
     "RunErrors",
     "RunScatter",
@@ -104,6 +112,7 @@ __all__ = [
     "in_planes",
     "last_run",
     "local_runs",
+    "machine_influence",
     "mapped",
     "match_speeds",
     "mode_made_worse",
@@ -113,6 +122,8 @@ __all__ = [
     "real_parts",
     "refine",
     "region_edge",
+    "relative_to",
+    "rotor_and_arbor",
     "solve",
     "solve_discrete",
     "tolerance",
@@ -125,6 +136,7 @@ __all__ = [
     "verdict_of_prediction",
     "verdict_of_readings",
     "what_if",
+    "with_arbor",
     "with_check_runs",
     "with_parameters",
     "zones_of",

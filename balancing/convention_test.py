@@ -101,7 +101,7 @@ def convention_test(trials: Trials) -> ConventionTest:
     trials
         All runs that are known, with what was mounted in them.
     """
-    R = len(trials.runs)
+    R, trials = len(trials.runs), trials.turned
     mounted = trials.weights[:, trials.weights.any(axis=0)]
     A = np.column_stack((np.ones(R), mounted / np.abs(mounted).max(axis=0, initial=0.0)))
     rank = int(np.linalg.matrix_rank(A, _SAME))

@@ -281,7 +281,7 @@ class Correction(Prediction, Answered):
             return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
-        what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
+        what = self._what()
         if self.others:
             ways = {"phase": f"phases {labels.phase}", "angles": f"angles count {labels.angle_words}"}
             what += f", if {' and '.join(ways[name] for name in labels.assumed)} as assumed"
@@ -310,6 +310,10 @@ class Correction(Prediction, Answered):
             "every reading, method and errors",
             to_mount=True,
         )
+
+    def _what(self) -> str:
+        """What to do."""
+        return "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
 
     def _left(self) -> str:
         """Root mean square before and after, and what a check run will show."""

@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
 from balancing.regions import real_parts
-from balancing.trials import ReadingErrors, Trials
+from balancing.trials import TURNED, ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.base.text import percent
 from rotorid.regression import gain
@@ -272,7 +272,7 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
     out: list[ComplexArray] = []
     for p, weights in enumerate(trials.weights.T):
         stays = np.cumsum(weights != np.append(0, weights[:-1]))
-        for k in np.unique(stays[weights != 0]):
+        for k in np.unique(stays[weights != 0]) if trials.planes[p] != TURNED else ():
             effect = np.where(stays == k, weights, 0)[:, None, None] * W[..., p]
             out += [size * effect for size in (trials.placement.mass, 1j * trials.placement.angle) if size]
     if trials.drift:

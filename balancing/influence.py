@@ -397,13 +397,15 @@ def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[in
     return [influence.planes.index(p) for p in planes]
 
 
-def estimate_influence(trials: Trials) -> Influence:
+def estimate_influence(trials: Trials, *, relative: bool = False) -> Influence:
     """Influence coefficients, and the readings of the bare rotor, from trial runs.
 
     Parameters
     ----------
     trials
         R ≥ P + 1 runs whose weights determine the baseline and every plane.
+    relative
+        Whether weights may be relative to unknown trial weights, and the coefficients with them.
 
     Returns
     -------
@@ -421,6 +423,15 @@ def estimate_influence(trials: Trials) -> Influence:
     Runs over-determine the coefficients where R > P + 1. Rows are then weighted by the variance of their
     readings where it is known, else alike.
     """
+    if trials.index is not None or (trials.relative is not None and not relative):
+        raise UndeterminedError(trials.special)
+    influence = fit_runs(trials)
+    check_effects(trials, influence.W, influence.channels(known=True), influence.remarks.contradictions)
+    return influence
+
+
+def fit_runs(trials: Trials) -> Influence:
+    """`estimate_influence` of weights as they stand, without a look at whether each does something."""
     R, P = trials.weights.shape
     if P == 0:
         raise UndeterminedError(
@@ -451,7 +462,7 @@ def estimate_influence(trials: Trials) -> Influence:
     mounted = Mounted(trials.runs[-1], trials.planes, trials.weights[-1])
     errors = Errors(run_noise(trials, theta[..., 1:], G, reading, run), reading, run, mounted, trials)
     disagree = contradiction(trials, A, run)
-    influence = Influence(
+    return Influence(
         speeds=trials.speeds,
         sensors=trials.sensors,
         planes=trials.planes,
@@ -461,8 +472,6 @@ def estimate_influence(trials: Trials) -> Influence:
         labels=trials.labels,
         remarks=Remarks(trials.warnings + reading.warnings + disagree, unseen(trials, run), disagree),
     )
-    check_effects(trials, influence.W, influence.channels(known=True), disagree)
-    return influence
 
 
 def _gain(A: ComplexArray, variance: FloatArray) -> ComplexArray:

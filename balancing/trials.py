@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +76,27 @@ class Placement(NamedTuple):
 
 
 _EXACT = Placement()
+TURNED = "the rotor on its arbor"
+"""The plane that stands for a rotor turned on its arbor (`balancing.index`): no weight is misplaced there."""
+
+TRIAL_WEIGHTS = "times the trial weight"
+"""The unit of weights that are relative."""
+
+
+class Relative(NamedTuple):
+    """What weights are multiples of: one trial weight of each plane, of unknown mass, place or both.
+
+    Attributes
+    ----------
+    angle
+        Whether angles count from the places of these trial weights.
+    sizes, unit
+        Their masses by plane, NaN where they are not known, and the unit of these.
+    """
+
+    angle: bool
+    sizes: dict[str, float]
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +134,11 @@ class Trials:
         Stated errors of the mounted weights; zero: not stated.
     drift
         Stated drift of the readings from the first to the last run, relative, one standard deviation.
+    index
+        By what angle the rotor was turned on its arbor in each run, rad with the rotation, shape (R,); None:
+        it was not. Weights count from the rotor's mark then, phases from that of the arbor.
+    relative
+        What the weights are relative to; None: nothing, their masses and places are known.
 
     Raises
     ------
@@ -134,6 +160,8 @@ class Trials:
     covariance: FloatArray | None = None
     placement: Placement = _EXACT
     drift: float = 0.0
+    index: FloatArray | None = None
+    relative: Relative | None = None
 
     def __post_init__(self) -> None:
         keep(
@@ -166,6 +194,11 @@ class Trials:
                 raise ValueError(f"{name} must be finite, of shape {shape}, steps ≥ 0; got {array.shape}")
             array[..., missing] = np.nan
             arrays[name] = array
+        if self.index is not None:
+            index = np.array(self.index, dtype=np.float64)
+            if index.shape != (R,) or not np.isfinite(index).all():
+                raise ValueError(f"index must be {R} finite angles, one for each run; got {index.tolist()}")
+            arrays["index"] = index
         keep(self, **arrays)
 
     def _check_readings(self, readings: ComplexArray) -> None:
@@ -181,6 +214,22 @@ class Trials:
                 f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
                 "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
+
+    @property
+    def turned(self) -> Trials:
+        """The runs with one plane more, the first, that stands for the index: see `balancing.index`."""
+        if self.index is None:
+            return self
+        turn = np.exp(1j * self.index)
+        weights = np.column_stack((turn - 1, self.weights * turn[:, None]))
+        return replace(self, planes=(TURNED, *self.planes), weights=weights, index=None)
+
+    @property
+    def special(self) -> str:
+        """Why the runs give a correction and nothing else; empty: they are ordinary ones."""
+        if self.relative is not None:
+            return "a trial weight is not known: that gives a correction, and nothing else"
+        return "" if self.index is None else "an index gives the rotor's correction, and nothing else"
 
     @property
     def repeats(self) -> IntArray:

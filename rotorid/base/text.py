@@ -27,6 +27,7 @@ RPM = 60 / math.tau  # of 1 rad/s
 SPEEDS = {"rpm": ("rpm", RPM), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
 """Words and scales of speeds by the units of files."""
 _BASES = {"m_s": "m/s", "mm_s": "mm/s", "in_s": "in/s", "m_s2": "m/s²", "mm_s2": "mm/s²", "um": "µm"}
+_MASSES = ("g_", "kg_", "mg_", "oz_", "lb_")
 _BASES |= {unit: unit for unit in ("m", "mm", "mil", "in", "g")}
 
 
@@ -145,9 +146,11 @@ class Shown:
 def vibration_unit_words(unit: str) -> str:
     """The unit of a reading; one that is only printed stays as it is.
 
-    >>> [vibration_unit_words(unit) for unit in ("um_pp", "mm_s_rms", "mm", "V", "")]
-    ['µm pp', 'mm/s rms', 'mm peak', 'V', '']
+    >>> [vibration_unit_words(unit) for unit in ("um_pp", "mm_s_rms", "mm", "V", "g_mm", "")]
+    ['µm pp', 'mm/s rms', 'mm peak', 'V', 'g·mm', '']
     """
+    if unit.startswith(_MASSES) and unit.endswith(("_mm", "_m", "_in")):
+        return weight_unit_words(unit)
     for suffix, word in (("_pp", "pp"), ("_rms", "rms"), ("", "peak")):
         base = unit.removesuffix(suffix)
         if unit.endswith(suffix) and base in _BASES:

@@ -21,6 +21,8 @@ from rotorid.commands.balance_solution import (
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
 from rotorid.commands.quantities import one_of
+from rotorid.commands.special_runs import special
+from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, provenance, table_of
 
@@ -71,11 +73,10 @@ class Balance(Outcome):
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
-        from balancing import Correction
         from rotorid.report.balance import balance_report
 
-        if not isinstance(self.result, Correction):
-            return super().sheet()
+        if self.job.trials.special:
+            return super().sheet()  # what these say stands in no form
         made = self.result, self.mounted, self.check, self.left, self.verdict, self.zones
         return balance_report(self.to_dict(), made, self.job, self.provenance, self.answer)
 
@@ -132,6 +133,7 @@ def corrected(
     influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
+    result = special(result, read, options.coefficients)
     mounted, check, left = _pieces(read, result, solved, options), None, None
     if read.check is not None and not options.refine:
         compared = result, read.check, influence, runs
@@ -159,6 +161,8 @@ def corrected(
     def coefficients(path: Path) -> Written:
         from rotorid.files.influence import influence_bytes
 
+        if read.trials.relative is not None:
+            raise ValueError(f"{path.name}: {read.trials.special}")
         return influence_bytes(path, as_measured(read, influence))
 
     def solved_equations() -> Equations:
@@ -268,7 +272,6 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
-    from rotorid.commands.tolerance import ToleranceOptions, permissible
 
     stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
     return permissible(stated, names=("--rotor-mass", "--service-speed"))

@@ -16,6 +16,7 @@ from rotorid.commands.coefficients import choose, counted, of_planes, unknowns_o
 from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import limited
 from rotorid.commands.quantities import Names, Speeds, names, speeds
+from rotorid.commands.special_runs import refuse
 from rotorid.report.options import file_of
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
@@ -155,14 +156,20 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, tuple[Path, ...
             raise ValueError(
                 "the conventions of a job, its errors and coefficients are stated where it is read"
             )
-        return limited(job, options.max_mass, options.limit), (), None
+        return _limited(job, options), (), None
     several = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
     files = tuple(file_of(file, "a job") for file in several)
     if len(files) == 1 and stored is None and files[0].suffix.lower() in (".toml", ".xlsx"):
         read = partial(read_job, files[0], **stated)
     else:
         read = partial(job_from_files, files, influence=stored, **stated)
-    return limited(read(), options.max_mass, options.limit), files, read
+    return _limited(read(), options), files, read
+
+
+def _limited(job: Job, options: BalanceOptions) -> Job:
+    """The job with the limits of the options, if these go with its runs."""
+    refuse(job, vars(options))
+    return limited(job, options.max_mass, options.limit)
 
 
 class Solved(NamedTuple):
@@ -269,7 +276,7 @@ def with_other_conventions(
         other = labels.otherwise(assumed)
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
-                again = limited(read(phase=other.phase, angles=other.angles), options.max_mass, options.limit)
+                again = _limited(read(phase=other.phase, angles=other.angles), options)
                 correction = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue

@@ -247,6 +247,8 @@ def run_readings(job: Job, rotor: Rotor) -> RunReadings:
 
     from rotorid.calibration import RunReadings
 
+    if job.trials.special:
+        raise ValueError(job.trials.special)
     trials, places = job.trials, model_places(job)
     if job.rotor is not None and job.rotor.n_nodes != rotor.n_nodes:
         raise ValueError(

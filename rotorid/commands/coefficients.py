@@ -51,9 +51,14 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         estimate_influence,
         in_planes,
         refine,
+        rotor_and_arbor,
         unknowns,
     )
 
+    if job.trials.relative is not None:
+        return estimate_influence(job.trials, relative=True), None
+    if job.trials.index is not None:
+        return rotor_and_arbor(job.trials, stored(job, kind)).rotor, None
     has_trials = bool(job.trials.weights.any())
     nothing = not has_trials and job.influence is None and job.rotor is None
     if nothing and kind is None and job.settings.machine_type:
@@ -114,6 +119,13 @@ def of_planes(
         mounted = influence.mounted._replace(weights=weights)
         influence = replace(influence, errors=influence.errors._replace(mounted=mounted))
     return influence, runs and in_planes(runs, job.groups)
+
+
+def stored(job: Job, kind: str | None) -> Influence | None:
+    """Coefficients that no runs of the job need tell: stored ones, or computed ones where these are meant."""
+    if kind != "computed":
+        return job.influence
+    return computed(job, 0.0 if job.rotor and job.rotor.calibration else MODEL_ERROR)
 
 
 def _separate(trials: Trials) -> bool:

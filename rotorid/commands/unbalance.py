@@ -86,6 +86,8 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Outcome:
 
     read = job_source(job)
     rotor = read.rotor
+    if read.trials.special:
+        raise ValueError(read.trials.special)
     if rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
     asked = nodes(options.stations, "--stations")

@@ -64,7 +64,7 @@ _NO_NAMES = {
 }
 """Words of which no sensor's or plane's name consists."""
 _TIDY = {
-    False: re.compile(r"(?:(speed|amplitude|phase)(?:_(.*))?|run|sensor|repeat)"),
+    False: re.compile(r"(?:(speed|amplitude|phase|index(?=_(?:deg|rad)$))(?:_(.*))?|run|sensor|repeat)"),
     True: re.compile(
         r"(?:(mass|unbalance|angle)(?:_(?!clock)(.*))?|run|plane|hole|clock|action|unit|pieces)"
     ),

@@ -9,9 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing import Groups, Holes, Influence, Labels, Limits, Trials, Unknowns, held, in_planes, unknowns
+from balancing import (
+    Groups,
+    Holes,
+    Influence,
+    Labels,
+    Limits,
+    Trials,
+    Unknowns,
+    held,
+    in_planes,
+    machine_influence,
+    unknowns,
+)
+from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
 from rotorid.base.text import counted, listing
+from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.job_models import (
     READINGS,
@@ -263,6 +277,10 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     readings = _readings(settings, tables, problems)
     settings, rotor, model_files = in_model(settings, written.folder, problems)
     trials, influence, conventions, slow_roll = problems.need(readings)
+    if "check" in tables and (trials.relative or trials.index is not None):
+        words = "no check run beside trial weights of unknown mass or place, or an index: it is a further run"
+        settings.complain(problems, "check", words)
+        problems.stop()
     trials, planes = planes_of(settings, trials, influence, rotor, problems)
     groups = settings.shares(trials.labels)
     limits = make_limits(settings, planes, trials, problems)
@@ -291,7 +309,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     shares = np.array([share for group in groups.values() for share in group.values()], dtype=complex)
     vectors = [trials.weights, shares, np.exp(1j * np.radians(degrees))]
     vectors += [] if check is None else [check.weights]
-    matters = {"phase": True, "angles": any(map(off_axis, vectors))}
+    machine = units.vibration(trials.labels.vibration_unit).kind == "unbalance"  # phases are angles then
+    matters = {"phase": not machine, "angles": machine or any(map(off_axis, vectors))}
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
         trials=replace(trials, labels=labels),
@@ -347,12 +366,6 @@ def _readings(
     if "check" not in tables and ("check_weights" in tables or settings.check_weights):
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
-    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type):
-        expected = (
-            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
-            "whose coefficients come with balance --type"
-        )
-        settings.complain(problems, "weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
     phase, angles = settings.phase or stated_phase(runs), settings.angles
     stated = dict[str, Any]()
@@ -367,6 +380,15 @@ def _readings(
             problems.extend(error.problems)
     conventions = conventions_of(settings, stated)
     trials = make_trials(runs, tables.get("weights"), conventions, settings.errors, problems)
+    machine = trials is not None and units.vibration(trials.labels.vibration_unit).kind == "unbalance"
+    if not (tables.keys() & {"weights", "influence"} or settings.rotor or settings.machine_type or machine):
+        expected = (
+            "a weights table, or an influence table of stored coefficients, or a rotor; or machine_type, "
+            "whose coefficients come with balance --type"
+        )
+        settings.complain(problems, "weights", expected)
+    elif machine and trials is not None and not trials.planes:
+        influence = machine_influence(trials)
     if source is not None and influence is not None and trials is not None:
         groups = settings.shares(conventions.labels)
         trials = in_planes(trials, groups)
@@ -377,20 +399,7 @@ def _readings(
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels
     labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
-    usual, notes = Labels(), list[str]()
-    if source is not None:
-        name = source_name(source)
-        adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
-        if words := " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted):
-            notes.append(
-                "nothing states the conventions of the readings: those of "
-                f"{name} are used for them too, {words}"
-            )
-        if stated.get("phase", labels.phase) != labels.phase:
-            notes.append(
-                f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
-                f"phase = {stated['phase']}, as {name} says"
-            )
+    notes = [] if source is None else _on_conventions(conventions, labels, stated, source_name(source))
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors, slow_roll = tables.get("slow_roll", settings.slow_roll), None
     if vectors is not None:
@@ -400,6 +409,24 @@ def _readings(
             slow_roll, further = made
             trials = subtract_slow_roll(replace(trials, warnings=(*trials.warnings, *further)), slow_roll)
     return trials, influence, conventions, slow_roll
+
+
+def _on_conventions(
+    conventions: Conventions, labels: Labels, stated: Mapping[str, Any], name: str
+) -> list[str]:
+    """What readings take from stored coefficients that state their conventions, and where both differ."""
+    usual, notes = Labels(), []
+    adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
+    if words := " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted):
+        notes.append(
+            f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
+        )
+    if stated.get("phase", labels.phase) != labels.phase:
+        notes.append(
+            f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
+            f"phase = {stated['phase']}, as {name} says"
+        )
+    return notes
 
 
 def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = None) -> Conventions:

@@ -16,7 +16,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing import Holes, Influence, Labels, Limits, Trials, from_list, held, in_planes, unknowns
+from balancing import (
+    TRIAL_WEIGHTS,
+    Holes,
+    Influence,
+    Labels,
+    Limits,
+    Trials,
+    from_list,
+    held,
+    in_planes,
+    unknowns,
+)
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -169,6 +180,9 @@ def _of_readings(
 def _sizes(plane: Plane, field: str, labels: Labels, problems: Problems) -> tuple[float, ...]:
     """Weights that a plane states, as those of the job are (kg or kg·m); empty where it states none."""
     stated: Quantity | None = getattr(plane, field)
+    if stated is not None and labels.weight_unit == TRIAL_WEIGHTS:
+        plane.complain(problems, field, "trial weights without ?, since this is no multiple of them")
+        return ()
     sizes = () if stated is None else in_job_units(stated, labels.weight_unit, plane.radius)
     if sizes is None:
         kind = "unbalances (mass × radius)" if labels.unbalances else "masses"

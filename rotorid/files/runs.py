@@ -47,6 +47,7 @@ COLUMNS = (
     Column("sensor"),
     Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
     PHASE,
+    Column("index", one_of(units.ANGLE), ("index_deg",), required=False),
     Column("repeat", required=False),
     Column("time_s", required=False, blank=True),
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
@@ -153,7 +154,8 @@ def make_trials(
     if mounted is None:
         return trials
     labels = replace(trials.labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)
-    return replace(trials, planes=mounted.planes, weights=mounted.weights, labels=labels)
+    trials = replace(trials, labels=labels, relative=mounted.relative)
+    return replace(trials, planes=mounted.planes, weights=mounted.weights)
 
 
 def read_runs(
@@ -196,6 +198,12 @@ def read_runs(
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
+    turn, labels = None, conventions.labels
+    if "index" in table and len(problems) == start:
+        by_run = dict(zip(run[::-1], table.numbers("index")[::-1], strict=True))
+        turn = labels.with_rotation(np.array([by_run[name] for name in runs]))
+        same = np.array([by_run[name] for name in run]) == table.numbers("index")
+        table.complain_where(~same, "index", "one index a run, the same in all its rows")
     if not len(problems):
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
@@ -209,10 +217,12 @@ def read_runs(
         out[..., *np.transpose(places)] = values[..., rows]
         return out
 
-    vectors = conventions.labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     unit = table.unit("amplitude")
+    if unit.kind == "unbalance":  # of a calibrated machine, at angles as those of weights
+        labels = replace(labels, phase="lead" if labels.angle_sign > 0 else "lag")
+    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
     labels = replace(
-        conventions.labels,
+        labels,
         vibration_unit=unit.name,
         vibration_scale=unit.scale,
         weight_unit="g",
@@ -236,6 +246,7 @@ def read_runs(
         warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged))),
         steps=placed(np.array([table.steps("amplitude"), table.steps("phase")])),
         covariance=None if stated is None else placed(stated),
+        index=turn,
     )
 
 

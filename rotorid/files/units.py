@@ -172,8 +172,8 @@ def vibration(name: str) -> Unit:
         Where a known unit was meant but is misspelt (`MM`, `um_pk`): as a label it would lose its meaning.
     """
     name = spelt(name)
-    if name in VIBRATION:
-        return VIBRATION[name]
+    if name in VIBRATION or name in UNBALANCE:  # the latter are readings of a calibrated balancing machine
+        return (VIBRATION | UNBALANCE)[name]
     for unit in VIBRATION:
         if name.casefold() == unit.casefold():
             raise UnitError(f"the unit written {unit}, not {name}")

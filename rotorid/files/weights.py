@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from balancing import TRIAL_WEIGHTS, Relative
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
@@ -23,6 +24,7 @@ from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.layout import NUMBER, Conventions, long_rows
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
+from rotorid.files.unknown_weights import Unknown, relative_weights, without_marks
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
 COLUMNS = (
@@ -47,6 +49,7 @@ class Weights:
     weights: ComplexArray
     unit: Unit
     rows: tuple[tuple[str, str, complex], ...] = ()
+    relative: Relative | None = None
 
 
 def read_weights(
@@ -66,8 +69,9 @@ def read_weights(
         Collects the complaints.
     """
     find, before = partial(find_header, weights=True), len(problems)
+    unknown = Unknown()
     try:
-        grid = read_grid(source, "weights", problems, may_be_empty=True, find=find)
+        grid, unknown = without_marks(read_grid(source, "weights", problems, may_be_empty=True, find=find))
         grid = _one_weight_a_row(grid, conventions)
     except InputError as error:
         problems.extend(error.problems)
@@ -101,7 +105,11 @@ def read_weights(
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
     for name, its, value in rows if runs and len(problems) == before else ():
         total[(runs or ()).index(name), planes.index(its)] += value
-    return Weights(planes, total, table.unit("mass"), tuple(rows))
+    made = Weights(planes, total, table.unit("mass"), tuple(rows))
+    if not unknown or len(problems) > before:
+        return made
+    total, relative = relative_weights(table, unknown, run, runs or (), total)
+    return replace(made, weights=total, unit=Unit(TRIAL_WEIGHTS, "multiple"), relative=relative)
 
 
 def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:

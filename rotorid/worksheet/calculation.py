@@ -147,10 +147,13 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         Column(labels.weight_in, [row["mass"] for row in parts], figures),
         Column("at °", [row["angle_deg"] for row in parts], figures),
     )
+    tables = str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values()))
+    if made.job.trials.special:  # the columns of these are others
+        rows, tables = [], str(Markup("<pre>{}</pre>").format(answer.numbers))
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         "judgement": answer.judgement,
-        "tables": str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values())),
+        "tables": tables,
         "parts": html(Table("parts", columns)) if parts else "",
         "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],

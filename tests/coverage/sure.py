@@ -17,6 +17,7 @@ PROGRAMS = {
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
     "identify": ("coverage_identify.py", 500),
+    "special": ("coverage_special.py", 1000),
     "runup": ("coverage_runup.py", 1, 200),
     "what_if": ("coverage_what_if.py", 200),
 }

@@ -5,6 +5,7 @@ distribution of so many jobs.
 """
 
 import coverage_balance as example
+import coverage_special as special
 import numpy as np
 import pytest
 import sure
@@ -57,3 +58,10 @@ def test_assumed_errors_that_are_not_too_small():
 def test_the_tables_are_printed(capsys):
     example.main(8)
     assert sure.titles(capsys.readouterr().out) == sure.titles("".join(sure.blocks("balance")))
+
+
+@pytest.mark.parametrize(("count", "before"), special.ROWS.values(), ids=special.ROWS)
+def test_regions_of_unknown_trial_weights_and_of_rotors_on_arbors(count, before):
+    rng = np.random.default_rng(5)
+    inside = silent([special.outcome(rng, count, before=before) for _ in range(300 if FULL else 60)])
+    assert lowest_share(len(inside), 0.93) <= np.mean(inside) <= highest_share(len(inside), 0.97)

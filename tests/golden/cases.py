@@ -175,6 +175,9 @@ rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
 rk4-few                     balance sample_data/rk4/few.toml
 rk4-few-1005                balance sample_data/rk4/few_1005.toml
+left-in-unknown             balance sample_data/left_in/unknown.toml
+index                       balance sample_data/index/job.toml
+index-machine               balance sample_data/index/machine.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 one-shot                    balance sample_data/calibration/later.toml
 template                    balance --template job.xlsx
@@ -479,7 +482,9 @@ STORED = (
     "identify-modes",
     "identify-output-error",
     "identify-task_3_3",
+    "index",
     "influence-coarse",
+    "left-in-unknown",
     "model-job-ridge",
     "modes-chain",
     "motion-run-up",

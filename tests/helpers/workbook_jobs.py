@@ -27,6 +27,8 @@ SAMPLES = (
     "turbo_job/holes",
     "bk_two_plane/job",
     "left_in/job",
+    "left_in/unknown",
+    "index/machine",
     "rk4/job",
     "model_job/job",
 )

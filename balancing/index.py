@@ -1,0 +1,205 @@
+"""Runs with the rotor turned on its arbor (index balancing): what the rotor does, and what its arbor does.
+
+The phase mark is the arbor's. At index θ the rotor stands turned by θ, with the rotation, and so do the
+weights d on it:
+
+    y(θ) = A + R e^{iθ} + W d e^{iθ} = Y₀ + R (e^{iθ} − 1) + W (d e^{iθ}),    Y₀ = A + R.
+
+That is a rotor with one plane more, whose trial weight is e^{iθ} − 1 and whose coefficient is R: what fits
+trial runs fits these, with its errors. No run need stand at index 0. Two positions, 0° and 180°, have the
+closed form R = (y(0) − y(180))/2, A = (y(0) + y(180))/2. Weights on the rotor cannot mend its arbor: they are
+to make |R + W d| small. A is all that turns with the arbor: its unbalance, the rotor's mass on a seat that
+runs out, run-out of what the sensors see.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from balancing.conditioning import UndeterminedError, check_effects, check_runs
+from balancing.correct import correct
+from balancing.correction import Correction
+from balancing.influence import Influence, Mounted, fit_runs
+from balancing.noise import Gaussian
+from balancing.tables import reading_columns, vector_columns
+from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray
+from rotorid.base.json import plain
+from rotorid.base.tables import Column, records
+
+_SAME = 1e-6
+
+
+class RotorAndArbor(NamedTuple):
+    """Coefficients with what the rotor does alone as baseline, and with what its arbor does."""
+
+    rotor: Influence
+    arbor: Influence
+
+
+def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAndArbor:
+    """Rotor and arbor apart.
+
+    Parameters
+    ----------
+    trials
+        R runs with `index`, of at least two positions: without weights, and with one trial weight for each
+        plane, or without weights alone where coefficients are stored.
+    stored
+        Coefficients at the speeds and of the sensors of the runs.
+
+    Raises
+    ------
+    UndeterminedError
+        For one position only, and for runs that do not tell rotor, arbor and trial weights apart.
+    ValueError
+        For trial weights beside stored coefficients.
+
+    Returns
+    -------
+    RotorAndArbor
+        Coefficients of weights on the rotor, with what the `rotor`, or the `arbor`, does alone as baseline.
+    """
+    turn = np.exp(1j * (np.zeros(1) if trials.index is None else trials.index))
+    if np.abs(turn - turn[0]).max() < _SAME:
+        raise UndeterminedError(
+            "the rotor stood at one index only, which does not tell it from its arbor: turn it on the arbor, "
+            "best by 180°, and measure again"
+        )
+    if stored is not None and trials.weights.any():
+        raise ValueError(
+            "runs at several indices with stored coefficients are runs without weights: leave these runs "
+            "out, or the coefficients"
+        )
+    runs = (trials if stored is None else replace(trials, planes=(), weights=trials.weights[:, :0])).turned
+    try:
+        check_runs(runs.runs, runs.planes, runs.weights)
+    except UndeterminedError:
+        raise UndeterminedError(
+            "these runs do not tell the rotor, its arbor and the trial weights apart: two runs without "
+            "weights, at indices such as 0° and 180°, and one with a trial weight for each plane do"
+        ) from None
+    fitted = fit_runs(runs)
+    if stored is None:
+        own = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
+        check_effects(
+            replace(runs, planes=runs.planes[1:], weights=runs.weights[:, 1:]),
+            own.W,
+            own.channels(known=True),
+            fitted.remarks.contradictions,
+        )
+    W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
+    P = len(planes)
+    on = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
+
+    def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
+        """The coefficients with this combination of Y₀ and R as baseline."""
+        change = np.zeros((P + 1, fitted.W.shape[-1] + 1), dtype=complex)
+        change[0, :2] = combination
+        if stored is None:
+            change[1:, 2:] = np.eye(P)
+        noise = fitted.errors.noise.changed(change)
+        if stored is not None:
+            noise = noise.plus(stored.errors.noise.changed(np.diag([0.0, *np.ones(P)]).astype(complex)))
+        mounted = Mounted(trials.runs[-1], planes, on)
+        errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
+        labels = (stored or fitted).labels
+        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, labels=labels)
+
+    R = fitted.W[..., 0]
+    A = fitted.baseline - R
+    least = 0.0 if A.any() else 1e-12 * np.abs(R).max()  # a correction of nothing at all is refused
+    return RotorAndArbor(part((0, 1), R), part((1, -1), A + least))
+
+
+def machine_influence(trials: Trials) -> Influence:
+    """Coefficients of a calibrated balancing machine, whose readings are the unbalances of its planes: 1.
+
+    Parameters
+    ----------
+    trials
+        Its readings, kg·m; its sensors are named as the planes.
+
+    Returns
+    -------
+    Influence
+        Exact, without a baseline.
+    """
+    S, C = trials.mean.shape[1:]
+    one = np.broadcast_to(np.eye(C, dtype=complex), (S, C, C))
+    labels = replace(
+        trials.labels,
+        weight_unit=trials.labels.vibration_unit,
+        weight_scale=trials.labels.vibration_scale,
+    )
+    nothing = np.full((S, C), np.nan + 0j)
+    errors = Gaussian.none(S, C, C)
+    return Influence(trials.speeds, trials.sensors, trials.sensors, one, nothing, errors, labels)
+
+
+@dataclass(frozen=True, eq=False)
+class ArborCorrection(Correction):
+    """A correction of the rotor alone, with its unbalance and that of its arbor.
+
+    Attributes
+    ----------
+    rotor_and_arbor
+        What would correct the rotor, and its arbor, free of limits: opposite to their unbalances.
+    """
+
+    rotor_and_arbor: tuple[Correction, ...] = ()
+
+    @property
+    def unbalances(self) -> tuple[Correction, ...]:
+        """Weights that do what the rotor does, and what its arbor does, with their draws."""
+        nothing = Mounted("", (), np.zeros(0, dtype=complex))
+        bare = [replace(c, remove=(), mounted=nothing) for c in self.rotor_and_arbor]
+        return tuple(replace(c, weights=-c.weights, draws=-c.draws) for c in bare)
+
+    def _what(self) -> str:
+        return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
+
+    def _left(self) -> str:
+        return f"{super()._left()}, beside the arbor's part"
+
+    def _weights_text(self) -> str:
+        arbor = Correction._weights_text(self.unbalances[1]).rpartition("\n")[0]
+        head = "Unbalance of the arbor, and all run-out that turns with it, which no index tells from it:"
+        return f"{super()._weights_text()}\n{head}\n{arbor}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """That of the correction with rotor_unbalance, arbor_unbalance and on_arbor_at_index_0."""
+        columns: tuple[Column, ...] = reading_columns(self.labels, self.speeds, self.sensors)
+        for name, readings in (("before", self.before), ("after", self.after)):
+            columns += vector_columns(self.labels, name, readings + self.rotor_and_arbor[1].before)
+        rotor, arbor = (records(part._weight_columns()[:6]) for part in self.unbalances)
+        further = {
+            "rotor_unbalance": rotor,
+            "arbor_unbalance": arbor,
+            "on_arbor_at_index_0": records(columns),
+        }
+        return super().to_dict() | plain(further)
+
+
+def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
+    """The correction of a rotor, with the unbalances of rotor and arbor.
+
+    Parameters
+    ----------
+    result
+        Correction of `both.rotor`.
+    both
+        From `rotor_and_arbor`.
+
+    Returns
+    -------
+    ArborCorrection
+        Whose JSON has rotor_unbalance, arbor_unbalance and on_arbor_at_index_0.
+    """
+    at = result.planes, result.speeds
+    corrections = tuple(correct(part, None, *at, refuse=False) for part in both)
+    fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
+    return ArborCorrection(**fields, rotor_and_arbor=corrections)
