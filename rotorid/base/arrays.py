@@ -104,7 +104,7 @@ def off_axis(weights: ArrayLike) -> bool:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
-    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
-    parts = ((radial, along), (tangential, across))
-    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
+    unit = np.exp(1j * np.angle(z))
+    axes = np.stack((unit, 1j * unit), axis=-1)
+    R = np.stack((axes.real, axes.imag), axis=-2)
+    return np.asarray(R * np.stack((radial, tangential), axis=-1)[..., None, :] @ np.swapaxes(R, -1, -2))

@@ -45,8 +45,6 @@ NARROW, LETTERS = 6, 50
 """Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
 LONG, THINNED = 60, 13
 """Rows of a table that a page shows whole, and of a longer one so many."""
-OLDEST = (1980, 1, 1, 0, 0, 0)
-"""Date of a part of an archive."""
 NOTHING, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 """In HTML, where nothing is known, and before negative numbers."""
 
@@ -105,22 +103,11 @@ class Table:
     note
         What a reader must know about it.
 
-    Raises
-    ------
-    ValueError
-        For columns of different lengths, lists in their cells, and without any.
     """
 
     name: str
     columns: tuple[Column, ...]
     note: str = ""
-
-    def __post_init__(self) -> None:
-        if len({len(column.values) for column in self.columns}) != 1:
-            raise ValueError(f"the table {self.name!r} must have columns of one length")
-        for column in self.columns:
-            if any(isinstance(value, list | dict) for value in column.values):
-                raise ValueError(f"the column {column.heading!r} must be one-dimensional")
 
     def under(self, place: str) -> Table:
         """The same, of a result that stands at this place of a document."""
@@ -188,7 +175,7 @@ def csv(table: Table) -> bytes:
 def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
     """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there.
 
-    Its date and those of its parts are that of `now`.
+    Its date is that of `now`; its parts have none.
     """
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
@@ -207,13 +194,12 @@ def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
         _fill(book.create_sheet(table.name[:LONGEST_TITLE]), table)
     book.active = first
     book.properties.modified = date
-    saved, dated = io.BytesIO(), io.BytesIO()
+    saved, undated = io.BytesIO(), io.BytesIO()
     ExcelWriter(book, zipfile.ZipFile(saved, "w")).save()
-    with zipfile.ZipFile(saved) as parts, zipfile.ZipFile(dated, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(saved) as parts, zipfile.ZipFile(undated, "w") as archive:
         for part in parts.namelist():
-            info = zipfile.ZipInfo(part, max(date.timetuple()[:6], OLDEST))
-            archive.writestr(info, parts.read(part), zipfile.ZIP_DEFLATED)
-    return dated.getvalue()
+            archive.writestr(zipfile.ZipInfo(part), parts.read(part), zipfile.ZIP_DEFLATED)
+    return undated.getvalue()
 
 
 def _fill(sheet: Any, table: Table) -> None:  # noqa: ANN401

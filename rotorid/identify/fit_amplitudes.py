@@ -34,7 +34,6 @@ from rotorid.regression.estimate import Combination, Estimate, only_determined
 from rotorid.regression.linear import normal_matrix
 from rotorid.regression.nonlinear import (
     LOSSES,
-    Bounds,
     NonlinearEstimate,
     evaluated_once,
     nonlinear_least_squares,
@@ -49,6 +48,7 @@ WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
+Bounds = Mapping[str, tuple[float | None, float | None]]
 OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
 """A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
@@ -109,7 +109,7 @@ def _check(
     for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
         check_known(what, names, "parameter", model.parameters)
     for name, (low, high) in bounds.items():
-        if low is not None and high is not None and not low <= high:
+        if low is not None and high is not None and not low < high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     if prior and not experiments.stated:
         raise ValueError(
@@ -187,7 +187,7 @@ def output_error(
             point,
             names=names,
             sigma_stated=data.stated,
-            bounds=bounds or None,
+            bounds=np.array([(bounds or {}).get(name, (None, None)) for name in names], dtype=float),
             loss=loss,
             near=left < REWEIGHTINGS,
             prior=added,

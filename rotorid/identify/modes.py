@@ -103,7 +103,7 @@ def _search(
             q,
             names=names,
             sigma_stated=stated,
-            bounds=dict(zip(names, limits, strict=True)),
+            bounds=limits,
             near=turn > 0,
         )
         q = fit.estimate.solution

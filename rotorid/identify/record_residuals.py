@@ -192,13 +192,6 @@ def _table(columns: Mapping[str, float | FloatArray], outputs: Sequence[str], sa
     return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs], axis=-1)
 
 
-def at(step: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
-    """The estimate of a step, as one of the parameters themselves."""
-    values = np.where(np.isnan(step.values), np.nan, theta)
-    chi = float(residuals @ residuals) if step.errors_stated else None
-    return replace(step, values=values, solution=theta, residuals=residuals, chi_square=chi)
-
-
 def negligible(size: FloatArray, theta: FloatArray, step: Estimate, limits: tuple[float, float]) -> bool:
     """Whether a step of this size (n,) no longer matters: relative to the parameters, or to their errors."""
     # all components: the step has no part that the data do not determine, and vanishes with the combinations

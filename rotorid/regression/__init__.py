@@ -1,6 +1,6 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
-from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
+from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, echelon
 from rotorid.regression.linear import (
     RCOND,
     covariance_root,
@@ -19,7 +19,6 @@ __all__ = [
     "Combination",
     "Estimate",
     "covariance_root",
-    "coverage_factor",
     "echelon",
     "gain",
     "least_squares",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.linear_start import build_rows, linear_fit
-from rotorid.regression import coverage_factor
 
 FloatArray = NDArray[np.float64]
 TWO_MASSES = (
@@ -124,7 +123,7 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
             fit = linear_fit(case.model, build_rows(case.model, data))
             values[i] = fit.recovery.values
             deviations = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
-            factor = coverage_factor(None if stated else fit.estimate.dof)
+            factor = replace(fit.estimate, errors_stated=stated).coverage_factor
         inside[i] = np.abs(values[i] - truth) <= factor * deviations
     std = values.std(axis=0)
     return Figures(inside.mean(axis=0), (values.mean(axis=0) - truth) / std, std / np.abs(truth))

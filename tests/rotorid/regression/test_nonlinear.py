@@ -100,7 +100,7 @@ def test_a_linear_model_gives_the_linear_kernel(seed, stated, sigma):
 def test_a_parameter_at_its_bound_is_named_and_held():
     K, y = line()
     run = {"names": ["a", "slope"], "sigma_stated": False}
-    bounds = {"a": (-9, None), "slope": (None, 1.5)}  # the first does not bind
+    bounds = [(-9, None), (None, 1.5)]  # the first does not bind
     fit = nonlinear_least_squares(lambda x: K @ x - y, lambda x: K, [-99.0, 0.0], bounds=bounds, **run)
     held = least_squares(K[:, :1], y - 1.5 * K[:, 1])
     assert fit.at_bounds == ("slope",)
@@ -152,10 +152,8 @@ def test_no_convergence_is_said():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"names": ["a"]}, "as many finite starting values"),
         ({"loss": "median"}, "loss 'median' is not known"),
-        ({"bounds": {"z": (0, 1)}}, "'z', which is not estimated"),
-        ({"bounds": {"b1": (1, 1)}}, "lower bound of b1"),
+        ({"bounds": (1, 1)}, "must be strictly less"),
         ({"start": [1e308, -1e6]}, "not finite"),
     ],
 )
