@@ -63,11 +63,8 @@ def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
     ValueError
         If they are no numbers, not finite or negative, or do not ascend although they must.
     """
-    try:
-        array = np.atleast_1d(np.array(speeds, dtype=float))
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.ndim != 1 or not array.size or not (np.isfinite(array) & (array >= 0)).all():
+    array = np.atleast_1d(np.array(speeds, dtype=float))
+    if array.ndim != 1 or not array.size or not ((array >= 0) & (array < np.inf)).all():
         raise ValueError(
             "speeds must be numbers in rad/s, at least one, in one list, finite and not negative"
         )
@@ -91,20 +88,12 @@ def attachment(item: Any) -> str:  # noqa: ANN401  all that has a node and a nam
 
 def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
     """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
-    unit = np.exp(1j * np.asarray(angle, dtype=float))
-    along, across = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in (unit.real, unit.imag))
-    return np.asarray(np.asarray(size) * (along + 1j * across), dtype=complex)
-
-
-def off_axis(weights: ArrayLike) -> bool:
-    """Whether any of these complex numbers stands at another angle than 0° and 180°."""
-    w = np.asarray(weights, dtype=complex)
-    return bool((np.abs(w.imag) > 1e-9 * np.abs(w)).any())
+    unit = np.round(np.exp(1j * np.asarray(angle, dtype=float)), 15) + 0.0  # no negative zero
+    return np.asarray(np.asarray(size) * unit, dtype=complex)
 
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.exp(1j * np.angle(z))
-    axes = np.stack((unit, 1j * unit), axis=-1)
-    R = np.stack((axes.real, axes.imag), axis=-2)
-    return np.asarray(R * np.stack((radial, tangential), axis=-1)[..., None, :] @ np.swapaxes(R, -1, -2))
+    mean, apart = (radial + tangential) / 2, (radial - tangential) / 2 * np.exp(2j * np.angle(z))
+    parts = np.array([[mean + apart.real, apart.imag], [apart.imag, mean - apart.real]])
+    return np.moveaxis(parts, (0, 1), (-2, -1))

@@ -154,7 +154,7 @@ class CalibratedRotor:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
-        warnings = list(self.fit.end_warnings)
+        warnings = [*filter(None, (self.undetermined, self.fit.bound_warning))]
         if self.chance < LEVEL and self.fit.converged:
             times, errors = np.sqrt(self.chi_square / self.dof), "stated" if self.stated else "assumed"
             lack = f" ({percent(self.lack_of_fit)} % of what weights do)" if self.lack_of_fit else ""

@@ -11,7 +11,7 @@ import numpy as np
 
 from balancing import Holes, Influence, Labels, Limits, Trials
 from fem import Sensor as Probe
-from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
+from rotorid.base.arrays import ComplexArray, FloatArray, polar
 from rotorid.base.text import counted, listing
 from rotorid.files.columns import Source, source_name
 from rotorid.files.job_models import (
@@ -259,8 +259,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     degrees = [angle for plane in planes.values() for angle in plane.angles]
     if rotor is not None:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
-    vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
-    matters = {"phase": True, "angles": any(map(off_axis, vectors))}
+    vectors = [trials.weights, polar(1.0, np.radians(degrees)), *([] if check is None else [check.weights])]
+    matters = {"phase": True, "angles": any(np.imag(each).any() for each in vectors)}
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
         trials=replace(trials, labels=labels),

@@ -59,7 +59,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
             alone = least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=JACOBIAN_RCOND).at(theta, r)
             prior = replace(prior, alone=combined(problem, alone).describe_rank())
-        estimate, r = prior.apart(estimate), prior.best  # of the data alone
+        estimate, r = prior.apart(estimate), -prior.data.residuals  # of the data alone
     seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
     rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False

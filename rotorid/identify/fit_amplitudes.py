@@ -23,7 +23,7 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
-from rotorid.identify.amplitudes import Comparison, Experiments, compare
+from rotorid.identify.amplitudes import Comparison, Experiments, compare, evaluated_once
 from rotorid.identify.combinations import NAME, why_several
 from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
 from rotorid.identify.ode import check_known
@@ -35,7 +35,6 @@ from rotorid.regression.linear import normal_matrix
 from rotorid.regression.nonlinear import (
     LOSSES,
     NonlinearEstimate,
-    evaluated_once,
     nonlinear_least_squares,
 )
 from rotorid.regression.prior import PriorEffect, PriorValues, effect, prior_rows
@@ -239,7 +238,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     if covariance is not None:
         covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
-    warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
+    warnings = [*filter(None, ("" if converged else fit.message, fit.bound_warning))]
     warnings += unexplained(estimate, stated=data.stated) if converged else []
     return Identification(
         model=model,

@@ -14,8 +14,7 @@ variance of the residuals and Student's t; without degrees of freedom there is n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -230,14 +229,7 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
     [1.0, 2.0]
     """
-    return solution_and_rank(A, y, rcond=rcond)[0]
-
-
-def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tuple[Any, int]:
-    """As `solution`, and the rank of A: below n the equations leave combinations of x open."""
-    unit, scale = unit_columns(np.asarray(A))
-    x, _, rank, _ = np.linalg.lstsq(unit, np.asarray(y), rcond=rcond)
-    return (x.T / scale).T, int(rank)
+    return gain(A, rcond=rcond) @ np.asarray(y)
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
@@ -248,8 +240,7 @@ def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
     return np.asarray(scale[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
-@dataclass(frozen=True, eq=False)
-class NormalMatrix:
+class NormalMatrix(NamedTuple):
     """KᵀK (n, n) of the data's rows, [Q] (2.28), to look at: nothing is solved by it.
 
     Rows are taken over their errors where these are known, in the units of the unknowns. The condition number
@@ -268,11 +259,10 @@ class NormalMatrix:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return plain(vars(self))
+        return plain(self._asdict())
 
 
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
-    s = np.linalg.svd(K, compute_uv=False)
     full = np.linalg.matrix_rank(unit_columns(K)[0], JACOBIAN_RCOND) == len(names)
-    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)
+    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(K) ** 2:.4g}") if full else np.inf)

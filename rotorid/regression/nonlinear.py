@@ -12,16 +12,14 @@ from the pseudo-residuals ψ(r) over the mean of ψ′ (P. J. Huber, Robust Stat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import compress
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
@@ -95,12 +93,6 @@ class NonlinearEstimate:
             f"{', '.join(self.at_bounds)} {stand}: no standard deviation is given, and those of the others"
         )
         return f"{words} hold it fixed" if self.at_bounds else ""
-
-    @property
-    def end_warnings(self) -> tuple[str, ...]:
-        """What a user must know of the end of the search before trusting the numbers."""
-        rank = self.estimate.describe_rank() if self.converged and not self.estimate.full_rank else ""
-        return tuple(filter(None, ("" if self.converged else self.message, self.bound_warning, rank)))
 
 
 def nonlinear_least_squares(  # noqa: PLR0913
@@ -182,9 +174,8 @@ def nonlinear_least_squares(  # noqa: PLR0913
     if not small:
         x, ended = search.drive(first, robust, max_iterations)
         x, estimate, small = search.polish(x)
-        tried = counted(max_iterations, "evaluation")
-        why = "" if small else "the minimum was not reached: the last step is not yet small"
-        why = why if ended else f"not converged after {tried}: raise max_iterations or start nearer"
+        if not (small and ended):
+            why = "not converged: raise max_iterations or start nearer"
     at_bounds = (x <= lower) | (x >= upper)
     unknown = np.where(at_bounds, np.nan, 0.0)
     covariance, of_solution = (
@@ -317,16 +308,6 @@ class _Search:
         return step, float((np.abs(step.solution) / np.maximum(size, TINY)).max())
 
 
-def evaluated_once(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
-    """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
-
-    @lru_cache(maxsize=1)
-    def at(numbers: bytes) -> tuple[AnyArray, ...]:
-        return both(np.frombuffer(numbers))
-
-    return lambda x: at(x.tobytes())[0], lambda x: at(x.tobytes())[1]
-
-
 def search_from(
     residual: Function, start: FloatArray, jacobian: Function | None = None, *, limit: int
 ) -> tuple[float, FloatArray] | None:
@@ -337,13 +318,17 @@ def search_from(
     """
     from scipy.optimize import least_squares as driver
 
-    options: dict[str, Any] = {"max_nfev": limit}
-    if jacobian is not None:
-        enough = len(residual(start)) >= len(start)
-        options |= {"jac": jacobian, "x_scale": "jac", "method": "lm" if enough else "trf"}
+    enough = jacobian is not None and len(residual(start)) >= len(start)
     with np.errstate(all="ignore"):
         try:
-            end = driver(residual, start, **options)
+            end = driver(
+                residual,
+                start,
+                jac=jacobian or "2-point",
+                x_scale="jac" if jacobian else 1.0,
+                method="lm" if enough else "trf",
+                max_nfev=limit,
+            )
         except (ValueError, np.linalg.LinAlgError):
             return None
     return (float(end.cost), np.asarray(end.x)) if np.isfinite(end.x).all() else None

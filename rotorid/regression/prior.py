@@ -95,8 +95,8 @@ class PriorEffect:
     `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
     `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
     is what the data alone determine, in words, if that is not everything, `lost` what only the rows
-    determine, `rank` and `best` rank and residuals (m,) of the data, with what stands at a bound held there.
-    Condition numbers and rms are those without and with the prior; a nonlinear model is linearised.
+    determine, `data` the step to the best of the data, with what stands at a bound held there. Condition
+    numbers and rms are those without and with the prior; a nonlinear model is linearised.
     """
 
     rows: Prior
@@ -104,10 +104,8 @@ class PriorEffect:
     away: FloatArray
     alone: str
     lost: tuple[str, ...]
-    rank: int
-    best: FloatArray
-    condition_number: dict[str, float]
-    residual_rms: dict[str, float]
+    data: Estimate
+    sizes: dict[str, dict[str, float]]
 
     @property
     def why(self) -> dict[str, str]:
@@ -144,8 +142,8 @@ class PriorEffect:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         if self.rows.ridge:
             estimate = replace(estimate, covariance=None, solution_covariance=None)
-        chi_square = estimate.chi_square and float(self.best @ self.best)
-        return replace(estimate, chi_square=chi_square, dof=len(self.best) - self.rank)
+        chi_square = estimate.chi_square and self.data.chi_square
+        return replace(estimate, chi_square=chi_square, dof=self.data.dof)
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
@@ -158,8 +156,7 @@ class PriorEffect:
                 for name, value, std, share, away in each
             },
             "data_alone": self.alone or None,
-            "condition_number": self.condition_number,
-            "residual_rms": self.residual_rms,
+            **self.sizes,
         }
         return plain({"ridge" if rows.ridge else "prior": part})
 
@@ -183,16 +180,16 @@ def effect(
     std = np.full(len(moves), np.nan)
     std[moves] = both.std
     share = (1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
-    best = -alone.residuals
-    rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (best, r))
+    rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (alone.residuals, r))
     return PriorEffect(
         rows=rows,
         share=share,
         away=rows.residual(theta) / np.sqrt(np.where(share > SILENT, share, np.nan)),
         alone="" if alone.full_rank else alone.describe_rank(),
         lost=tuple(name for name in alone.undetermined if name not in both.undetermined),
-        rank=alone.rank,
-        best=best,
-        condition_number={"without": alone.condition_number, "with": both.condition_number},
-        residual_rms={"without": rms, "with": full_rms},
+        data=alone,
+        sizes={
+            "condition_number": {"without": alone.condition_number, "with": both.condition_number},
+            "residual_rms": {"without": rms, "with": full_rms},
+        },
     )

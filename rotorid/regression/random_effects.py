@@ -12,7 +12,7 @@ Biol. 4 (2005) 32.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -29,8 +29,7 @@ _FOLDS = 50
 _LEAST = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class RandomEffects:
+class RandomEffects(NamedTuple):
     """M groups of n numbers: what they have in common, and each.
 
     `mean` is μ (n,), `between` and `within` are B and W, (n, n); `new_group` is the covariance of a further

@@ -108,7 +108,7 @@ def test_a_parameter_at_its_bound_is_named_and_held():
     assert fit.std == pytest.approx([held.std[0], np.nan], rel=1e-9, nan_ok=True)
     assert fit.estimate.to_dict()["parameters"]["slope"] == {"value": 1.5, "std": None, "ci95": None}
     assert "nan" not in fit.estimate.answer.brief()
-    assert "slope stands at its bound" in fit.end_warnings[0]
+    assert "slope stands at its bound" in fit.bound_warning
 
 
 def test_a_product_cannot_be_split_and_the_words_say_so():
@@ -123,7 +123,7 @@ def test_a_product_cannot_be_split_and_the_words_say_so():
     assert (fit.estimate.rank, fit.estimate.undetermined) == (2, ("a", "b"))
     a, b, c = fit.estimate.solution
     assert (a * b, c) == pytest.approx((6, 0), rel=1e-9, abs=1e-9)
-    assert any("a and b by themselves are not" in w for w in fit.end_warnings)
+    assert "a and b by themselves are not" in fit.estimate.describe_rank()
 
 
 @pytest.mark.parametrize("stated", [True, False])
@@ -146,7 +146,7 @@ def test_no_convergence_is_said():
     run = {"names": names, "sigma_stated": False, "max_iterations": 2}
     fit = nonlinear_least_squares(*functions, starts[0], **run)
     assert not fit.converged
-    assert "not converged" in fit.end_warnings[0]
+    assert "not converged" in fit.message
 
 
 @pytest.mark.parametrize(
