@@ -99,8 +99,10 @@ class CalibratedRotor:
     @property
     def std(self) -> FloatArray:
         """One standard deviation (n,); NaN at a bound and where not determined."""
-        of_fit = np.full(len(self.names), np.nan) if self.fit.std is None else self.fit.std
-        return np.where(np.isnan(of_fit), np.nan, np.sqrt(np.diag(self.covariance)))
+        of_fit = self.fit.estimate.std
+        return np.where(
+            np.isnan(np.nan if of_fit is None else of_fit), np.nan, np.sqrt(np.diag(self.covariance))
+        )
 
     @property
     def data_share(self) -> FloatArray:

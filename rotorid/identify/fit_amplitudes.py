@@ -192,7 +192,7 @@ def output_error(
             prior=added,
         )
         iterations += fit.iterations
-        std = np.zeros(len(begin)) if fit.std is None else fit.std
+        std = np.zeros(len(begin)) if fit.estimate.std is None else fit.estimate.std
         if left < REWEIGHTINGS and (std > 0).any():
             moved = float((np.abs(fit.estimate.solution - point)[std > 0] / std[std > 0]).max())
         point = fit.estimate.solution

@@ -46,6 +46,11 @@ class Iterations(NonlinearEstimate):
     regression: tuple[FloatArray, FloatArray] | None = None
     stopped_by: str | None = None
 
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,); NaN at a bound or where not determined; None where errors are unknown."""
+        return self.estimate.std
+
 
 class Problem:
     """Residuals y(t, θ) − measured, divided by the standard deviations where these are known.

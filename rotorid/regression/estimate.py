@@ -33,14 +33,11 @@ class Combination:
         The combination, such as "b − 0.5·d" or "b*(1 - delta)".
     value, std
         Its estimate and one standard deviation, None where that is unknown.
-    coefficients
-        Of the parameters, shape (n,), where it is linear (a tangent, where it is not); None: in words only.
     """
 
     words: str
     value: float
     std: float | None
-    coefficients: FloatArray | None = None
 
     def line(self) -> str:
         """One line of text: "b − 0.5·d = 3.1 ± 0.2"."""
@@ -72,24 +69,14 @@ class Uncertain:
         return None if self.covariance is None else np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def coverage_factor(self) -> float | None:
-        """Half width of the 95 % interval in standard deviations: 1.96 of stated errors, else Student's t.
-
-        None without degrees of freedom, where no interval exists.
-        """
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals (n, 2), normal ones of stated errors, else Student's t; None where unknown."""
         from scipy.special import ndtri, stdtrit
 
-        if self.errors_stated:
-            return float(ndtri(0.975))
-        return float(stdtrit(self.dof, 0.975)) if self.dof > 0 else None
-
-    @property
-    def ci95(self) -> FloatArray | None:
-        """95 % intervals, shape (n, 2); None where errors are unknown."""
-        std, factor = self.std, self.coverage_factor
-        if std is None or factor is None:
+        if (std := self.std) is None or not (self.errors_stated or self.dof > 0):
             return None
-        return self.values[:, None] + factor * std[:, None] * [-1.0, 1.0]
+        factor = ndtri(0.975) if self.errors_stated else stdtrit(self.dof, 0.975)
+        return self.values[:, None] + np.outer(factor * std, [-1.0, 1.0])
 
     @property
     def correlation(self) -> FloatArray | None:
@@ -216,8 +203,8 @@ class Estimate(Answered, Uncertain):
     def combination(self, words: str, value: float, slope: FloatArray) -> Combination:
         """One of this value and these derivatives (n,) by the parameters, with its standard deviation."""
         cov = self.solution_covariance
-        std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
-        return Combination(words, value, std, slope)
+        std = None if cov is None else float(np.sqrt((slope @ cov @ slope).clip(0.0)))
+        return Combination(words, value, std)
 
     def at(self, theta: FloatArray, residuals: FloatArray) -> Estimate:
         """Of a step: the estimate of the parameters (n,) where it ends, with the residuals (m,) there."""

@@ -229,7 +229,7 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
     [1.0, 2.0]
     """
-    return gain(A, rcond=rcond) @ np.asarray(y)
+    return gain(A, rcond=rcond) @ y
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:

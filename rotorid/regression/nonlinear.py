@@ -76,11 +76,6 @@ class NonlinearEstimate:
         return self.estimate.values
 
     @property
-    def std(self) -> FloatArray | None:
-        """Standard deviations (n,); NaN at a bound or where not determined; None where errors are unknown."""
-        return self.estimate.std
-
-    @property
     def ci95(self) -> FloatArray | None:
         """95 % intervals (n, 2); NaN at a bound; None where errors are unknown."""
         return self.estimate.ci95
@@ -163,7 +158,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     rows = len(r0 := residual(first))
     if not np.isfinite(r0).all():
         raise ValueError("the residuals at the starting values are not finite: choose other starting values")
-    if prior is not None and len(prior):
+    if prior:
         if robust:
             raise ValueError("a prior or a ridge needs the loss linear: a robust loss would discount it, too")
         residual, jacobian = prior.beside(residual, jacobian)

@@ -170,7 +170,7 @@ def effect(
     bound is held there.
     """
     moves = np.array([name not in at_bounds for name in rows.names])
-    if not len(rows) or not moves.any():
+    if not rows or not moves.any():
         return None
     names = tuple(compress(rows.names, moves))
     alone, both = (

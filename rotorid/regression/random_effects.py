@@ -118,23 +118,23 @@ def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArr
     each = _medians(y, group)
     centre = np.median(each, axis=0)
     spread = np.median(np.abs(each - centre), axis=0)
-    off = np.mean(((y - centre) / np.where(spread > 0, spread, 1.0)) ** 2, axis=1)
-    inside, counted, folds = off <= np.sort(_medians(off, group))[len(each) // 2], np.full(len(y), True), 1
+    distance = np.mean(((y - centre) / np.where(spread > 0, spread, 1.0)) ** 2, axis=1)
+    inside, folds = distance <= np.sort(_medians(distance, group))[len(each) // 2], 1
     for _ in range(_STEPS):
-        distance, fold = np.empty(len(y)), group % folds
+        fold = group % folds
         for k in np.unique(fold).tolist():
             rest = inside & ((fold != k) | (folds == 1))
             number = np.unique(group[rest], return_inverse=True)[1]
             others = random_effects(y[rest], error[rest], number)
             for j in np.flatnonzero(fold == k).tolist():
                 distance[j] = others.distance(y[j], error[j])
-        dof = len(np.unique(group[inside])) - 1
-        scale = np.median(_medians(distance[counted], group[counted])) / fdtri(y.shape[1], dof, 0.5)
-        limit = float(scale * fdtri(y.shape[1], dof, LEVEL))
+        near = _medians(distance[inside], group[inside])
+        most, middle = fdtri(y.shape[1], len(near) - 1, [LEVEL, 0.5])
+        limit = float(np.median(near) * most / middle)
         fits = distance <= limit
         if len(np.unique(group[fits])) < LEAST_GROUPS or (fits == inside).all():
             break
-        inside, counted, folds = fits, fits, _FOLDS
+        inside, folds = fits, _FOLDS
     return distance, limit
 
 

@@ -97,7 +97,7 @@ def test_stated_errors_give_normal_intervals_whatever_the_residuals():
 
 def test_no_degrees_of_freedom_no_interval():
     estimate = least_squares([[1.0, 0.0], [1.0, 1.0]], [1.0, 2.0], names=["a", "b"])
-    assert estimate.std is estimate.ci95 is estimate.correlation is estimate.coverage_factor is None
+    assert estimate.std is estimate.ci95 is estimate.correlation is None
     assert "no intervals" in estimate.summary()
     assert estimate.to_dict()["parameters"]["a"] == {"value": pytest.approx(1.0), "std": None, "ci95": None}
 

@@ -74,7 +74,7 @@ def test_certified_values_come_out_to_seven_digits_from_both_starts(model, text,
         assert fit.converged
         np.testing.assert_array_equal(fit.history[[0, -1]], [start, fit.values])
         np.testing.assert_allclose(fit.values, values, rtol=1e-7)
-        np.testing.assert_allclose(fit.std, std, rtol=of_std)
+        np.testing.assert_allclose(fit.estimate.std, std, rtol=of_std)
         assert 2 * fit.costs[-1] == pytest.approx(float(total[0]), rel=1e-9)
 
 
@@ -105,7 +105,7 @@ def test_a_parameter_at_its_bound_is_named_and_held():
     held = least_squares(K[:, :1], y - 1.5 * K[:, 1])
     assert fit.at_bounds == ("slope",)
     assert fit.values == pytest.approx([held.values[0], 1.5], rel=1e-9)
-    assert fit.std == pytest.approx([held.std[0], np.nan], rel=1e-9, nan_ok=True)
+    assert fit.estimate.std == pytest.approx([held.std[0], np.nan], rel=1e-9, nan_ok=True)
     assert fit.estimate.to_dict()["parameters"]["slope"] == {"value": 1.5, "std": None, "ci95": None}
     assert "nan" not in fit.estimate.answer.brief()
     assert "slope stands at its bound" in fit.bound_warning
@@ -137,7 +137,7 @@ def test_a_robust_loss_shrugs_off_gross_errors(stated):
     )
     error, harm = np.abs(robust.values - [1, 2]), np.abs(plain.values - [1, 2])
     assert robust.converged
-    assert (error < np.minimum(4 * robust.std, 0.15)).all()
+    assert (error < np.minimum(4 * robust.estimate.std, 0.15)).all()
     assert harm.max() > 10 * error.max()
 
 
