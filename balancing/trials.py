@@ -10,7 +10,6 @@ import numpy as np
 
 from balancing.conventions import Labels
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
-from rotorid.base.arrays import off_axis as off_axis
 from rotorid.base.text import RPM
 
 Arc = tuple[float, float]

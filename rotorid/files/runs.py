@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, off_axis, turned
+from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
@@ -130,7 +130,7 @@ def read_trials(
     trials = problems.need(make_trials(runs, weights, conventions, errors, problems))
     problems.stop()
     assumed: tuple[str, ...] = ("phase",) if phase is None else ()
-    if angles is None and off_axis(trials.weights):
+    if angles is None and trials.weights.imag.any():
         assumed += ("angles",)
     return replace(trials, labels=replace(trials.labels, assumed=assumed))
 
