@@ -93,6 +93,7 @@ def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    mean, apart = (radial + tangential) / 2, (radial - tangential) / 2 * np.exp(2j * np.angle(z))
-    parts = np.array([[mean + apart.real, apart.imag], [apart.imag, mean - apart.real]])
-    return np.moveaxis(parts, (0, 1), (-2, -1))
+    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
+    parts = ((radial, along), (tangential, across))
+    return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))
