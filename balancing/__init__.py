@@ -47,11 +47,13 @@ from balancing.trim import LeftToDo, after_check_run
 from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
 from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
+from balancing.without_phase import AmplitudeSolution, WithoutPhase, balance_without_phase
 
 __all__ = [
     "GRADES",
     "METHODS",
     "UNBALANCE_METHODS",
+    "AmplitudeSolution",
     "CheckComparison",
     "Conditioning",
     "ConventionTest",
@@ -79,7 +81,9 @@ __all__ = [
     "Unbalance",
     "UndeterminedError",
     "Verdict",
+    "WithoutPhase",
     "after_check_run",
+    "balance_without_phase",
     "change_of_run",
     "check_runs",
     "combine",

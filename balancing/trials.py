@@ -113,6 +113,8 @@ class Trials:
         Stated errors of the mounted weights; zero: not stated.
     drift
         Stated drift of the readings from the first to the last run, relative, one standard deviation.
+    amplitudes_only
+        Whether phases are not known: the readings are amplitudes, ≥ 0, which `balance_without_phase` takes.
 
     Raises
     ------
@@ -134,6 +136,7 @@ class Trials:
     covariance: FloatArray | None = None
     placement: Placement = _EXACT
     drift: float = 0.0
+    amplitudes_only: bool = False
 
     def __post_init__(self) -> None:
         keep(
@@ -152,6 +155,8 @@ class Trials:
                 f"readings must have shape (repeats, {R} runs, {S} speeds, {C} sensors); got {readings.shape}"
             )
         self._check_readings(readings)
+        if self.amplitudes_only:
+            readings = np.abs(readings).astype(complex)
         weights = np.array(self.weights, dtype=complex)
         if weights.shape != (R, P) or not np.isfinite(weights).all():
             raise ValueError(f"weights must be finite, of shape ({R} runs, {P} planes); got {weights.shape}")
@@ -181,6 +186,15 @@ class Trials:
                 f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
                 "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
+
+    def with_phases(self) -> Trials:
+        """The same; ValueError where their phases are not known."""
+        if self.amplitudes_only:
+            raise ValueError(
+                "these readings have no phases: they are balanced by rotorid balance "
+                "(balancing.balance_without_phase), and tell nothing else"
+            )
+        return self
 
     @property
     def repeats(self) -> IntArray:

@@ -22,6 +22,7 @@ from rotorid.commands.balance_solution import (
 from rotorid.commands.coefficients import KINDS
 from rotorid.commands.quantities import one_of
 from rotorid.commands.tolerance import ToleranceOptions, permissible
+from rotorid.commands.without_phase import BalanceWithoutPhase, balanced_without_phase
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
@@ -66,8 +67,10 @@ class Balance(Outcome):
 
 
 @command
-def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balance:
+def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balance | BalanceWithoutPhase:
     """Correction weights from trial runs or a rotor model, with ± and what will be left.
+
+    Runs without phases are balanced by their amplitudes.
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 
@@ -93,6 +96,8 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Balanc
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
+    if read.trials.amplitudes_only:
+        return balanced_without_phase(read, options)
     stated = read.check is None or read.check_mounted
     if options.refine and stated:
         solved = solve(read, options)

@@ -261,6 +261,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
     vectors = [trials.weights, np.exp(1j * np.radians(degrees)), *([] if check is None else [check.weights])]
     matters = {"phase": True, "angles": any(map(off_axis, vectors))}
+    if trials.amplitudes_only:  # they tell no direction of turning, and need none
+        matters = dict.fromkeys(matters, False)
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
     return Job(
         trials=replace(trials, labels=labels),

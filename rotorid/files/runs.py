@@ -30,6 +30,7 @@ from rotorid.files.layout import (
     joined,
     read_runs_grids,
     stated_phase,
+    without_phases,
 )
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
+_UNKNOWN = replace(PHASE, required=False)
 COLUMNS = (
     Column("run"),
     SPEED,
@@ -52,6 +54,8 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
+AMPLITUDES = tuple(_UNKNOWN if column is PHASE else column for column in COLUMNS)
+"""Those of a runs table that may have no phases."""
 OVER_SPEED = (
     *(column for column in COLUMNS if column.stem not in ("repeat", "time_s")),
     Column("time", one_of(units.TIME), ("time_s",), required=False),
@@ -131,6 +135,8 @@ def read_trials(
     assumed: tuple[str, ...] = ("phase",) if phase is None else ()
     if angles is None and off_axis(trials.weights):
         assumed += ("angles",)
+    if trials.amplitudes_only:  # they tell no direction of turning, and need none
+        assumed = ()
     return replace(trials, labels=replace(trials.labels, assumed=assumed))
 
 
@@ -171,12 +177,17 @@ def read_runs(
         Collects the complaints.
     """
     grids = read_runs_grids(source, conventions, problems)
-    if grids is None or (len(grids) > 1 and not all(readings_table(grid, problems) for grid in grids)):
+    grids, blank = (None, "") if grids is None else without_phases(grids)
+    columns = AMPLITUDES
+    if grids is None or (
+        len(grids) > 1 and not all(readings_table(grid, problems, columns) for grid in grids)
+    ):
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
-    table = None if grid is None else readings_table(grid, problems)
+    table = None if grid is None else readings_table(grid, problems, columns)
     if table is None:
         return None, None
+    known = "phase" in table
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start, band = len(problems), conventions.speed_tolerance_percent
@@ -196,7 +207,7 @@ def read_runs(
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
-    if not len(problems):
+    if not len(problems) and known:
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
@@ -209,7 +220,7 @@ def read_runs(
         out[..., *np.transpose(places)] = values[..., rows]
         return out
 
-    vectors = conventions.labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    vectors = conventions.labels.vibration_from(table.numbers("amplitude"), table.numbers("phase", 0.0))
     unit = table.unit("amplitude")
     labels = replace(
         conventions.labels,
@@ -224,7 +235,8 @@ def read_runs(
         for name in table.grid.header
         if name.startswith(MOUNTED)
     ]
-    stated = np.moveaxis(covariances(table, vectors), 0, -1) if "phase_std" in table else None
+    stated = np.moveaxis(covariances(table, vectors), 0, -1) if known and "phase_std" in table else None
+    nothing, noted = np.zeros(len(table)), [blank] if blank else []
     return runs, Trials(
         runs,
         speeds,
@@ -233,9 +245,10 @@ def read_runs(
         placed(vectors),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged))),
-        steps=placed(np.array([table.steps("amplitude"), table.steps("phase")])),
+        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
+        steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if known else nothing])),
         covariance=None if stated is None else placed(stated),
+        amplitudes_only=not known,
     )
 
 

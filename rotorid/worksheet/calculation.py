@@ -17,6 +17,7 @@ from rotorid.worksheet.job_files import Stamp, stamp
 
 if TYPE_CHECKING:
     from rotorid.commands.balance import Balance
+    from rotorid.commands.without_phase import BalanceWithoutPhase
     from rotorid.files import Job
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
@@ -100,14 +101,20 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]
     refused = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made = balance(source, BalanceOptions())
+        made = _with_phases(balance(source, BalanceOptions()))
         split, refine = bool(made.job.holes), made.job.check is not None
         if split or refine:
             try:
-                made = balance(source, BalanceOptions(split=split, refine=refine))
+                made = _with_phases(balance(source, BalanceOptions(split=split, refine=refine)))
             except (ValueError, OSError, ArithmeticError) as error:
                 refused = [f"no {'trim' if refine else 'pieces'}: {error}"]
     return made, kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)) + refused
+
+
+def _with_phases(made: Balance | BalanceWithoutPhase) -> Balance:
+    """What the page shows."""
+    made.job.trials.with_phases()
+    return cast("Balance", made)
 
 
 def _without_check(path: Path) -> Job:
