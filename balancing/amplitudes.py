@@ -39,8 +39,8 @@ _APART = 1e-2
 """Of the largest amplitude: minima that differ by less are one."""
 _OPEN = 3.0
 """Of the largest amplitude: one standard deviation of what data leave open altogether."""
-_RADII = np.geomspace(0.03, 30.0, 48)
-_ANGLES = np.exp(2j * np.pi * np.arange(60) / 60)
+_RADII = np.geomspace(0.03, 30.0, 144)
+_ANGLES = np.exp(2j * np.pi * np.arange(144) / 144)
 _SMALL = 0.1
 """Of the largest amplitude: what is smaller counts as of this scale."""
 _TINY = 1e-300
@@ -120,7 +120,7 @@ def _starts(weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray) -
         y = (g @ amplitudes) / np.maximum((g * g).sum(axis=1), _TINY) * np.abs(D)
         return np.column_stack((y, (-y / D).real, (-y / D).imag))
     y = amplitudes.max() * 0.6
-    one = [y * size * way for size in (0.3, 1.0, 2.0) for way in _ANGLES[::8]]
+    one = [y * size * way for size in (0.3, 1.0, 2.0) for way in _ANGLES[::18]]
     every = np.array(list(product(one, repeat=P)))
     return np.column_stack((np.full(len(every), y), every.view(np.float64)))
 

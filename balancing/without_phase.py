@@ -8,7 +8,8 @@ Errors: as stated (amplitude, floor, from run to run); else 10 % of each amplitu
 run, and from four readings more than unknowns on what the fit leaves. The digits always count. Those of
 different readings count as independent.
 
-A solution stays possible within 95 %, by F or χ² of the 2 P numbers that it is. It is mounted where the
+A solution stays possible within 99 %, by F or χ² of the 2 P numbers that it is: with 95 % one in a hundred of
+what is mounted would leave more than before. It is mounted where the
 vibration that the best solution's weights leave is below 0.9 of the present with 95 %, whichever of the
 possible solutions is true; else a run is named whose amplitude differs most, in its errors, among all that
 is possible, of those that shake the rotor not much more than the runs did.
@@ -48,6 +49,8 @@ SPARE = 4
 """Readings more than unknowns from which errors are estimated."""
 CONTRADICTION = 0.01
 """Chance of a larger misfit below which amplitudes contradict each other."""
+POSSIBLE = 0.99
+"""Solutions are those within it."""
 WEAK = 3.0
 """Effect of a trial weight in units of its error: too small below."""
 SHAKING = 1.5
@@ -117,7 +120,7 @@ class WithoutPhase(Answered):
     trials
         The runs, of the planes that are corrected.
     solutions
-        All that are possible with 95 %, the best first.
+        All that are possible with 99 %, the best first.
     scatter
         How amplitudes err and how the best solution misses them.
     errors, limit
@@ -182,16 +185,18 @@ class WithoutPhase(Answered):
     def holds(self, weights: ComplexArray) -> bool:
         """Whether weights (P,) lie in the 95 % region of a solution.
 
-        For one plane also where a weight that leaves nothing there misfits by no more than 95 % allow.
+        For one plane also where one that leaves nothing misfits by no more than 95 % allow.
         """
         if any(one.region.holds(weights) for one in self.solutions):
             return True
         if len(self.planes) > 1:
             return False
         a = np.abs(self.trials.mean).reshape(len(self.trials.runs), -1)
-        T = self.trials.weights[:, 0]
-        each = (misfit(T, a[:, i], self.errors[:, i], weights) for i in range(a.shape[1]) if a[:, i].any())
-        return float(sum(each)) <= self.scatter.chi_square + self.limit
+        places = np.concatenate([weights, *(one.draws[:, 0] for one in self.solutions)])
+        some = np.flatnonzero(a.any(axis=0))
+        each = [misfit(self.trials.weights[:, 0], a[:, i], self.errors[:, i], places) for i in some]
+        total = np.sum(each, axis=0)
+        return bool(total[0] <= total.min() + self.limit)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
@@ -408,7 +413,7 @@ def balance_without_phase(
     Returns
     -------
     WithoutPhase
-        Every solution within 95 %.
+        Every solution within 99 %.
 
     Raises
     ------
@@ -437,7 +442,7 @@ def balance_without_phase(
             "amplitude_percent in [errors] where it is known"
         )
     P = len(trials.planes)
-    limit = _limit(2 * P, scatter.estimated)
+    limit = _limit(2 * P, scatter.estimated, POSSIBLE)
     contradiction = _contradiction(trials, data, scatter, fits)
     weak, in_line = _weak(data, fits), P == 1 and _in_line(trials.weights[:, 0])
     fits = [Minima(*(of[fit.chi_square <= fit.chi_square[0] + limit] for of in fit)) for fit in fits]
@@ -463,7 +468,7 @@ def balance_without_phase(
         solutions=solutions,
         scatter=scatter,
         errors=errors,
-        limit=limit,
+        limit=_limit(2 * P, scatter.estimated, LEVEL),
         in_line=in_line,
         weak=weak,
         decision=decision,
@@ -621,11 +626,11 @@ def _errors(trials: Trials) -> tuple[FloatArray, float | None]:
     return np.sqrt(square + digits), float(np.hypot(size, between))
 
 
-def _limit(n: int, dof: float) -> float:
-    """Of the misfit of n numbers, 95 %, with errors of so many degrees of freedom."""
+def _limit(n: int, dof: float, level: float) -> float:
+    """Of the misfit of n numbers, with errors of so many degrees of freedom."""
     from scipy.special import fdtri
 
-    return float(n * fdtri(n, min(dof, 1e9), LEVEL))
+    return float(n * fdtri(n, min(dof, 1e9), level))
 
 
 def _in_line(T: ComplexArray) -> bool:

@@ -167,6 +167,7 @@ bk-errors                   balance sample_data/bk_two_plane/job.toml --errors 2
 bk-minmax                   balance sample_data/bk_two_plane/job.toml --method minmax
 bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method weighted
 bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --errors 2,1
+no-phase                    balance sample_data/no_phase/job.toml
 left-in                     balance sample_data/left_in/job.toml
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
