@@ -115,7 +115,7 @@ def _starts(weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray) -
         around = [np.roll(grid, k, axis=1) for k in (-1, 1)]
         walled = np.pad(grid, ((1, 1), (0, 0)), constant_values=np.inf)
         low = np.all([grid <= other for other in (*around, walled[2:], walled[:-2])], axis=0)
-        D = places[low]
+        D = places[low] * np.exp(0.01 + 0.01j)  # off an axis of symmetry, on which saddles lie
         g = np.abs(weights[:, 0] - D[:, None])
         y = (g @ amplitudes) / np.maximum((g * g).sum(axis=1), _TINY) * np.abs(D)
         return np.column_stack((y, (-y / D).real, (-y / D).imag))

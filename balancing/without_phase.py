@@ -8,10 +8,9 @@ Errors: as stated (amplitude, floor, from run to run); else 10 % of each amplitu
 run, and from four readings more than unknowns on what the fit leaves. The digits always count. Those of
 different readings count as independent.
 
-A solution stays possible within 99 %, by F or χ² of the 2 P numbers that it is: with 95 % one in a hundred of
-what is mounted would leave more than before. It is mounted where the
-vibration that the best solution's weights leave is below 0.9 of the present with 95 %, whichever of the
-possible solutions is true; else a run is named whose amplitude differs most, in its errors, among all that
+A solution stays possible within 99 %, by F or χ² of the 2 P numbers that it is. The best one is mounted where
+the 95 % interval of the vibration that it leaves ends below 0.9 of the present, whichever of the possible
+solutions is true; else a run is named whose amplitude differs most, in its errors, among all that
 is possible, of those that shake the rotor not much more than the runs did.
 """
 
@@ -77,7 +76,7 @@ class AmplitudeSolution:
         The weights as the errors allow, (n, P).
     left
         Share of the present vibration (rms) that the weights of the first solution leave if this one is
-        true: with 95 % at most.
+        true: the upper end of its 95 % interval.
     """
 
     weights: ComplexArray
@@ -296,18 +295,21 @@ class WithoutPhase(Answered):
 
     def sentence(self) -> str:
         """Whether to mount what, or which run to make."""
-        lines = []
         if self.check is not None:
-            words = "as predicted" if self.as_predicted else "not as predicted (--table): add it to the runs"
-            lines.append(f"Check run: {words}.")
+            again = "add it to the runs, with its weights, and balance again"
+            return (
+                f"Check run: as predicted. To trim, {again}."
+                if self.as_predicted
+                else (f"Check run: not as predicted (--table): {again}.")
+            )
         if not self.sound:
-            return "\n".join([*lines, *self.decision.lines()])
+            return "\n".join(self.decision.lines())
         what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount"
         at = "; ".join(map(self._at, range(len(self.planes)))) if what == "Mount" else "as below"
         scale = self.labels.vibration_scale
         before, left = self.decision.before * scale, figures(self.decision.expected * scale, 2)
         words = f"rms {figures(before, 3)} → below {left} {self.labels.vibration_in}".rstrip()
-        return "\n".join([*lines, f"{what} {at}: {words} with 95 %."])
+        return f"{what} {at}: {words} with 95 %."
 
     def _at(self, p: int) -> str:
         return f"{self.labels.weight_at(self.weights[p])} in plane {self.planes[p]!r}"
@@ -540,7 +542,7 @@ def _solutions(
         before, effect = np.zeros(data.some.size), np.zeros((data.some.size, len(D)), dtype=complex)
         before[data.some] = x[:, 0] * data.top
         effect[data.some] = _effects(x) * data.top[:, None] / data.size
-        of, bound = _best(some, data.rows, largest) * data.size, float(np.quantile(left, LEVEL))
+        of, bound = _best(some, data.rows, largest) * data.size, float(np.quantile(left, (1 + LEVEL) / 2))
         made.append(AmplitudeSolution(D * data.size, choice.misfit, before, effect, of, bound))
         samples.append((y, w))
     return tuple(made), samples
