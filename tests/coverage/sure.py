@@ -17,6 +17,7 @@ PROGRAMS = {
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
     "identify": ("coverage_identify.py", 500),
+    "without phase": ("coverage_without_phase.py", 1000),
     "runup": ("coverage_runup.py", 1, 200),
 }
 """Program and arguments of each table: half an hour in all on two cores."""
