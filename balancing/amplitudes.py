@@ -60,16 +60,10 @@ class Minima(NamedTuple):
     parameters: FloatArray
     chi_square: FloatArray
 
-
-def predicted(weights: ComplexArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitudes (B, R) with weights (R, P) by parameters (B, 1 + 2P), and their derivatives by these."""
-    z = parameters[:, :1] + (parameters[:, 1::2] + 1j * parameters[:, 2::2]) @ weights.T
-    size = np.abs(z)
-    along = (z.conj() / np.maximum(size, _TINY))[..., None]
-    derivatives = np.empty((*size.shape, parameters.shape[1]))
-    derivatives[..., :1] = along.real
-    derivatives[..., 1::2], derivatives[..., 2::2] = (along * weights).real, -(along * weights).imag
-    return size, derivatives
+    def within(self, limit: float) -> Minima:
+        """Those at most so much above the best."""
+        near = self.chi_square <= self.chi_square[0] + limit
+        return Minima(self.parameters[near], self.chi_square[near])
 
 
 def misfit(
@@ -82,138 +76,111 @@ def misfit(
     return np.asarray(((a - scale[..., None] * g) ** 2).sum(axis=-1))
 
 
-def minima(weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray, within: float) -> Minima:
-    """All minima of χ² that are at most so much above the least.
+def effects(parameters: FloatArray) -> ComplexArray:
+    """Complex w (…, P) of parameters (…, 1 + 2P)."""
+    return np.asarray(parameters[..., 1::2] + 1j * parameters[..., 2::2])
+
+
+class Amplitudes:
+    """What one sensor read at one speed in R runs.
 
     Parameters
     ----------
     weights
-        Of each run and plane, around 1, shape (R, P).
+        Of each run and plane, (R, P).
     amplitudes, errors
-        Of each run, amplitudes around 1, and one standard deviation, shape (R,).
-    within
-        Of χ².
+        Of each run, and one standard deviation, (R,).
     """
-    starts = _starts(weights, amplitudes, errors)
-    x, chi_square = _refined(weights, amplitudes, errors, starts)
-    x = np.where(x[:, :1] < 0, -x, x)
-    order = np.argsort(chi_square, kind="stable")
-    order = order[chi_square[order] <= chi_square[order[0]] + within]
-    kept: list[int] = []
-    for k in order.tolist():
-        if all(np.abs(x[k] - x[j]).max() > _APART * amplitudes.max() for j in kept):
-            kept.append(k)
-    return Minima(x[kept], chi_square[kept])
 
+    def __init__(self, weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray) -> None:
+        top, size = amplitudes.max(), np.sqrt((np.abs(weights) ** 2).sum(axis=0) / (weights != 0).sum(axis=0))
+        self._T, self._a, self._s = weights / size, amplitudes / top, errors / top  # all around 1
+        self._unit = top / np.concatenate(([1.0], np.repeat(size, 2)))
 
-def _starts(weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray) -> FloatArray:
-    """Parameters (B, 1 + 2P) near every minimum."""
-    P = weights.shape[1]
-    if P == 1:
-        places = _RADII[:, None] * _ANGLES
-        grid = misfit(weights[:, 0], amplitudes, errors, places)
-        around = [np.roll(grid, k, axis=1) for k in (-1, 1)]
-        walled = np.pad(grid, ((1, 1), (0, 0)), constant_values=np.inf)
-        low = np.all([grid <= other for other in (*around, walled[2:], walled[:-2])], axis=0)
-        D = places[low] * np.exp(0.01 + 0.01j)  # off an axis of symmetry, on which saddles lie
-        g = np.abs(weights[:, 0] - D[:, None])
-        y = (g @ amplitudes) / np.maximum((g * g).sum(axis=1), _TINY) * np.abs(D)
-        return np.column_stack((y, (-y / D).real, (-y / D).imag))
-    y = amplitudes.max() * 0.6
-    one = [y * size * way for size in (0.3, 1.0, 2.0) for way in _ANGLES[::18]]
-    every = np.array(list(product(one, repeat=P)))
-    return np.column_stack((np.full(len(every), y), every.view(np.float64)))
+    def minima(self, within: float) -> Minima:
+        """All minima of χ² that are at most so much above the least."""
+        x, chi_square = self._refined(self._starts())
+        x = np.where(x[:, :1] < 0, -x, x)
+        kept: list[int] = []
+        for k in np.argsort(chi_square, kind="stable").tolist():
+            if all(np.abs(x[k] - x[j]).max() > _APART for j in kept):
+                kept.append(k)
+        return Minima(x[kept] * self._unit, chi_square[kept]).within(within)
 
+    def covariances(self, parameters: FloatArray) -> FloatArray:
+        """Of the parameters of minima, (B, 1 + 2P, 1 + 2P); what data leave open is wide, not infinite."""
+        return self._spread(parameters / self._unit) * np.outer(self._unit, self._unit)
 
-def _refined(
-    weights: ComplexArray, amplitudes: FloatArray, errors: FloatArray, x: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Minima of χ² from starts (B, 1 + 2P), and χ² there (B,)."""
+    def drawn(self, rng: np.random.Generator, at: Minima, count: int, dof: float = np.inf) -> FloatArray:
+        """Parameters that the amplitudes allow, so many around each minimum, (B, count, 1 + 2P).
 
-    def at(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        size, derivatives = predicted(weights, x)
-        r = (size - amplitudes) / errors
-        return r, derivatives / errors[:, None], (r * r).sum(axis=1)
+        `dof`: degrees of freedom of errors that were estimated.
+        """
+        X = at.parameters / self._unit
+        B, n = X.shape
+        root = np.linalg.cholesky(_WIDE * self._spread(X))
+        tail = np.sqrt(rng.chisquare(_TAIL, (B, _MORE * count, 1)) / _TAIL)
+        off = np.einsum("bij,bkj->bki", root, rng.standard_normal((B, _MORE * count, n)) / tail)
+        x = (X[:, None] + off).reshape(-1, n)
+        x = np.where(x[:, :1] < 0, -x, x)
+        both = np.array([x - X[:, None], -x - X[:, None]])  # both signs are one solution
+        distance = (np.einsum("bij,sbkj->sbki", np.linalg.inv(root), both) ** 2).sum(axis=-1).min(axis=0)
+        size = np.log(np.einsum("bii->bi", root)).sum(axis=1)
+        density = -0.5 * (_TAIL + n) * np.log1p(distance / _TAIL) - size[:, None]
+        excess = (self._residuals(x)[0] ** 2).sum(axis=1) - at.chi_square[0]
+        fit = -0.5 * excess if np.isinf(dof) else -0.5 * (dof + n) * np.log1p(excess.clip(0.0) / dof)
+        squares = np.abs(effects(x)) ** 2
+        flat = np.log(x[:, 0] + _SMALL) + np.log(squares + _SMALL**2).sum(axis=1)
+        log_weight = fit - flat - np.logaddexp.reduce(density, axis=0)
+        probability = np.exp(log_weight - log_weight.max())
+        belongs, out = np.argmax(density, axis=0), np.repeat(X[:, None], count, axis=1)
+        for b in range(B):
+            share = np.cumsum(np.where(belongs == b, probability, 0.0))
+            if share[-1] > 0:
+                steps = (np.arange(count) + rng.random()) / count * share[-1]
+                out[b] = rng.permutation(x[np.searchsorted(share, steps).clip(max=len(x) - 1)])
+        return np.asarray(out * self._unit)
 
-    (r, J, chi_square), damping = at(x), np.full(len(x), 1e-2)
-    eye = np.eye(x.shape[1])
-    for _ in range(40):
-        normal = np.einsum("bri,brj->bij", J, J)
-        scale = np.einsum("bii->bi", normal)
-        scale = np.maximum(scale, 1e-9 * scale.max(axis=1, keepdims=True)) + _TINY
-        normal = normal + (damping[:, None] * scale)[..., None] * eye
-        step = np.linalg.solve(normal, np.einsum("bri,br->bi", J, r)[..., None])[..., 0]
-        r_new, J_new, new = at(x - step)
-        better = new < chi_square
-        x = np.where(better[:, None], x - step, x)
-        r, J = np.where(better[:, None], r_new, r), np.where(better[:, None, None], J_new, J)
-        done = bool(np.all(np.abs(step).max(axis=1) < 1e-10) or np.all(damping >= 1e6))
-        chi_square = np.where(better, new, chi_square)
-        damping = np.where(better, damping / 5, damping * 5).clip(1e-10, 1e6)
-        if done:
-            break
-    return x, chi_square
+    def _residuals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(|…| − a)/σ (B, R) of parameters (B, 1 + 2P), and their derivatives by these."""
+        z = x[:, :1] + effects(x) @ self._T.T
+        size = np.abs(z)
+        along = (z.conj() / np.maximum(size, _TINY))[..., None]
+        J = np.empty((*size.shape, x.shape[1]))
+        J[..., :1], J[..., 1::2], J[..., 2::2] = along.real, (along * self._T).real, -(along * self._T).imag
+        return (size - self._a) / self._s, J / self._s[:, None]
 
+    def _spread(self, x: FloatArray) -> FloatArray:
+        J = self._residuals(x)[1]
+        return np.asarray(np.linalg.inv(np.einsum("bri,brj->bij", J, J) + np.eye(x.shape[1]) / _OPEN**2))
 
-def covariances(weights: ComplexArray, errors: FloatArray, parameters: FloatArray) -> FloatArray:
-    """Of the parameters of each minimum, (B, 1 + 2P, 1 + 2P); what data leave open is wide, not infinite."""
-    J = predicted(weights, parameters)[1] / errors[:, None]
-    return np.asarray(np.linalg.inv(np.einsum("bri,brj->bij", J, J) + np.eye(J.shape[-1]) / _OPEN**2))
+    def _starts(self) -> FloatArray:
+        """Parameters (B, 1 + 2P) near every minimum."""
+        P = self._T.shape[1]
+        if P == 1:
+            places, T = _RADII[:, None] * _ANGLES, self._T[:, 0]
+            grid = misfit(T, self._a, self._s, places)
+            walled = np.pad(grid, ((1, 1), (0, 0)), constant_values=np.inf)
+            around = np.roll(grid, 1, axis=1), np.roll(grid, -1, axis=1), walled[2:], walled[:-2]
+            low = np.all([grid <= other for other in around], axis=0)
+            D = places[low] * np.exp(0.01 + 0.01j)  # off an axis of symmetry, on which saddles lie
+            y = self._a.mean() * np.abs(D) / np.abs(T - D[:, None]).mean(axis=1)
+            return np.column_stack((y, (-y / D).real, (-y / D).imag))
+        one = [0.6 * size * way for size in (0.3, 1.0, 2.0) for way in _ANGLES[::18]]
+        every = np.array(list(product(one, repeat=P)))
+        return np.column_stack((np.full(len(every), 0.6), every.view(np.float64)))
 
-
-def drawn(
-    rng: np.random.Generator,
-    weights: ComplexArray,
-    amplitudes: FloatArray,
-    errors: FloatArray,
-    at: Minima,
-    count: int,
-    dof: float = np.inf,
-) -> FloatArray:
-    """Parameters that the amplitudes allow, drawn around each minimum.
-
-    Parameters
-    ----------
-    rng
-        Random numbers.
-    weights, amplitudes, errors
-        As of `minima`.
-    at
-        The minima.
-    count
-        Draws of each.
-    dof
-        Degrees of freedom of errors that were estimated.
-
-    Returns
-    -------
-    Shape (B, count, 1 + 2P).
-    """
-    X, n = at.parameters, at.parameters.shape[1]
-    root = np.linalg.cholesky(_WIDE * covariances(weights, errors, X))
-    inverse, size = np.linalg.inv(root), np.log(np.einsum("bii->bi", root)).sum(axis=1)
-    shape = len(X), _MORE * count
-    spread = np.sqrt(rng.chisquare(_TAIL, (*shape, 1)) / _TAIL)
-    x = X[:, None] + np.einsum("bij,bkj->bki", root, rng.standard_normal((*shape, n)) / spread)
-    x = x.reshape(-1, n)
-    x = np.where(x[:, :1] < 0, -x, x)
-    chi_square = (((predicted(weights, x)[0] - amplitudes) / errors) ** 2).sum(axis=1)
-    off = np.array([x - X[:, None], -x - X[:, None]])  # both signs are one solution
-    distance = (np.einsum("bij,sbkj->sbki", inverse, off) ** 2).sum(axis=-1).min(axis=0)
-    density = -0.5 * (_TAIL + n) * np.log1p(distance / _TAIL) - size[:, None]
-    excess = chi_square - at.chi_square[0]
-    fit = -0.5 * excess if np.isinf(dof) else -0.5 * (dof + n) * np.log1p(excess.clip(0.0) / dof)
-    effects = (x[:, 1:] ** 2).reshape(len(x), -1, 2).sum(axis=-1)
-    flat = np.log(x[:, 0] + _SMALL) + np.log(effects + _SMALL**2).sum(axis=1)
-    top = density.max(axis=0)
-    log_weight = fit - flat - top - np.log(np.exp(density - top).sum(axis=0))
-    probability = np.exp(log_weight - log_weight.max())
-    belongs = np.argmax(density, axis=0)
-    out = np.repeat(X[:, None], count, axis=1)
-    for b in range(len(X)):
-        share = np.cumsum(np.where(belongs == b, probability, 0.0))
-        if share[-1] > 0:
-            steps = (np.arange(count) + rng.random()) / count * share[-1]
-            chosen = np.searchsorted(share, steps).clip(max=len(x) - 1)
-            out[b] = rng.permutation(x[chosen])
-    return out
+    def _refined(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Minima of χ² from starts (B, 1 + 2P), and χ² there (B,)."""
+        (r, J), damping = self._residuals(x), np.full((len(x), 1), 1e-2)
+        for _ in range(40):
+            normal, eye = np.einsum("bri,brj->bij", J, J), np.eye(x.shape[1])
+            scale = damping * np.maximum(np.einsum("bii->bi", normal), 1e-9)
+            gradient = np.einsum("bri,br->bi", J, r)[..., None]
+            step = np.linalg.solve(normal + scale[..., None] * eye, gradient)[..., 0]
+            r_new, J_new = self._residuals(x - step)
+            better = ((r_new**2).sum(axis=1) < (r**2).sum(axis=1))[:, None]
+            x, r = np.where(better, x - step, x), np.where(better, r_new, r)
+            J = np.where(better[..., None], J_new, J)
+            damping = np.where(better, damping / 5, damping * 5).clip(1e-10, 1e6)
+        return x, (r**2).sum(axis=1)

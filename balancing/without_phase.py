@@ -23,15 +23,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from balancing.amplitudes import Minima, covariances, drawn, minima, misfit, predicted
+from balancing.amplitudes import Amplitudes, Minima, effects, misfit
 from balancing.conditioning import UndeterminedError, chance
-from balancing.conventions import Labels
 from balancing.correction import MountDecision
 from balancing.decision import HARDLY_BELOW
 from balancing.regions import LEVEL, Region, half_width
 from balancing.tables import reading_columns, rms, three_figures, weight_columns
 from balancing.trials import Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import capital, counted, figures, listing, percent
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+    from balancing.conventions import Labels
 
 ASSUMED = 0.1
 """Relative error of an amplitude of a run, where nothing says more."""
@@ -54,10 +54,8 @@ WEAK = 3.0
 """Effect of a trial weight in units of its error: too small below."""
 SHAKING = 1.5
 """A run that is proposed may read so many times the largest run (rms, with 95 %)."""
-_FAR = 1e3
-"""Times the trial weights: a weight that says that nothing is known."""
-_DRAWS, _MOST, _LEAST = 1000, 32, 1e-3
-"""Draws of each solution; solutions kept; least error of a reading, of the largest one of its sensor."""
+_FAR, _DRAWS, _MOST, _LEAST = 1e3, 1000, 32, 1e-3
+"""Largest weight, of the trials'; draws of a solution; solutions; least error, of a sensor's largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +96,30 @@ class AmplitudeSolution:
         return np.vstack((np.quantile(np.abs(self.draws), tails, axis=0), half_width(turned)))
 
 
-class NextRun(NamedTuple):
-    """A run that tells possible solutions apart: `weight` in `plane`, and the amplitudes of one reading.
+class Scatter(NamedTuple):
+    """How amplitudes err, and how the best solution misses them.
 
-    `reading` is its number, `expected` its amplitude by each solution.
+    Attributes
+    ----------
+    relative, origin
+        Relative error of an amplitude of a run; "stated", "assumed" or "estimated".
+    chi_square, dof
+        Misfit of the best solution, and its degrees of freedom.
+    estimated
+        Degrees of freedom of the errors; infinite where they are not estimated.
     """
 
-    plane: str
-    weight: complex
-    reading: int
-    expected: FloatArray
+    relative: float
+    origin: str
+    chi_square: float
+    dof: int
+    estimated: float = np.inf
+
+    def limit(self, n: int, level: float) -> float:
+        """What n numbers may miss, at a level."""
+        from scipy.special import fdtri
+
+        return float(n * fdtri(n, min(self.estimated, 1e9), level))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,21 +129,17 @@ class WithoutPhase(Answered):
     Attributes
     ----------
     trials
-        The runs, of the planes that are corrected.
+        The runs.
     solutions
         All that are possible with 99 %, the best first.
-    scatter
-        How amplitudes err and how the best solution misses them.
-    errors, limit
-        Of each amplitude, (R, N); what of the misfit 95 % allow.
-    in_line
-        Whether the weights of all runs stand in one line.
-    weak
-        Whether no weight changed a reading by more than its errors explain.
+    scatter, errors
+        How amplitudes err and are missed; of each amplitude, (R, N).
     decision
         Whether to mount the weights, and what to do instead.
     next_run
-        What would tell more; None where no run would.
+        Plane and weight of a run that would tell more; None where none would.
+    weak
+        Whether no weight changed a reading by more than its errors explain.
     check, check_bounds
         Check runs, and what they should read at least and at most by the first solution, (2, R, S, C).
     remove
@@ -142,11 +150,9 @@ class WithoutPhase(Answered):
     solutions: tuple[AmplitudeSolution, ...]
     scatter: Scatter
     errors: FloatArray
-    limit: float
-    in_line: bool
-    weak: bool
     decision: MountDecision
-    next_run: NextRun | None
+    next_run: tuple[str, complex] | None
+    weak: bool
     check: Trials | None = None
     check_bounds: FloatArray | None = None
     remove: tuple[str, ...] = ()
@@ -172,36 +178,32 @@ class WithoutPhase(Answered):
         return self.decision.word == "mount"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What contradicts."""
-        return self.decision.warnings
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Further remarks."""
-        return self.decision.notes
+    def as_predicted(self) -> bool:
+        """Whether every amplitude of the check runs lies where it was predicted to."""
+        if self.check is None or self.check_bounds is None:
+            return True
+        (low, high), read = self.check_bounds, np.abs(self.check.mean)
+        return bool(np.all((low <= read) & (read <= high)))
 
     def holds(self, weights: ComplexArray) -> bool:
         """Whether weights (P,) lie in the 95 % region of a solution.
 
         For one plane also where one that leaves nothing misfits by no more than 95 % allow.
         """
-        if any(one.region.holds(weights) for one in self.solutions):
-            return True
-        if len(self.planes) > 1:
-            return False
-        a = np.abs(self.trials.mean).reshape(len(self.trials.runs), -1)
+        if len(self.planes) > 1 or any(one.region.holds(weights) for one in self.solutions):
+            return any(one.region.holds(weights) for one in self.solutions)
+        a, T = np.abs(self.trials.mean).reshape(self.errors.shape), self.trials.weights[:, 0]
         places = np.concatenate([weights, *(one.draws[:, 0] for one in self.solutions)])
-        some = np.flatnonzero(a.any(axis=0))
-        each = [misfit(self.trials.weights[:, 0], a[:, i], self.errors[:, i], places) for i in some]
-        total = np.sum(each, axis=0)
-        return bool(total[0] <= total.min() + self.limit)
+        total = sum(misfit(T, *reading, places) for reading in zip(a.T, self.errors.T, strict=True))
+        return bool(np.min(total) + self.scatter.limit(2, LEVEL) >= np.ravel(total)[0])
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
         labels, first = self.labels, self.solutions[0]
-        after = np.abs(first.before + first.effect @ first.weights) * labels.vibration_scale
-        before, run = first.before * labels.vibration_scale, self.next_run
+        scale = labels.vibration_scale
+        after = np.abs(first.before + first.effect @ first.weights) * scale
+        before, run = first.before * scale, self.next_run
+        readings = *reading_columns(labels, self.trials.speeds, self.trials.sensors), Column("before", before)
         return plain(
             {
                 "judgement": self.decision.to_dict(labels),
@@ -211,28 +213,24 @@ class WithoutPhase(Answered):
                 "corrections": records(self._columns(first)),
                 "solutions": [
                     {
-                        "corrections": records(self._columns(one)),
                         "chi_square": one.chi_square,
                         "left_95": one.left,
+                        "corrections": records(self._columns(one)),
                     }
                     for one in self.solutions
                 ],
-                "residuals": records((*self._readings(), Column("before", before), Column("after", after))),
+                "residuals": records((*readings, Column("after", after))),
                 "amplitudes": records(self._amplitudes()),
                 "rms_before": rms(before),
                 "rms_after": rms(after),
-                "rms_after_95": max(one.left for one in self.solutions) * rms(before),
+                "rms_after_95": self.decision.expected * scale,
                 "chi_square": self.scatter.chi_square,
                 "chi_square_dof": self.scatter.dof,
                 "errors": {"amplitude_percent": 100 * self.scatter.relative, "origin": self.scatter.origin},
-                "weights_in_one_line": self.in_line,
-                "next_run": None
-                if run is None
-                else {"plane": run.plane, "unit": labels.weight_unit, **labels.weight_entry(run.weight)}
-                | {"expected": run.expected * labels.vibration_scale},
-                "check": None if self.check is None else records(self._check_columns()),
-                "warnings": self.warnings,
-                "notes": self.notes,
+                "next_run": None if run is None else {"plane": run[0], **labels.weight_entry(run[1])},
+                "check": None if self.check is None else records(self._check()),
+                "warnings": self.decision.warnings,
+                "notes": self.decision.notes,
             }
         )
 
@@ -242,105 +240,81 @@ class WithoutPhase(Answered):
 
         each = [frame(self._columns(one)).assign(solution=k) for k, one in enumerate(self.solutions, 1)]
         table = pd.concat(each, ignore_index=True)
-        return table[["solution", *(name for name in table if name != "solution")]]
+        return table[["solution", *table.columns[:-1]]]
 
-    def _columns(self, one: AmplitudeSolution) -> tuple[Column, ...]:
-        """plane, mass, unit, angle_deg and their 95 %."""
-        signs = np.array([-1.0 if plane in self.remove else 1.0 for plane in self.planes])
-        low, high, angle = one.intervals()
+    def _columns(self, *solutions: AmplitudeSolution) -> tuple[Column, ...]:
+        """plane, mass, unit, angle_deg and their 95 % of each solution."""
+        removed = np.array([-1.0 if plane in self.remove else 1.0 for plane in self.planes])
+        D = np.concatenate([removed * one.weights for one in solutions])
+        low, high, angle = np.hstack([one.intervals() for one in solutions])
         scale = self.labels.weight_scale
         return (
-            *weight_columns(self.labels, self.planes, signs * one.weights),
+            *weight_columns(self.labels, self.planes * len(solutions), D),
             Column("mass_low", low * scale, lambda mass: figures(mass, 2), title="from"),
             Column("mass_high", high * scale, lambda mass: figures(mass, 2), title="to (95 %)"),
             Column("angle_95_deg", np.degrees(angle), lambda width: f"± {width:.0f}°", title=""),
         )
 
-    def _readings(self) -> tuple[Column, Column]:
-        return reading_columns(self.labels, self.trials.speeds, self.trials.sensors)
-
     def _amplitudes(self) -> tuple[Column, ...]:
         """Every amplitude as it was read, and by the first solution."""
         first = self.solutions[0]
         fitted = np.abs(first.before + self.trials.weights @ first.effect.T)
-        return (*self._of_runs(self.trials), self._vibration("fitted", fitted))
+        return self._read(self.trials, fitted=fitted)
 
-    def _check_columns(self) -> tuple[Column, ...]:
+    def _check(self) -> tuple[Column, ...]:
         """Those of the check runs, and what they should be."""
-        if self.check is None or self.check_bounds is None:
-            return ()
-        low, high = self.check_bounds
-        return (*self._of_runs(self.check), self._vibration("lowest", low), self._vibration("highest", high))
+        assert self.check is not None
+        assert self.check_bounds is not None
+        return self._read(self.check, lowest=self.check_bounds[0], highest=self.check_bounds[1])
 
-    def _of_runs(self, trials: Trials) -> tuple[Column, ...]:
+    def _read(self, trials: Trials, **beside: FloatArray) -> tuple[Column, ...]:
+        """Every amplitude of runs, with others beside."""
         speed, sensor = reading_columns(self.labels, trials.speeds, trials.sensors)
-        R, N = len(trials.runs), len(sensor.values)
+        R, scale = len(trials.runs), self.labels.vibration_scale
+        amplitudes = {"read": np.abs(trials.mean), **beside}
         return (
-            Column("run", np.repeat(trials.runs, N)),
+            Column("run", np.repeat(trials.runs, len(sensor.values))),
             replace(speed, values=tuple(speed.values) * R),
             replace(sensor, values=tuple(sensor.values) * R),
-            self._vibration("read", np.abs(trials.mean)),
+            *(Column(name, of.ravel() * scale, three_figures) for name, of in amplitudes.items()),
         )
-
-    def _vibration(self, name: str, amplitudes: FloatArray) -> Column:
-        return Column(name, amplitudes.ravel() * self.labels.vibration_scale, three_figures)
-
-    @property
-    def as_predicted(self) -> bool:
-        """Whether every amplitude of the check runs lies where it was predicted to."""
-        if self.check is None or self.check_bounds is None:
-            return True
-        read = np.abs(self.check.mean)
-        return bool(np.all((self.check_bounds[0] <= read) & (read <= self.check_bounds[1])))
 
     def sentence(self) -> str:
         """Whether to mount what, or which run to make."""
         if self.check is not None:
-            again = "add it to the runs, with its weights, and balance again"
-            return (
-                f"Check run: as predicted. To trim, {again}."
-                if self.as_predicted
-                else (f"Check run: not as predicted (--table): {again}.")
-            )
+            words = "as predicted" if self.as_predicted else "not as predicted (--table)"
+            return f"Check run: {words}. To go on, add it to the runs, with its weights, and balance again."
         if not self.sound:
             return "\n".join(self.decision.lines())
-        what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount"
-        at = "; ".join(map(self._at, range(len(self.planes)))) if what == "Mount" else "as below"
-        scale = self.labels.vibration_scale
-        before, left = self.decision.before * scale, figures(self.decision.expected * scale, 2)
-        words = f"rms {figures(before, 3)} → below {left} {self.labels.vibration_in}".rstrip()
-        return f"{what} {at}: {words} with 95 %."
-
-    def _at(self, p: int) -> str:
-        return f"{self.labels.weight_at(self.weights[p])} in plane {self.planes[p]!r}"
+        places = zip(self.planes, self.weights, strict=True)
+        at = "; ".join(f"{self.labels.weight_at(weight)} in plane {plane!r}" for plane, weight in places)
+        what = "Remove this material" if set(self.planes) <= set(self.remove) else f"Mount {at}"
+        before, left = (
+            x * self.labels.vibration_scale for x in (self.decision.before, self.decision.expected)
+        )
+        words = f"rms {figures(before, 3)} → below {figures(left, 2)} {self.labels.vibration_in}".rstrip()
+        return f"{what}: {words} with 95 %."
 
     @property
     def answer(self) -> Answer:
         """What to do, every solution with its 95 %, and the amplitudes behind it."""
-        rows: list[tuple[Column, ...]] = [self._columns(one) for one in self.solutions]
-        merged = [
-            Column(each[0].heading, [v for c in each for v in c.values], each[0].shown, title=each[0].title)
-            for each in zip(*rows, strict=True)
-        ]
-        P = len(self.planes)
-        leaves = [f"{100 * one.left:.0f} %" if one.left < 10 else "anything" for one in self.solutions]
-        shown = [name for one in leaves for name in (one, *[""] * (P - 1))]
-        merged.append(Column("left", shown, title="leaves at most"))
-        origin = {"stated": "as stated", "estimated": "estimated from the runs"}.get(
-            self.scatter.origin, "assumed"
-        )
+        left = [f"{100 * one.left:.0f} %" if one.left < 10 else "anything" for one in self.solutions]
+        blank = [""] * (len(self.planes) - 1)
+        leaves = Column("left", [cell for words in left for cell in (words, *blank)], title="leaves at most")
+        origin = {"stated": "as stated", "estimated": "estimated from the runs"}
         caption = (
-            f"{self.labels.turning_in_words()}; amplitudes ± {percent(self.scatter.relative)} % ({origin}), "
-            f"{counted(len(self.solutions), 'solution')}"
+            f"{self.labels.turning_in_words()}; amplitudes ± {percent(self.scatter.relative)} % "
+            f"({origin.get(self.scatter.origin, 'assumed')}), {counted(len(self.solutions), 'solution')}."
         )
+        table = text((*self._columns(*self.solutions), leaves), width=COLUMNS)
         tables = [text(self._amplitudes(), 3)]
         if self.check is not None:
-            tables.append("Check run, 95 % of what was predicted:\n" + text(self._check_columns(), 3))
+            tables.append("Check run, with 95 % of what was predicted:\n" + text(self._check(), 3))
         return Answer(
             self.sentence(),
-            "" if self.weak else f"{text(merged, width=COLUMNS)}\n\n{capital(caption)}.",
-            self.warnings,
-            self.notes,
+            "" if self.weak else f"{table}\n\n{capital(caption)}",
+            self.decision.warnings,
+            self.decision.notes,
             tuple(tables),
             "every amplitude",
             to_mount=True,
@@ -353,42 +327,8 @@ class WithoutPhase(Answered):
         return solutions_figure(self)
 
 
-class _Data(NamedTuple):
-    """Amplitudes (R, N) around 1, errors, weights (R, P) around 1, what they were divided by, how they count.
-
-    `some`: which of all readings they are.
-    """
-
-    a: FloatArray
-    s: FloatArray
-    T: ComplexArray
-    top: FloatArray
-    size: FloatArray
-    rows: FloatArray
-    some: BoolArray
-
-    @property
-    def relative(self) -> FloatArray:
-        """Of amplitudes, (N,)."""
-        return np.asarray((self.s / np.maximum(self.a, self.s)).mean(axis=0))
-
-    def fits(self, within: float, runs: Sequence[int] | slice = slice(None)) -> list[Minima]:
-        """All solutions of each reading."""
-        T, a, s = self.T[runs], self.a[runs], self.s[runs]
-        return [minima(T, a[:, i], s[:, i], within) for i in range(a.shape[1])]
-
-
-class _Choice(NamedTuple):
-    """One solution of each reading: its misfit, how far one weight is from leaving nothing, and which."""
-
-    misfit: float
-    unlike: float
-    which: tuple[int, ...]
-
-
 def balance_without_phase(
     trials: Trials,
-    planes: Sequence[str] | None = None,
     *,
     check: Trials | None = None,
     max_weight: FloatArray | None = None,
@@ -401,12 +341,10 @@ def balance_without_phase(
     ----------
     trials
         Runs; phases of their readings are not used.
-    planes
-        At most two; default: all in which weights were mounted. Runs with weights elsewhere do not count.
     check
-        Check runs, with their weights, to be compared with the first solution.
+        Check runs, to be compared with the first solution; without planes: with its weights.
     max_weight
-        Largest weight of each of these planes, kg or kg·m, (P,).
+        Largest weight of each plane, kg or kg·m, (P,).
     row_weights
         How much each reading counts for the weights, (S, C).
     remove
@@ -422,7 +360,7 @@ def balance_without_phase(
     UndeterminedError
         Too few runs; says which to make.
     ValueError
-        No, or more than two planes, and readings that are all zero.
+        More than two planes, a plane without weights, a sensor that reads nothing.
 
     Examples
     --------
@@ -433,426 +371,292 @@ def balance_without_phase(
     >>> balance_without_phase(trials).weights.round(6)
     array([0.+0.8j])
     """
-    trials, notes = _used(trials, planes)
     _enough(trials)
-    data, scatter, fits, silent = _fitted(trials, row_weights)
-    if silent:
-        notes.append(f"sensor {listing(silent, 'and')} reads 0 in every run, and counts for nothing")
-    if scatter.origin == "assumed":
-        notes.append(
+    R, P = trials.weights.shape
+    a, (errors, relative) = np.abs(trials.mean).reshape(R, -1), _errors(trials)
+    readings = [Amplitudes(trials.weights, *one) for one in zip(a.T, errors.T, strict=True)]
+    fits = [one.minima(60.0) for one in readings]
+    scatter = _scatter(fits, R - 1 - 2 * P, relative)
+    if scatter.origin == "estimated":
+        errors = errors * scatter.relative / ASSUMED
+        readings = [Amplitudes(trials.weights, *one) for one in zip(a.T, errors.T, strict=True)]
+        fits = [Minima(fit.parameters, fit.chi_square * (ASSUMED / scatter.relative) ** 2) for fit in fits]
+    contradiction = _contradiction(trials, a, errors, scatter)
+    weak = all(_clear(one, fit) < WEAK for one, fit in zip(readings, fits, strict=True))
+    limit = scatter.limit(2 * P, POSSIBLE)
+    fits, rows = [fit.within(limit) for fit in fits], np.ones(a.shape[1])
+    rows = rows if row_weights is None else np.ravel(row_weights)
+    chosen, alike = _choices(readings, fits, rows, limit)
+    size = np.abs(trials.weights).max(axis=0)
+    largest = _FAR * size if max_weight is None else np.minimum(max_weight, _FAR * size)
+    rng = np.random.default_rng(0)
+    every = zip(readings, fits, strict=True)
+    draws = [one.drawn(rng, fit, _DRAWS, scatter.estimated) for one, fit in every]
+    solutions, samples = _solutions(fits, draws, chosen, rows, largest)
+    run = _next_run(
+        trials, np.concatenate([one[: _DRAWS // len(samples) + 1] for one in samples]), errors, rows
+    )
+    notes = (
+        [
             f"amplitudes are taken to scatter by {percent(ASSUMED)} % from run to run: state "
             "amplitude_percent in [errors] where it is known"
-        )
-    P = len(trials.planes)
-    limit = _limit(2 * P, scatter.estimated, POSSIBLE)
-    contradiction = _contradiction(trials, data, scatter, fits)
-    weak, in_line = _weak(data, fits), P == 1 and _in_line(trials.weights[:, 0])
-    fits = [Minima(*(of[fit.chi_square <= fit.chi_square[0] + limit] for of in fit)) for fit in fits]
-    chosen, alike = _choices(data, fits, limit)
+        ]
+        if scatter.origin == "assumed"
+        else []
+    )
     if not alike:
         notes.append("no single weight leaves nothing at every reading: the least of all is shown")
-    largest = np.full(P, np.inf) if max_weight is None else np.asarray(max_weight) / data.size
-    rng, every = np.random.default_rng(0), enumerate(fits)
-    draws = [
-        drawn(rng, data.T, data.a[:, i], data.s[:, i], fit, _DRAWS, scatter.estimated) for i, fit in every
-    ]
-    solutions, samples = _solutions(data, fits, chosen, draws, largest)
-    run = _next_run(trials, data, samples, solutions, largest)
-    cause = contradiction and ("measure again", contradiction)
-    if not cause and weak:
-        cause = "do not mount", "the trial weights changed the readings by no more than their errors explain"
-    decision = _decide(trials, solutions, run, cause, notes, in_line=in_line)
-    errors = np.full((len(data.a), data.some.size), np.inf)
-    errors[:, data.some] = data.s * data.top
-    bounds = None if check is None else _bounds(check, trials, data, samples[0], solutions[0].weights)
-    return WithoutPhase(
-        trials=trials,
-        solutions=solutions,
-        scatter=scatter,
-        errors=errors,
-        limit=_limit(2 * P, scatter.estimated, LEVEL),
-        in_line=in_line,
-        weak=weak,
-        decision=decision,
-        next_run=run,
-        check=check,
-        check_bounds=bounds,
-        remove=tuple(remove),
+    decision = _decide(trials, solutions, run, contradiction, weak=weak)
+    bounds = (
+        None if check is None else _bounds(check, trials, samples[0], scatter.relative, solutions[0].weights)
     )
-
-
-class Scatter(NamedTuple):
-    """How amplitudes err, and how the best solution misses them.
-
-    Attributes
-    ----------
-    relative, origin
-        Relative error of an amplitude of a run; "stated", "assumed" or "estimated".
-    chi_square, dof
-        Misfit of the best solution, and its degrees of freedom.
-    estimated
-        Degrees of freedom of the errors; infinite where they are not estimated.
-    """
-
-    relative: float
-    origin: str
-    chi_square: float
-    dof: int
-    estimated: float = np.inf
-
-
-def _fitted(trials: Trials, row_weights: FloatArray | None) -> tuple[_Data, Scatter, list[Minima], list[str]]:
-    """Amplitudes, errors and solutions of each reading, and the sensors that read nothing."""
-    T, R = trials.weights, len(trials.runs)
-    a = np.abs(trials.mean).reshape(R, -1)
-    top, some = a.max(axis=0), np.asarray(a.any(axis=0))
-    if not some.any():
-        raise ValueError("every amplitude is 0: there is nothing to balance")
-    silent = sorted({trials.sensors[i % len(trials.sensors)] for i in np.flatnonzero(~some)})
-    errors, relative = _errors(trials)
-    rows = np.ones(some.size) if row_weights is None else np.ravel(row_weights)
-    a, s, top, rows = (of[..., some] for of in (a, errors.reshape(R, -1), top, rows))
-    size = np.sqrt((np.abs(T) ** 2).sum(axis=0) / (T != 0).sum(axis=0))
-    data = _Data(a / top, np.maximum(s / top, _LEAST), T / size, top, size, rows * top, some)
-    fits = data.fits(60.0)
-    spare = R - 1 - 2 * len(trials.planes)
-    chi_square, dof = float(sum(fit.chi_square[0] for fit in fits)), spare * a.shape[1]
-    if relative is not None or spare < SPARE or not chi_square:
-        origin = "assumed" if relative is None else "stated"
-        return data, Scatter(ASSUMED if relative is None else relative, origin, chi_square, dof), fits, silent
-    factor = float(np.sqrt(chi_square / dof))
-    fits = [Minima(fit.parameters, fit.chi_square / factor**2) for fit in fits]
-    scatter = Scatter(ASSUMED * factor, "estimated", float(dof), dof, dof)
-    return data._replace(s=data.s * factor), scatter, fits, silent
-
-
-def _solutions(
-    data: _Data, fits: list[Minima], chosen: list[_Choice], draws: list[FloatArray], largest: FloatArray
-) -> tuple[tuple[AmplitudeSolution, ...], list[tuple[FloatArray, ComplexArray]]]:
-    """Solutions of the job, and y and w of their draws around 1."""
-    made, samples, mounted = list[AmplitudeSolution](), [], np.zeros(0)
-    for choice in chosen:
-        x = np.array([fits[i].parameters[b] for i, b in enumerate(choice.which)])
-        some = np.array([draws[i][b] for i, b in enumerate(choice.which)]).swapaxes(0, 1)
-        D = _best(x[None], data.rows, largest)[0]
-        mounted = mounted if made else D
-        y, w = some[..., 0], _effects(some)
-        after = np.linalg.norm((y + w @ mounted) * data.rows, axis=1)
-        left = after / np.linalg.norm(y * data.rows, axis=1).clip(1e-300)
-        before, effect = np.zeros(data.some.size), np.zeros((data.some.size, len(D)), dtype=complex)
-        before[data.some] = x[:, 0] * data.top
-        effect[data.some] = _effects(x) * data.top[:, None] / data.size
-        of, bound = _best(some, data.rows, largest) * data.size, float(np.quantile(left, (1 + LEVEL) / 2))
-        made.append(AmplitudeSolution(D * data.size, choice.misfit, before, effect, of, bound))
-        samples.append((y, w))
-    return tuple(made), samples
-
-
-def _effects(parameters: FloatArray) -> ComplexArray:
-    """Complex w (…, P) of parameters (…, 1 + 2P)."""
-    return np.asarray(parameters[..., 1::2] + 1j * parameters[..., 2::2])
-
-
-def _used(trials: Trials, planes: Sequence[str] | None) -> tuple[Trials, list[str]]:
-    """The runs that load no plane but these, and what to say of them."""
-    loaded = [plane for plane, of in zip(trials.planes, trials.weights.T, strict=True) if of.any()]
-    chosen = list(loaded if planes is None else planes)
-    if unknown := [plane for plane in chosen if plane not in loaded]:
-        raise ValueError(f"no run has a weight in plane {listing(map(repr, unknown), 'and')}")
-    if not 1 <= len(chosen) <= 2:
-        raise ValueError(
-            f"without phases one or two planes can be balanced, not {len(chosen)}: choose with --planes"
-        )
-    at = [trials.planes.index(plane) for plane in chosen]
-    other = np.delete(trials.weights, at, axis=1).any(axis=1)
-    notes = (
-        [f"{counted(int(other.sum()), 'run')} with weights in other planes left out"] if other.any() else []
-    )
-    if other.all():
-        raise ValueError("every run has weights in other planes: choose these too")
-    keep = np.flatnonzero(~other)
-
-    def some(array: Any) -> Any:  # noqa: ANN401
-        return None if array is None else np.take(array, keep, axis=array.ndim - 3)
-
-    return replace(
-        trials,
-        runs=tuple(trials.runs[r] for r in keep),
-        planes=tuple(chosen),
-        readings=some(trials.readings),
-        weights=trials.weights[keep][:, at],
-        steps=some(trials.steps),
-        covariance=some(trials.covariance),
-        amplitudes_only=True,
-    ), notes
+    decision = replace(decision, warnings=tuple(trials.warnings), notes=tuple(notes))
+    return WithoutPhase(trials, solutions, scatter, errors, decision, run, weak, check, bounds, tuple(remove))
 
 
 def _enough(trials: Trials) -> None:
-    """Refuse too few runs, with those that are missing."""
+    """Refuse what cannot be solved, with the runs that are missing."""
     T, P = trials.weights, len(trials.planes)
+    if not 1 <= P <= 2 or not T.any(axis=0).all():
+        raise ValueError("without phases one or two planes can be balanced, each with trial weights")
+    silent = ~np.abs(trials.mean).any(axis=(0, 1))
+    if silent.any():
+        raise ValueError(
+            f"sensor {trials.sensors[int(np.argmax(silent))]!r} reads 0 in every run: leave it out"
+        )
     different = len(np.unique(np.round(T / np.abs(T).max(), 9), axis=0))
     if different >= (3 if P == 1 else 7):
         return
-    missing = []
+    missing = [] if (T == 0).all(axis=1).any() else ["the rotor without weights"]
     for plane, of in zip(trials.planes, T.T, strict=True):
-        there = np.unique(np.round(np.angle(of[of != 0]) * 1e6) / 1e6) if of.any() else np.zeros(0)
-        mass = float(np.abs(of).max())
-        for _ in range(3 - len(there)):
-            angles = np.sort(there)
+        angles = np.unique(np.round(np.angle(of[of != 0]), 6))
+        while len(angles) < 3:
             gaps = np.diff([*angles, angles[0] + 2 * np.pi])
             k = int(np.argmax(gaps))
-            there = np.append(there, angles[k] + (gaps[k] / 3 if len(angles) == 1 else gaps[k] / 2))
-            missing.append(f"{trials.labels.weight_at(mass * np.exp(1j * there[-1]))} in plane {plane!r}")
-    if not (T == 0).all(axis=1).any():
-        missing.insert(0, "the rotor without weights")
-    need = "four runs: a baseline and three trial weights"
+            angle = angles[k] + gaps[k] / (3 if len(angles) == 1 else 2)
+            weight = trials.labels.weight_at(np.abs(of).max() * np.exp(1j * angle))
+            angles = np.sort([*angles, angle])
+            missing.append(f"{weight} in plane {plane!r}")
+    need, some = "one plane needs four runs, a baseline and three trial weights", ""
     if P == 2:
-        need = "seven runs: a baseline and three trial weights in each plane"
-    some = "" if P == 1 else ", which leave four solutions at each sensor"
+        need = "two planes need seven runs, a baseline and three trial weights in each"
+        some = ", which leave four solutions at a sensor"
     raise UndeterminedError(
-        f"without phases {'one plane needs' if P == 1 else 'two planes need'} {need}, at directions that "
-        f"span more than 90°; there are {counted(different, 'run')} with different weights{some}. Make the "
-        f"missing {'run' if len(missing) == 1 else 'runs'}: {listing(missing, 'and')}"
+        f"without phases {need}, at directions that span more than 90°; there are {different} with different "
+        f"weights{some}. Missing: {listing(missing, 'and')}"
     )
 
 
 def _errors(trials: Trials) -> tuple[FloatArray, float | None]:
-    """One standard deviation of each amplitude (R, S, C), and the relative one; None: 10 % are assumed."""
+    """One standard deviation of each amplitude (R, N), and the relative one; None: it is assumed."""
     a, n, reading, run = np.abs(trials.mean), trials.repeats, trials.errors, trials.run_errors
     size, floor = (0.0, 0.0) if reading is None else (reading.amplitude, reading.floor)
     between, lowest = (0.0, 0.0) if run is None else run
-    digits = np.zeros(a.shape) if trials.steps is None else np.nanmean(trials.steps[0], axis=0) ** 2 / 12
-    if not any((size, floor, between, lowest)):
-        return np.sqrt((ASSUMED * a) ** 2 + digits), None
-    square = (size**2 / n + between**2) * a**2 + floor**2 / n + lowest**2
-    return np.sqrt(square + digits), float(np.hypot(size, between))
+    unstated = not any((size, floor, between, lowest))
+    square = (
+        ((ASSUMED * a) ** 2) if unstated else (size**2 / n + between**2) * a**2 + floor**2 / n + lowest**2
+    )
+    if trials.steps is not None:
+        square = square + np.nanmean(trials.steps[0], axis=0) ** 2 / 12
+    errors = np.maximum(np.sqrt(square), _LEAST * a.max(axis=0)).reshape(len(a), -1)
+    return errors, None if unstated else float(np.hypot(size, between))
 
 
-def _limit(n: int, dof: float, level: float) -> float:
-    """Of the misfit of n numbers, with errors of so many degrees of freedom."""
-    from scipy.special import fdtri
-
-    return float(n * fdtri(n, min(dof, 1e9), level))
-
-
-def _in_line(T: ComplexArray) -> bool:
-    """Whether places stand in one line."""
-    s = np.linalg.svd(np.column_stack((np.ones(len(T)), T.real, T.imag)) / [1, *[np.abs(T).max()] * 2])[1]
-    return bool(s[-1] < 1e-6 * s[0])
+def _scatter(fits: list[Minima], spare: int, relative: float | None) -> Scatter:
+    """Errors as stated, assumed, or such that the misfit is as large as its degrees of freedom."""
+    chi_square, dof = float(sum(fit.chi_square[0] for fit in fits)), spare * len(fits)
+    if relative is not None:
+        return Scatter(relative, "stated", chi_square, dof)
+    if spare < SPARE or chi_square < 1e-6:
+        return Scatter(ASSUMED, "assumed", chi_square, dof)
+    return Scatter(ASSUMED * float(np.sqrt(chi_square / dof)), "estimated", float(dof), dof, dof)
 
 
-def _choices(data: _Data, fits: list[Minima], limit: float) -> tuple[list[_Choice], bool]:
+def _contradiction(trials: Trials, a: FloatArray, errors: FloatArray, scatter: Scatter) -> str:
+    """Why the amplitudes are none of a linear rotor; empty where they may be."""
+    T, (R, N), estimated = trials.weights, a.shape, scatter.origin == "estimated"
+    unlikely = scatter.dof > 0 and chance(scatter.chi_square, scatter.dof) < CONTRADICTION
+    rest = scatter.dof - N
+    if rest > 0 and (unlikely or estimated):  # does one run contradict all others?
+        without = np.zeros(R)
+        for r in range(R):
+            some = np.arange(R) != r
+            each = (
+                Amplitudes(T[some], *one).minima(0.0) for one in zip(a[some].T, errors[some].T, strict=True)
+            )
+            without[r] = sum(float(fit.chi_square[0]) for fit in each)
+        r = int(np.argmin(without))
+        gain = (scatter.chi_square - without[r]) * rest / max(without[r], 1e-12)
+        if (R * chance(gain, N, rest) < CONTRADICTION) if estimated else chance(without[r], rest) > 1 - LEVEL:
+            return f"run {trials.runs[r]!r} contradicts all others"
+    if not unlikely:
+        return ""
+    loaded = T.any(axis=1)
+    if T.shape[1] == 1 and loaded.sum() == 3 and not loaded.all() and abs(T.sum()) < 1e-3 * np.abs(T).sum():
+        mean, bare = (np.sqrt((a[of] ** 2).mean(axis=0)) for of in (loaded, ~loaded))
+        i = int(np.argmin(mean / bare))
+        if mean[i] < bare[i]:
+            mean_words, bare_words = (trials.labels.amplitude_words(float(of[i])) for of in (mean, bare))
+            return (
+                "the amplitudes are impossible: the root mean square of three equal trials at 120°, "
+                f"{mean_words}, cannot be below the baseline's {bare_words}"
+            )
+    ratio = np.sqrt(scatter.chi_square / scatter.dof)
+    return f"the amplitudes miss every linear rotor by {ratio:.2g} times their errors"
+
+
+def _clear(reading: Amplitudes, fit: Minima) -> float:
+    """The largest effect of a plane in units of its errors, in the best solution."""
+    x, spread = fit.parameters[0], reading.covariances(fit.parameters[:1])[0]
+    error = np.diag(spread)[1:].reshape(-1, 2).mean(axis=1)
+    return float(np.max(np.abs(effects(x)) / np.sqrt(error)))
+
+
+class _Choice(NamedTuple):
+    """One solution of each reading: its misfit, how far one weight is from leaving nothing, and which."""
+
+    misfit: float
+    unlike: float
+    which: tuple[int, ...]
+
+
+def _choices(
+    readings: list[Amplitudes], fits: list[Minima], rows: FloatArray, limit: float
+) -> tuple[list[_Choice], bool]:
     """Solutions of all readings that go together, the best first; whether one weight does for all of them.
 
     A reading is y + w D with the common D; its distance from 0 counts in its errors. The choices are made
     reading by reading, of which the best are kept.
     """
-    P, N = data.T.shape[1], len(fits)
-    spread = [covariances(data.T, data.s[:, i], fit.parameters) for i, fit in enumerate(fits)]
+    P = fits[0].parameters.shape[1] // 2
+    spread = [one.covariances(fit.parameters) for one, fit in zip(readings, fits, strict=True)]
 
     def unlike(which: tuple[int, ...]) -> float:
         if len(which) <= P:
             return 0.0
         x = np.array([fits[i].parameters[b] for i, b in enumerate(which)])
-        D = _best(x[None], data.rows[: len(which)], np.full(P, np.inf))[0]
-        left = x[:, 0] + (x[:, 1::2] + 1j * x[:, 2::2]) @ D
+        D = _best(x[None], rows[: len(which)])[0]
+        left, total = x[:, 0] + effects(x) @ D, 0.0
         G = np.zeros((2, 1 + 2 * P))
         G[0, 0], G[0, 1::2], G[0, 2::2], G[1, 1::2], G[1, 2::2] = 1.0, D.real, -D.imag, D.imag, D.real
-        total = 0.0
         for i, b in enumerate(which):
             r = np.array([left[i].real, left[i].imag])
-            total += float(r @ np.linalg.solve(G @ spread[i][b] @ G.T + 1e-12 * np.eye(2), r))
+            total += float(r @ np.linalg.pinv(G @ spread[i][b] @ G.T) @ r)
         return total
 
     kept = [_Choice(0.0, 0.0, ())]
     for fit in fits:
-        longer = []
-        for choice in kept:
-            for b, chi_square in enumerate(fit.chi_square):
-                which = (*choice.which, b)
-                longer.append(_Choice(choice.misfit + float(chi_square), unlike(which), which))
+        longer = [
+            _Choice(choice.misfit + float(more), unlike((*choice.which, b)), (*choice.which, b))
+            for choice in kept
+            for b, more in enumerate(fit.chi_square)
+        ]
         kept = sorted(longer, key=lambda one: one.misfit + one.unlike)[:_MOST]
-    alike = chance(kept[0].unlike, 2 * (N - P)) >= CONTRADICTION
-    if not alike:
-        kept.sort(key=lambda one: one.misfit)
-    least = kept[0].misfit + alike * kept[0].unlike
-    return [one for one in kept if one.misfit + alike * one.unlike <= least + limit], alike
+    alike = chance(kept[0].unlike, 2 * (len(fits) - P)) >= CONTRADICTION
+    costs = [one.misfit + alike * one.unlike for one in kept]
+    order = sorted(range(len(kept)), key=costs.__getitem__)
+    return [kept[k] for k in order if costs[k] <= min(costs) + limit], alike
 
 
-def _best(x: FloatArray, rows: FloatArray, largest: FloatArray) -> ComplexArray:
+def _best(x: FloatArray, rows: FloatArray, largest: FloatArray | None = None) -> ComplexArray:
     """Weights (n, P) that leave least, by parameters (n, N, 1 + 2P), within the largest ones (P,)."""
-    y, w = x[..., 0] * rows, (x[..., 1::2] + 1j * x[..., 2::2]) * rows[:, None]
-    A = np.einsum("nip,niq->npq", w.conj(), w)
-    b = -np.einsum("nip,ni->np", w.conj(), y)
-    eye = np.eye(A.shape[-1])
-    trace = np.einsum("npp->n", A.real)[:, None, None]
-    D = np.linalg.solve(A + (1e-9 * trace + 1e-300) * eye, b[..., None])[..., 0]
-    D *= np.minimum(1.0, _FAR / np.maximum(np.abs(D), 1e-300))
-    if np.isinf(largest).all():
+    y, w = x[..., 0] * rows, effects(x) * rows[:, None]
+    A, b = np.einsum("nip,niq->npq", w.conj(), w), -np.einsum("nip,ni->np", w.conj(), y)
+    ridge = 1e-9 * np.einsum("npp->np", A.real)[..., None] * np.eye(A.shape[-1])
+    D = np.linalg.solve(A + ridge + 1e-300 * np.eye(A.shape[-1]), b[..., None])[..., 0]
+    if largest is None or (np.abs(D) <= largest).all():
         return np.asarray(D)
-    for _ in range(100 if len(eye) > 1 else 1):  # a plane at a time: what is left is convex
-        for p in range(len(eye)):
-            of = A[:, p, p].real + 1e-300
-            D[:, p] = (b[:, p] - np.einsum("nq,nq->n", A[:, p], D) + A[:, p, p] * D[:, p]) / of
+    for _ in range(50):  # a plane at a time: what is left is convex
+        for p in range(len(largest)):
+            rest = b[:, p] - np.einsum("nq,nq->n", A[:, p], D) + A[:, p, p] * D[:, p]
+            D[:, p] = rest / np.maximum(A[:, p, p].real, 1e-300)
             D[:, p] *= np.minimum(1.0, largest[p] / np.maximum(np.abs(D[:, p]), 1e-300))
     return np.asarray(D)
 
 
-def _odd_run(data: _Data, scatter: Scatter, unknowns: int) -> int | None:
-    """The run that contradicts all others, if one does."""
-    (R, N), chi_square, estimated = data.a.shape, scatter.chi_square, np.isfinite(scatter.estimated)
-    rest = N * (R - 1 - unknowns)
-    if rest < 1 or (not estimated and chance(chi_square, scatter.dof) >= CONTRADICTION):
-        return None
-    others = ([q for q in range(R) if q != r] for r in range(R))
-    without = [sum(float(fit.chi_square[0]) for fit in data.fits(0.0, runs)) for runs in others]
-    r = int(np.argmin(without))
-    if not estimated:
-        return r if chance(without[r], rest) > 1 - LEVEL else None
-    gain = (chi_square - without[r]) * rest / max(without[r], 1e-12)
-    return r if R * chance(gain, N, rest) < CONTRADICTION else None
-
-
-def _contradiction(trials: Trials, data: _Data, scatter: Scatter, fits: list[Minima]) -> str:
-    """Why the amplitudes are none of a linear rotor; empty where they may be."""
-    odd = _odd_run(data, scatter, 1 + 2 * len(trials.planes))
-    if odd is not None:
-        return f"run {trials.runs[odd]!r} contradicts all others"
-    if scatter.dof <= 0 or chance(scatter.chi_square, scatter.dof) >= CONTRADICTION:
-        return ""
-    a, T = np.abs(trials.mean).reshape(len(trials.runs), -1), trials.weights
-    loaded = (T != 0).any(axis=1)
-    around = T[loaded]
-    if (
-        T.shape[1] == 1
-        and len(around) == 3
-        and (~loaded).any()
-        and abs(around.sum()) < 1e-3 * np.abs(around).sum()
-    ):
-        mean, bare = (np.sqrt((a[of] ** 2).mean(axis=0)) for of in (loaded, ~loaded))
-        i = int(np.argmin(mean / np.maximum(bare, 1e-300)))
-        if mean[i] < bare[i]:
-            words = trials.labels.amplitude_words
-            return (
-                f"the amplitudes are impossible: the root mean square of three equal trials at 120°, "
-                f"{words(float(mean[i]))}, cannot be below the baseline's {words(float(bare[i]))}"
-            )
-    off = np.array(
-        [
-            (predicted(data.T, fit.parameters[:1])[0][0] - data.a[:, i]) / data.s[:, i]
-            for i, fit in enumerate(fits)
-        ]
-    )
-    r = int(np.argmax((off**2).sum(axis=0)))
-    ratio, run = np.sqrt(scatter.chi_square / scatter.dof), trials.runs[r]
-    return f"the amplitudes miss every linear rotor by {ratio:.2g} times their errors, run {run!r} most"
-
-
-def _weak(data: _Data, fits: list[Minima]) -> bool:
-    """Whether no weight changed a reading by more than its errors explain."""
-    clear = 0.0
-    for i, fit in enumerate(fits):
-        x, spread = fit.parameters[0], covariances(data.T, data.s[:, i], fit.parameters[:1])[0]
-        for p in range(data.T.shape[1]):
-            at = slice(1 + 2 * p, 3 + 2 * p)
-            clear = max(clear, float(np.linalg.norm(x[at]) / np.sqrt(np.trace(spread[at, at]) / 2)))
-    return clear < WEAK
+def _solutions(
+    fits: list[Minima], draws: list[FloatArray], chosen: list[_Choice], rows: FloatArray, largest: FloatArray
+) -> tuple[tuple[AmplitudeSolution, ...], list[FloatArray]]:
+    """Solutions of the job, and the parameters of their draws, (n, N, 1 + 2P)."""
+    made, samples, mounted = list[AmplitudeSolution](), list[FloatArray](), np.zeros(0, dtype=complex)
+    for choice in chosen:
+        x = np.array([fits[i].parameters[b] for i, b in enumerate(choice.which)])
+        some = np.array([draws[i][b] for i, b in enumerate(choice.which)]).swapaxes(0, 1)
+        D = _best(x[None], rows, largest)[0]
+        mounted = mounted if made else D
+        after = np.linalg.norm((some[..., 0] + effects(some) @ mounted) * rows, axis=1)
+        left = after / np.linalg.norm(some[..., 0] * rows, axis=1).clip(1e-300)
+        bound = float(np.quantile(left, (1 + LEVEL) / 2))
+        spread = _best(some, rows, largest)
+        made.append(AmplitudeSolution(D, choice.misfit, x[:, 0], effects(x), spread, bound))
+        samples.append(some)
+    return tuple(made), samples
 
 
 def _next_run(
-    trials: Trials,
-    data: _Data,
-    samples: list[tuple[FloatArray, ComplexArray]],
-    solutions: Sequence[AmplitudeSolution],
-    largest: FloatArray,
-) -> NextRun | None:
-    """The weight of one plane at which possible amplitudes differ most, in their errors."""
-    share = max(_DRAWS // len(samples), 1)
-    y = np.concatenate([one[0][:share] for one in samples])
-    w = np.concatenate([one[1][:share] for one in samples])
-    most = SHAKING * float(np.sqrt(((data.a * data.rows) ** 2).sum(axis=1).max()))
-    best: tuple[float, int, complex, int] | None = None
-    for p in range(data.T.shape[1]):
+    trials: Trials, draws: FloatArray, errors: FloatArray, rows: FloatArray
+) -> tuple[str, complex] | None:
+    """The plane and the weight at which possible amplitudes differ most, in their errors."""
+    a, y, w = np.abs(trials.mean).reshape(errors.shape), draws[..., 0], effects(draws)
+    most = SHAKING * np.linalg.norm(a * rows, axis=1).max()
+    relative, best, told = (errors / np.maximum(a, errors)).mean(axis=0), None, 0.0
+    for p, plane in enumerate(trials.planes):
+        size = np.abs(trials.weights[:, p]).max()
         for way in np.exp(2j * np.pi * np.arange(24) / 24):
-            weight = min(1.0, float(largest[p])) * way
-            read = np.abs(y + w[..., p] * weight)
-            if np.quantile(np.sqrt(((read * data.rows) ** 2).sum(axis=1)), LEVEL) > most:
-                continue
-            tell = read.var(axis=0) / ((data.relative * read.mean(axis=0)) ** 2 + data.s.min(axis=0) ** 2)
-            if best is None or tell.sum() > best[0]:
-                best = float(tell.sum()), p, complex(weight), int(np.argmax(tell))
-    if best is None:
-        return None
-    _, p, weight, i = best
-    i, weight = int(np.flatnonzero(data.some)[i]), weight * data.size[p]
-    expected = np.array([abs(one.before[i] + one.effect[i, p] * weight) for one in solutions])
-    return NextRun(trials.planes[p], weight, i, expected)
+            read = np.abs(y + w[..., p] * size * way)
+            tell = (read.var(axis=0) / ((relative * read.mean(axis=0)) ** 2 + errors.min(axis=0) ** 2)).sum()
+            if tell > told and np.quantile(np.linalg.norm(read * rows, axis=1), LEVEL) <= most:
+                told, best = float(tell), (plane, complex(size * way))
+    return best
 
 
 def _decide(
     trials: Trials,
     solutions: Sequence[AmplitudeSolution],
-    run: NextRun | None,
-    wrong: tuple[Any, str] | Literal[""],
-    notes: Sequence[str],
+    run: tuple[str, complex] | None,
+    contradiction: str,
     *,
-    in_line: bool,
+    weak: bool,
 ) -> MountDecision:
     """Mount what leaves less than 0.9 of the present vibration by every possible solution."""
     before, labels = rms(solutions[0].before), trials.labels
-    expected = before * max(one.left for one in solutions)
-    instead, cause = list[str](), ""
-    word: Literal["mount", "do not mount", "measure again"] = "do not mount"
-    if wrong:
-        word, cause = wrong
-        again = word == "measure again"
-        instead = [
-            "Measure these runs again, or mend the table."
-            if again
-            else "Repeat the runs with heavier weights."
-        ]
+    expected, T = before * max(one.left for one in solutions), trials.weights[:, 0]
+    word: Literal["do not mount", "measure again"] = "do not mount"
+    if contradiction:
+        word, cause, instead = "measure again", contradiction, "Measure these runs again, or mend the table."
+    elif weak:
+        cause = "the trial weights changed the readings by no more than their errors explain"
+        instead = "Repeat the runs with heavier weights."
     elif expected < HARDLY_BELOW * before:
-        word = "mount"
+        return MountDecision(before=before, expected=expected)
     else:
         cause = f"they may leave rms {labels.amplitude_words(float(f'{expected:.2g}'))} (95 %)"
         if len(solutions) > 1:
             cause = f"{counted(len(solutions), 'solution')} explain the readings"
-        if in_line:
+        off = np.linalg.svd(
+            np.column_stack((np.ones(len(T)), np.array([T.real, T.imag]).T / np.abs(T).max()))
+        )[1]
+        if len(trials.planes) == 1 and off[-1] < 1e-6 * off[0]:
             cause = "the weights of all runs stand in one line, and its two sides cannot be told apart"
-        if run is not None:
-            words = f"Make this run: {labels.weight_at(run.weight)} in plane {run.plane!r} alone"
-            if len(solutions) == 2:
-                one, other = map(labels.amplitude_words, sorted(map(float, run.expected)))
-                words += (
-                    f"; {trials.sensors[run.reading % len(trials.sensors)]} then reads about {one} or {other}"
-                )
-            instead.append(f"{words}.")
-    made = MountDecision(word, cause, tuple(instead), before, expected)
-    return replace(made, warnings=tuple(trials.warnings), notes=tuple(notes))
+        instead = (
+            "" if run is None else f"Make this run: {labels.weight_at(run[1])} in plane {run[0]!r} alone."
+        )
+    return MountDecision(word, cause, (instead,) if instead else (), before, expected)
 
 
 def _bounds(
-    check: Trials,
-    trials: Trials,
-    data: _Data,
-    sample: tuple[FloatArray, ComplexArray],
-    proposed: ComplexArray,
+    check: Trials, trials: Trials, draws: FloatArray, relative: float, proposed: ComplexArray
 ) -> FloatArray:
     """Lowest and highest amplitude that check runs should show, jointly with 95 %, (2, R, S, C)."""
-    weights = np.zeros((len(check.runs), len(trials.planes)), dtype=complex)
-    for p, plane in enumerate(trials.planes):
-        if not check.planes:
-            weights[:, p] = proposed[p] / data.size[p]
-        elif plane in check.planes:
-            weights[:, p] = check.weights[:, check.planes.index(plane)] / data.size[p]
-    y, w = sample
-    read = np.abs(y[:, None] + np.einsum("nip,rp->nri", w, weights))
-    rng, least = np.random.default_rng(1), data.s.min(axis=0)
-    read = np.abs(read + rng.standard_normal(read.shape) * np.hypot(data.relative * read, least)) * data.top
+    R, mounted = len(check.runs), dict(zip(check.planes, check.weights.T, strict=True))
+    usual = np.zeros_like(proposed) if check.planes else proposed
+    planes = zip(trials.planes, usual, strict=True)
+    D = np.array([mounted.get(plane, np.full(R, weight)) for plane, weight in planes])
+    read = np.abs(draws[:, None, :, 0] + np.einsum("nip,pr->nri", effects(draws), D))
+    least = _LEAST * np.abs(trials.mean).max(axis=0).ravel()
+    noise = np.random.default_rng(1).standard_normal(read.shape)
+    read = np.abs(read + noise * np.hypot(relative * read, least))
     tail = (1 - LEVEL) / 2 / read[0].size
-    bounds = np.zeros((2, len(check.runs), data.some.size))
-    bounds[:, :, data.some] = np.quantile(read, [tail, 1 - tail], axis=0)
-    each = bounds.reshape(2, -1, len(trials.speeds), len(trials.sensors))
+    bounds = np.quantile(read, [tail, 1 - tail], axis=0).reshape(2, R, len(trials.speeds), -1)
     speeds = [int(np.argmin(np.abs(trials.speeds - speed))) for speed in check.speeds]
-    sensors = [trials.sensors.index(sensor) for sensor in check.sensors]
-    return np.asarray(each[:, :, speeds][..., sensors])
+    return np.asarray(bounds[:, :, speeds][..., [trials.sensors.index(sensor) for sensor in check.sensors]])
