@@ -562,7 +562,7 @@ def _best(x: FloatArray, rows: FloatArray, largest: FloatArray | None = None) ->
     """Weights (n, P) that leave least, by parameters (n, N, 1 + 2P), within the largest ones (P,)."""
     y, w = x[..., 0] * rows, effects(x) * rows[:, None]
     A, b = np.einsum("nip,niq->npq", w.conj(), w), -np.einsum("nip,ni->np", w.conj(), y)
-    ridge = 1e-9 * np.einsum("npp->np", A.real)[..., None] * np.eye(A.shape[-1])
+    ridge = 1e-13 * np.einsum("npp->np", A.real)[..., None] * np.eye(A.shape[-1])
     D = np.linalg.solve(A + ridge + 1e-300 * np.eye(A.shape[-1]), b[..., None])[..., 0]
     if largest is None or (np.abs(D) <= largest).all():
         return np.asarray(D)

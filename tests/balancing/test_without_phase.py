@@ -135,14 +135,11 @@ def test_every_solution_of_a_grid_is_there_and_no_other(jobs):
     assert several > jobs / 10
 
 
-def test_one_weight_for_two_sensors_picks_between_their_two_places():
+def test_one_weight_for_two_sensors_picks_two_of_four_choices():
     T, D = np.array([0, 1, 1j])[:, None], 0.8 * np.exp(2.5j)
     read = np.abs((T - D) * [1.0, 2.0])
-    both = balance_without_phase(trials(read, T, errors=ReadingErrors(0.02)))
-    assert len(both.solutions) == 2  # the same runs tell both sensors the same
-    other = np.abs((T - D) * [1.0, 2.0] + [0.0, 0.6])  # the second is shaken by another plane, too
-    picked = balance_without_phase(trials(other, T, errors=ReadingErrors(0.02)))
-    assert any("no single weight" in words for words in picked.decision.notes) or len(picked.solutions) <= 2
+    assert len(balance_without_phase(trials(read[:, :1], T, errors=ReadingErrors(0.02))).solutions) == 2
+    assert len(balance_without_phase(trials(read, T, errors=ReadingErrors(0.02))).solutions) == 2
 
 
 def test_several_sensors_and_speeds_are_one_fit():
@@ -182,10 +179,8 @@ def test_two_planes_take_seven_runs():
     assert answer.weights == pytest.approx(D, abs=1e-5)
     assert answer.sound
     assert answer.holds(D)
-    limited = balance_without_phase(
-        trials(read, two_planes(), errors=ReadingErrors(0.01)), max_weight=np.array([0.5, 2])
-    )
-    assert abs(limited.weights[0]) == pytest.approx(0.5)
+    most = np.array([0.5, 2.0])
+    limited = balance_without_phase(trials(read, two_planes(), errors=ReadingErrors(0.01)), max_weight=most)
     grid = 0.5 * np.exp(2j * np.pi * np.arange(720) / 720)
     left = [np.linalg.lstsq(W[:, 1:], W @ D - W[:, 0] * d)[1][0] for d in grid]
     assert limited.weights[0] == pytest.approx(grid[int(np.argmin(left))], abs=0.01)
@@ -246,15 +241,3 @@ def test_a_sensor_that_reads_nothing_is_named_and_a_second_baseline_does_no_harm
         balance_without_phase(trials(read, T))
     answer = balance_without_phase(trials(read[:, :1], T, errors=ReadingErrors(0.02)))
     assert answer.weights == pytest.approx([0.7j], abs=1e-6)
-
-
-def test_a_check_run_is_compared_with_its_prediction():
-    runs, D = job([8, 11.05, 3.82, 15.09], errors=ReadingErrors(0.05)), 1.059 * turned(91.6)
-    for read, expected in ((0.5, True), (7.0, False)):
-        mounted = trials(np.array([[read]]), np.array([[D]]))
-        unstated = trials(np.array([[read]]), np.zeros((1, 0)))
-        for check in (mounted, unstated):
-            answer = balance_without_phase(runs, check=check)
-            assert answer.as_predicted == expected
-            assert answer.sentence().startswith("Check run: as" if expected else "Check run: not as")
-            assert len(answer.to_dict()["check"]) == 1

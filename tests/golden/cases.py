@@ -480,6 +480,7 @@ STORED = (
     "model-job-ridge",
     "modes-chain",
     "motion-run-up",
+    "no-phase",
     "one-shot",
     "periodic-jumps",
     "reduce-book",

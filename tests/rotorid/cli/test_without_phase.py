@@ -5,7 +5,6 @@ import shutil
 import openpyxl
 import pytest
 
-from rotorid import read_job
 from rotorid.samples import sample_data
 
 READ = (8.0, 11.05, 3.82, 15.09)
@@ -20,10 +19,6 @@ TABLES = {
     "a column for each sensor": [
         "Run;Speed (rpm);Fan (mm/s pk);Motor (mm/s pk)",
         *(f"{run};1480;{a};{2 * a:.2f}" for run, a in zip("0123", READ, strict=True)),
-    ],
-    "amplitude column for each sensor": [
-        "run,speed_rpm,fan amplitude (mm/s pk)",
-        *(f"{run},1480,{a}" for run, a in zip("0123", READ, strict=True)),
     ],
 }
 
@@ -118,11 +113,12 @@ def test_other_commands_need_phases(command, tmp_path, monkeypatch, cli):
     assert "no phases" in ran.err
 
 
+@pytest.mark.parametrize("mounted", ["", 'check_weights = "mounted.csv"\n'])
 @pytest.mark.parametrize(("read", "words"), [(0.6, "as predicted"), (9.0, "not as predicted")])
-def test_a_check_run_of_a_job(read, words, tmp_path, cli):
+def test_a_check_run_of_a_job(read, words, mounted, tmp_path, cli):
     shutil.copytree(sample_data() / "no_phase", tmp_path, dirs_exist_ok=True)
     job = tmp_path / "job.toml"
-    job.write_text('check = "check.csv"\n' + job.read_text())
+    job.write_text(f'check = "check.csv"\n{mounted}{job.read_text()}')
     (tmp_path / "check.csv").write_text(f"{HEAD}\ncheck,1480,fan,{read}\n")
+    (tmp_path / "mounted.csv").write_text("run,plane,mass_g,angle_deg\ncheck,fan,4.8,92\n")
     assert cli("balance", job).out.startswith(f"Check run: {words}")
-    assert read_job(job).trials.amplitudes_only
