@@ -54,6 +54,10 @@ WEAK = 3.0
 """Effect of a trial weight in units of its error: too small below."""
 SHAKING = 1.5
 """A run that is proposed may read so many times the largest run (rms, with 95 %)."""
+_UNLIKE = 1e-4
+"""Chance below which no single weight leaves nothing at every reading."""
+_NEAR = 0.25
+"""Solutions whose weights differ by less, of their size, are shown as one, with the draws of both."""
 _FAR, _DRAWS, _MOST, _LEAST = 1e3, 1000, 32, 1e-3
 """Largest weight, of the trials'; draws of a solution; solutions; least error, of a sensor's largest."""
 
@@ -386,7 +390,7 @@ def balance_without_phase(
     limit = scatter.limit(2 * P, POSSIBLE)
     fits, rows = [fit.within(limit) for fit in fits], np.ones(a.shape[1])
     rows = rows if row_weights is None else np.ravel(row_weights)
-    chosen, alike = _choices(readings, fits, rows, limit)
+    chosen = _choices(readings, fits, rows, limit)
     size = np.abs(trials.weights).max(axis=0)
     largest = _FAR * size if max_weight is None else np.minimum(max_weight, _FAR * size)
     rng = np.random.default_rng(0)
@@ -404,8 +408,6 @@ def balance_without_phase(
         if scatter.origin == "assumed"
         else []
     )
-    if not alike:
-        notes.append("no single weight leaves nothing at every reading: the least of all is shown")
     decision = _decide(trials, solutions, run, contradiction, weak=weak)
     bounds = (
         None if check is None else _bounds(check, trials, samples[0], scatter.relative, solutions[0].weights)
@@ -520,13 +522,11 @@ class _Choice(NamedTuple):
     which: tuple[int, ...]
 
 
-def _choices(
-    readings: list[Amplitudes], fits: list[Minima], rows: FloatArray, limit: float
-) -> tuple[list[_Choice], bool]:
-    """Solutions of all readings that go together, the best first; whether one weight does for all of them.
+def _choices(readings: list[Amplitudes], fits: list[Minima], rows: FloatArray, limit: float) -> list[_Choice]:
+    """Solutions of all readings that go together, the best first.
 
-    A reading is y + w D with the common D; its distance from 0 counts in its errors. The choices are made
-    reading by reading, of which the best are kept.
+    A reading is y + w D with the common D; where one weight may leave nothing anywhere, its distance from 0
+    counts in its errors. The choices are made reading by reading, of which the best are kept.
     """
     P = fits[0].parameters.shape[1] // 2
     spread = [one.covariances(fit.parameters) for one, fit in zip(readings, fits, strict=True)]
@@ -552,10 +552,10 @@ def _choices(
             for b, more in enumerate(fit.chi_square)
         ]
         kept = sorted(longer, key=lambda one: one.misfit + one.unlike)[:_MOST]
-    alike = chance(kept[0].unlike, 2 * (len(fits) - P)) >= CONTRADICTION
+    alike = chance(kept[0].unlike, 2 * (len(fits) - P)) >= _UNLIKE
     costs = [one.misfit + alike * one.unlike for one in kept]
     order = sorted(range(len(kept)), key=costs.__getitem__)
-    return [kept[k] for k in order if costs[k] <= min(costs) + limit], alike
+    return [kept[k] for k in order if costs[k] <= min(costs) + limit]
 
 
 def _best(x: FloatArray, rows: FloatArray, largest: FloatArray | None = None) -> ComplexArray:
@@ -588,7 +588,14 @@ def _solutions(
         left = after / np.linalg.norm(some[..., 0] * rows, axis=1).clip(1e-300)
         bound = float(np.quantile(left, (1 + LEVEL) / 2))
         spread = _best(some, rows, largest)
-        made.append(AmplitudeSolution(D, choice.misfit, x[:, 0], effects(x), spread, bound))
+        one = AmplitudeSolution(D, choice.misfit, x[:, 0], effects(x), spread, bound)
+        off = [np.linalg.norm(D - other.weights) / np.linalg.norm(other.weights) for other in made]
+        if made and min(off) < _NEAR:
+            k, other = int(np.argmin(off)), made[int(np.argmin(off))]
+            both = np.concatenate((other.draws, spread))
+            made[k] = replace(other, draws=both, left=max(other.left, bound))
+            continue
+        made.append(one)
         samples.append(some)
     return tuple(made), samples
 
