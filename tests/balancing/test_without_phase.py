@@ -78,13 +78,10 @@ def test_amplitudes_of_a_published_case_contradict_themselves_as_much_as_it_says
         assert (answer.decision.word == "measure again") == flagged
 
 
-@pytest.mark.parametrize(
-    ("read", "word"), [((7, 4, 3.5, 5), "cannot be below the baseline's 7"), ((1, 9, 9, 1), "")]
-)
-def test_impossible_amplitudes_are_named(read, word):
-    answer = balance_without_phase(job(read))
+def test_impossible_amplitudes_are_named():
+    answer = balance_without_phase(job((7, 4, 3.5, 5)))
     assert answer.decision.word == "measure again"
-    assert word in answer.decision.cause
+    assert "cannot be below the baseline's 7 " in answer.decision.cause
 
 
 def brute(T, a, s):
