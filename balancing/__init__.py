@@ -56,6 +56,7 @@ from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
 from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction, verdict_of_readings
 from balancing.what_if import WhatIf, what_if
+from balancing.without_phase import AmplitudeSolution, WithoutPhase, balance_without_phase
 from balancing.zones import Zones, zones_of
 
 __all__ = [
@@ -63,6 +64,7 @@ __all__ = [
     "METHODS",
     "TRIAL_WEIGHTS",
     "UNBALANCE_METHODS",
+    "AmplitudeSolution",
     "CheckComparison",
     "Conditioning",
     "ConventionTest",
@@ -94,8 +96,10 @@ __all__ = [
     "Unknowns",
     "Verdict",
     "WhatIf",
+    "WithoutPhase",
     "Zones",
     "after_check_run",
+    "balance_without_phase",
     "change_of_run",
     "check_runs",
     "combine",

@@ -311,7 +311,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     vectors += [] if check is None else [check.weights]
     machine = units.vibration(trials.labels.vibration_unit).kind == "unbalance"  # phases are angles then
     matters = {"phase": not machine, "angles": machine or any(np.imag(each).any() for each in vectors)}
-    labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
+    matters = {} if trials.amplitudes_only else matters  # they tell no direction of turning, and need none
+    labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters.get(name)))
     return Job(
         trials=replace(trials, labels=labels),
         influence=None if influence is None else replace(influence, labels=labels),
