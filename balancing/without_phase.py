@@ -38,7 +38,6 @@ from rotorid.base.text import capital, counted, figures, listing, percent
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from balancing.conventions import Labels
 
@@ -323,12 +322,6 @@ class WithoutPhase(Answered):
             "every amplitude",
             to_mount=True,
         )
-
-    def figure(self) -> Figure:
-        """Polar picture of the solutions with their regions and the weights of the runs."""
-        from balancing.plots.polar import solutions_figure
-
-        return solutions_figure(self)
 
 
 def balance_without_phase(

@@ -45,7 +45,7 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> BalanceWithoutP
     ValueError
         For options that need phases, all in one message; UndeterminedError.
     """
-    from balancing import balance_without_phase
+    from balancing import balance_without_phase, plots
 
     if given := [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]:
         raise ValueError(f"the runs have no phases: leave {listing(given, 'and')} away")
@@ -64,5 +64,6 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> BalanceWithoutP
 
     made = provenance(job.files, options)
     files = {".json": coefficients, "influence.csv": coefficients}
-    plain = outcome_of(result, made, files=files, title="Balancing without phases")
+    pictures = {"": lambda: plots.solutions_figure(result)}
+    plain = outcome_of(result, made, files=files, pictures=pictures, title="Balancing without phases")
     return BalanceWithoutPhase(**vars(plain), job=job)
