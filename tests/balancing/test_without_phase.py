@@ -105,10 +105,10 @@ def drawn_job(rng):
     """Weights at random places, exact or with scatter."""
     R = int(rng.integers(3, 8))
     T = np.concatenate(([0], np.exp(rng.uniform(-0.5, 0.5, R - 1) + 2j * np.pi * rng.random(R - 1))))
-    if rng.random() < 0.2:
-        T = T.real + 0j
-    D = np.exp(rng.uniform(-1, 1) + 2j * np.pi * rng.random())
-    a = np.abs(T - D) * (1 + rng.choice([0.0, 0.1]) * rng.standard_normal(R))
+    D, scatter = np.exp(rng.uniform(-1, 1) + 2j * np.pi * rng.random()), rng.choice([0.0, 0.1])
+    if rng.random() < 0.2:  # in one line, and the place off it: on it χ² has kinks
+        T, D, scatter = T.real + 0j, np.abs(D) * np.exp(1j * rng.uniform(0.4, 2.7)), 0.0
+    a = np.abs(T - D) * (1 + scatter * rng.standard_normal(R))
     return T, np.abs(a) / np.abs(a).max(), D
 
 
