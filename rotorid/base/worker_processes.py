@@ -11,8 +11,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 
 def worker_pool(workers: int) -> Executor:
     """So many processes, started alike on every system, which end with this one."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent)
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent)
 
 
 def _end_with_parent() -> None:
