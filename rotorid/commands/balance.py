@@ -10,21 +10,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import LINES, Answer, together
+from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
 from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
 from rotorid.commands.balance_solution import (
     choices,
+    coefficients_of,
     job_of,
     solve,
+    special,
     with_other_conventions,
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
-from rotorid.commands.quantities import one_of
-from rotorid.commands.special_runs import special
+from rotorid.commands.model_places import next_mode
+from rotorid.commands.option_quantities import mounted_weights
+from rotorid.commands.quantities import one_of, speeds
 from rotorid.commands.tolerance import ToleranceOptions, permissible
-from rotorid.report.options import check_choices
-from rotorid.report.outcome import Outcome, command, provenance, table_of
+from rotorid.report.options import check_choices, refuse
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +39,10 @@ if TYPE_CHECKING:
     from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
+
+
+_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", "grade", "rotor_mass", "service_speed")
+"""Options that mean nothing beside `weights`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,11 +115,37 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcom
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
-    if options.weights is not None:
-        from rotorid.commands.what_if import predicted
+    return corrected(read, options, files, again) if options.weights is None else _what_if(read, options)
 
-        return predicted(read, options)
-    return corrected(read, options, files, again)
+
+def _what_if(job: Job, options: BalanceOptions) -> Outcome:
+    """What the weights of the options would leave, with limits and zones.
+
+    Check runs count for the coefficients where `options.refine`, and else not at all.
+    """
+    from balancing import match_speeds, verdict_of_readings, what_if, zones_of
+
+    refuse(options, _NEEDLESS, "means nothing with --weights, which are taken as they are")
+    given = mounted_weights(job, options.weights or {})
+    (influence, runs), of_type = coefficients_of(job, options)
+    chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
+    remove = [name for name, plane in job.planes.items() if plane.remove]
+    result = what_if(influence, given, runs, chosen, remove)
+    result = replace(result, worse=(*result.worse, *next_mode(job, result)))
+    verdict, limits = None, job.limits_of(influence.planes)
+    if limits is not None:
+        kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))
+        verdict = verdict_of_readings(result.influence, result.after, result.after_covariance, kept)
+    zones = zones_of(result, job.zones) if job.zones else None
+    beside = {key: part for key, part in (("verdict", verdict), ("zones", zones)) if part}
+    return outcome_of(
+        result,
+        provenance(job.files if of_type is None else of_type.files, options),
+        answer=together([result.answer, *(part.answer for part in beside.values())]),
+        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items()},
+        file=Table("weights", result.columns()),
+        title="What these weights would leave",
+    )
 
 
 def corrected(
