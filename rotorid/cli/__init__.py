@@ -13,7 +13,7 @@ import typer
 
 from rotorid.base.answer import COLUMNS
 from rotorid.base.choices import one_of
-from rotorid.cli.choices import Command, Commands, whole_paragraphs
+from rotorid.cli.choices import Command, whole_paragraphs
 from rotorid.cli.demo import demo
 from rotorid.commands.app import json_text, run, typer_command, written_help
 from rotorid.commands.progress import plain
@@ -86,7 +86,6 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
     """The command line: of the one command that the first word names, or of all."""
     app = typer.Typer(
         name="rotorid",
-        cls=Commands,
         rich_markup_mode=None if plain() else "rich",  # else without any escape code
         invoke_without_command=True,
         add_completion=False,

@@ -99,10 +99,6 @@ def balance_report(
         method=f"{result.method_in_words} {result.conditioning.sentence()}",
         seen=conventions_explained.seen_from(labels),
         conventions=conventions_explained.words(labels, places, key),
-        phase_figure=inline_svg(
-            conventions_explained.phase_figure(labels),
-            f"A reading over time with a phase of 60° ({labels.phase})",
-        ),
         residual_figure=inline_svg(
             residual_figure(result, mounted, check, left), "Vibration before and after"
         ),
@@ -135,14 +131,12 @@ def to_do(
         done = (_done(len(table.columns[0].values)),) if boxes else ()
         return html(replace(table, columns=(*table.columns, *done)))
 
-    free = replace(_weights(document, result, job), name="In place of these weights at any angle")
     left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
     part = "mounting" if left is None else "left_to_do"
     pieces = not plain and document[part]["holes"]
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
-        "free": html(free) if boxes and left is None and not plain else "",
         "trim": "" if left is None else shown(_trim(document, result.labels)),
         "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
         "stays": _if_run_stays(result) if plain else "",
