@@ -74,9 +74,8 @@ class Balance(Outcome):
 
     def beside(self) -> dict[str, Any]:
         """Keys of the document beside those of the correction."""
-        names = {"mounting": "mounted", "check": "check", "left_to_do": "left", "verdict": "verdict"}
-        names |= {"of_type": "of_type", "zones": "zones"}
-        parts = {key: getattr(self, name) for key, name in names.items()}
+        parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
+        parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
         return {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:

@@ -264,9 +264,7 @@ def _amplitudes(trials: Trials, given: Amplitudes) -> dict[str, Quantity]:
         return other
 
     for one in [given] if isinstance(given, str | Mapping) else given:
-        if not isinstance(one, str | Mapping):
-            raise ValueError(f"--limit {given!r}: texts are needed, such as SENSOR=20")
-        names = [one] if isinstance(one, str) else one  # names of sensors may hold commas
+        names = one if isinstance(one, Mapping) else [one]  # names of sensors may hold commas
         limits |= _limits(names, "--limit", unit_of, si, "SENSOR=20", "sensor", sensors, sensors)
     return limits
 

@@ -44,10 +44,8 @@ _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
-MOUNTED = "note of weights: "
-"""Begins the name of a column of weights, which belong into a weights table."""
 _OF_READING = ("run", "speed", "repeat")
-_NO_DATA = ("", "note", "mounted")
+_NO_DATA = ("", "note")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
@@ -136,8 +134,6 @@ class _Column(NamedTuple):
     def name(self, place: int) -> str:
         """The name that it has in such a table; that of a remark is of no other column."""
         name, stem = self.heading.name, self.stem
-        if stem == "mounted":
-            return f"{MOUNTED}{name}"
         if stem == "note" and name != "time_s" and not name.casefold().startswith(_NOTES):
             return f"note {place} {name}"
         if stem in ("", "note"):

@@ -139,7 +139,6 @@ def to_do(
         "weights": shown(_weights(document, result, job)) if plain else "",
         "trim": "" if left is None else shown(_trim(document, result.labels)),
         "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
-        "stays": _if_run_stays(result) if plain else "",
     }
 
 
@@ -220,22 +219,6 @@ def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Table:
     """What goes into each hole."""
     work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
     return Table("", tuple(work))
-
-
-def _if_run_stays(c: Correction) -> Markup | str:
-    """What to do instead where the weights of the last run stay mounted."""
-    if not c.mounted.weights.any():
-        return ""
-    run, planes, _ = c.mounted
-    away = ["take away" if plane in c.remove else "add" for plane in planes]
-    masses, places = c.labels.weight(c.to_add)[0], c.places(planes, c.to_add)
-    columns = (
-        Column("plane", planes),
-        Column("do", away),
-        Column(c.labels.weight_in, masses, _FOUR),
-        Column("angle", np.where(masses > 0, places, np.nan), degrees),
-    )
-    return html(Table(f"Instead, only if the weights of run “{run}” stay mounted", columns))
 
 
 def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison | None) -> Markup:
