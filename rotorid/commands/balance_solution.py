@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
-from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
 from rotorid.commands.coefficients import choose, counted, of_planes, stored, unknowns_of
 from rotorid.commands.model_places import next_mode
-from rotorid.commands.option_quantities import limited
+from rotorid.commands.option_quantities import Errors, limited, percent_and_degrees
 from rotorid.commands.quantities import Names, Speeds, names, speeds
 from rotorid.report.options import file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT

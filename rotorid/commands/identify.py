@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.commands.amplitude_errors import Errors, amplitude_errors
+from rotorid.commands.option_quantities import Errors, amplitude_errors
 from rotorid.report.options import file_of
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 

@@ -24,6 +24,7 @@ from rotorid.commands.quantities import (
     rising_speeds,
     sensors,
 )
+from rotorid.files.units import STANDARD_GRAVITY
 from rotorid.report.options import file_of
 from rotorid.report.outcome import Outcome, command
 
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray
     from rotorid.reduction import SmallModel
 
-STANDARD_GRAVITY = 9.80665  # m/s²
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (

@@ -132,28 +132,13 @@ def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, pro
 
 
 def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
-    """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors, and warnings."""
-    left, labels, errors, words = trials.readings - vectors, trials.labels, trials.errors, list[str]()
-    S, size = np.abs(np.broadcast_to(vectors, left.shape[2:])), np.abs(trials.mean)
-
-    def shown(amplitude: float) -> str:
-        return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_in}".rstrip()
-
-    for r, s, c in np.argwhere(size < S * (1.0 - 1e-12))[:1]:
-        words.append(
-            f"the slow-roll vector of sensor {trials.sensors[c]!r}, {shown(S[s, c])}, is larger than "
-            f"its reading in run {trials.runs[r]!r} at {labels.speed_words(float(trials.speeds[s]))}, "
-            f"{shown(size[r, s, c])}: check its unit, and that the readings have not been corrected already"
-        )
-    largest = float(S.max(initial=0.0))
-    if errors is not None and (share := max(errors.amplitude, errors.phase) * largest):
+    """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors."""
+    left, errors = trials.readings - vectors, trials.errors
+    if errors is not None:
+        share = max(errors.amplitude, errors.phase) * float(np.abs(vectors).max(initial=0.0))
         errors = replace(errors, floor=float(np.hypot(errors.floor, share)))
-        words.append(
-            "the stated errors hold for the amplitudes as measured: of the slow-roll vectors, up to "
-            f"{shown(largest)}, they add {shown(share)} to the floor"
-        )
     steps = None if trials.steps is None else _turned(trials.steps, trials.readings, left)
-    return replace(trials, readings=left, errors=errors, warnings=(*trials.warnings, *words), steps=steps)
+    return replace(trials, readings=left, errors=errors, steps=steps)
 
 
 def _turned(steps: FloatArray, measured: ComplexArray, left: ComplexArray) -> FloatArray:

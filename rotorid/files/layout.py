@@ -79,11 +79,6 @@ class Conventions:
         Whether the job has limits in rms, so that mm/s alone are rms.
     run
         Name of the only run, for tables without a column of runs; empty: they need one.
-
-    Raises
-    ------
-    ValueError
-        For a tolerance that is not allowed.
     """
 
     labels: Labels = field(default_factory=Labels)
@@ -95,13 +90,6 @@ class Conventions:
     removed: frozenset[str] = frozenset()
     rms: bool = False
     run: str = ""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
-            raise ValueError(
-                f"speed_tolerance_percent must be from 0 to {LARGEST_TOLERANCE:g}, "
-                f"not {self.speed_tolerance_percent!r}"
-            )
 
 
 def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too

@@ -219,8 +219,7 @@ def _relative_weights(
             if first != run_of[row]:
                 words = (
                     f"one run of an unknown weight in plane {plane!r}, which stood in {first!r}: two are not "
-                    "determined; the same one read again is a repeat of that run, and of one that was moved "
-                    "angles count from its first place"
+                    "determined; the same one read again is a repeat of that run"
                 )
                 table.problems.add(words, table.grid.source, table.rows[row], stems[-1], "?")
         size = next(filter(None, total[:, p].tolist()), 1.0)

@@ -72,22 +72,12 @@ def test_a_sensor_without_a_vector(slow):
     assert slow([*SLOW[:2], ["slow", 150, "A", 0, 0]]).trials.warnings == ()
 
 
-def test_a_vector_larger_than_readings(slow):
-    (words,) = slow([*SLOW[:2], ["slow", 150, "A", 4.5, 35]]).trials.warnings
-    assert words.startswith(
-        "the slow-roll vector of sensor 'A', 4.5 µm pp, is larger than its reading in run 'trial 2' "
-        "at 1000 rpm, 4 µm pp: check its unit"
-    )
-
-
 def test_errors_are_those_of_the_measured_amplitude(slow):
     """2 % of what was measured: what the vectors had in it stands in the floor of the difference."""
     read = slow(lines="[errors]\namplitude_percent = 2\nphase_deg = 1\nfloor = 0.1\n")
     expected = np.hypot(0.05e-6, 0.02 * 1e-6)
     assert (read.trials.errors.amplitude, read.trials.errors.phase) == (0.02, np.radians(1))
     assert read.trials.errors.floor == pytest.approx(expected, rel=1e-12)
-    (words,) = read.trials.warnings
-    assert words.endswith("of the slow-roll vectors, up to 2 µm pp, they add 0.04 µm pp to the floor")
 
 
 @each_of(
