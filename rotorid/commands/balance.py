@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from rotorid.commands.balance_solution import JobGiven, Solved
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
-    from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
 
@@ -198,11 +197,6 @@ def corrected(
             raise ValueError(f"{path.name}: {read.trials.special}")
         return influence_bytes(path, as_measured(read, influence))
 
-    def solved_equations() -> Equations:
-        from rotorid.report.equations_of_results import correction_equations
-
-        return correction_equations(result.parts or result if result.unknowns else result)
-
     outcome = Balance(
         result=result,
         provenance=made,
@@ -210,7 +204,7 @@ def corrected(
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _picture(outcome, tolerance)},
-        solved=solved_equations,
+        solved=result,
         lines=LINES + 6 * bool(mounted or (left and left.pieces)),
         influence=influence,
         job=read,

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.files.node_tables import MeasuredModes
     from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
-    from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
 Place = Literal["best", "compromise", "mac", "book"]
@@ -193,11 +192,6 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Out
             raise ValueError(f"{path}: with --keep-supports the small model is for motion: FILE.toml")
         return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
 
-    def solved() -> Equations:
-        from rotorid.report.equations_of_results import equations_of
-
-        return equations_of(result)
-
     keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
     return outcome_of(
         result,
@@ -209,7 +203,7 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Out
             caption: partial(_picture, key, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
         },
         title=f"Rotor reduced to {counted(len(result.nodes), 'mass', 'masses')}",
-        solved=solved,
+        solved=result,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.base.tables import Table
+from rotorid.base.tables import Column, Table
 from rotorid.commands.option_quantities import length, positions, size, vectors, weight, weights
 from rotorid.commands.quantities import degrees, pairs
 from rotorid.report.options import changed, refuse
@@ -121,7 +121,7 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     return Outcome(
         result=placed,
         sentences=(placed.sentence(labels), *below),
-        file=Table("weight", ()),
+        file=Table("weight", (Column("weight", ()),)),
         lacking="there is no table of one weight: see to_dict()",
         keys=placed.to_dict(labels),
         pictures={"": lambda: _figure(placed, labels, target)},
