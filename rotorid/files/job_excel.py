@@ -176,7 +176,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
 
 
 def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
-    """The workbook of a job without its results, with the last digits that openpyxl would drop."""
+    """The workbook of a job without its results."""
     import openpyxl
 
     with warnings.catch_warnings():
@@ -185,9 +185,6 @@ def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
     for sheet in book.worksheets:
         if sheet.title.strip().casefold().startswith(RESULTS):
             book.remove(sheet)
-        for cell in (cell for row in sheet.iter_rows() for cell in row):
-            if isinstance(cell.value, float):  # of which openpyxl would keep 16 digits; 17 are needed
-                cell.value, cell.data_type = repr(cell.value), "n"
     return book
 
 
