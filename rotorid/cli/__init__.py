@@ -92,7 +92,7 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
         invoke_without_command=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": COLUMNS},
         callback=_rotorid,
         help=whole_paragraphs(_rotorid.__doc__ or ""),
     )
