@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any, get_type_hints
 
+import typer
 from typer.core import TyperCommand
 
 
@@ -22,6 +23,14 @@ class Command(TyperCommand):
         option: Any = super().get_help_option(ctx)
         option.rich_help_panel = "Output"
         return option
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
+        """As typer's, without a word of Python in a complaint."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as problem:
+            problem.message = problem.message.removeprefix("Value error, ")
+            raise
 
 
 def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public type for it
