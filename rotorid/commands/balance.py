@@ -26,7 +26,6 @@ from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, count
 from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import mounted_weights
 from rotorid.commands.quantities import one_of, speeds
-from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.commands.without_phase import balanced_without_phase
 from rotorid.report.options import check_choices, refuse
 from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
@@ -304,6 +303,8 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
+
+    from rotorid.commands.tolerance import ToleranceOptions, permissible
 
     stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
     return permissible(stated, names=("--rotor-mass", "--service-speed"))

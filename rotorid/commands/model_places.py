@@ -73,12 +73,12 @@ def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPl
 
 def next_mode(job: Job, outlook: Correction | WhatIf) -> tuple[str, ...]:
     """What the rotor model of a job says of the next mode beyond its readings; nothing without one."""
+    if job.rotor is None or not {*job.trials.sensors} <= job.sensor_places.keys():
+        return ()
     from balancing import mode_made_worse, model_influence
     from fem import critical_speeds_below
 
     fastest = float(job.trials.speeds.max())
-    if job.rotor is None or not {*job.trials.sensors} <= job.sensor_places.keys():
-        return ()
     beyond = [w for w in critical_speeds_below(job.rotor, REACH * fastest) if w > fastest]
     if not beyond or not {*outlook.planes} <= job.plane_nodes.keys():
         return ()

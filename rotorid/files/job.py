@@ -22,7 +22,6 @@ from balancing import (
     machine_influence,
     unknowns,
 )
-from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, polar
 from rotorid.base.text import counted
 from rotorid.files import units

@@ -46,8 +46,10 @@ _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 _BLANK = {"", "n.a.", "n/a", "na", "-", "--", "?", "none"}
 """Cells of a column of phases that nobody knows."""
+MOUNTED = "note of weights: "
+"""Begins the name of a column of weights, which belong into a weights table."""
 _OF_READING = ("run", "speed", "repeat")
-_NO_DATA = ("", "note")
+_NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
@@ -124,6 +126,8 @@ class _Column(NamedTuple):
     def name(self, place: int) -> str:
         """The name that it has in such a table; that of a remark is of no other column."""
         name, stem = self.heading.name, self.stem
+        if stem == "mounted":
+            return f"{MOUNTED}{name}"
         if stem == "note" and name != "time_s" and not name.casefold().startswith(_NOTES):
             return f"note {place} {name}"
         if stem in ("", "note"):
