@@ -54,15 +54,6 @@ def test_every_number_is_that_of_the_command(shared, name, options, path, count)
     assert len([key for key in numbers if key.startswith(path)]) == count
 
 
-def test_every_number_follows_an_edit(shared):
-    served = shared()
-    numbers = served.settled()["numbers"]
-    assert served.type(CELL, "95")[0] == 200
-    now = served.settled()["numbers"]
-    agree(now, command(served.job))
-    assert now != numbers
-
-
 def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
     served = shared()
     strangers = [
