@@ -89,9 +89,7 @@ class Balance(Outcome):
 
 @command
 def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcome:
-    """Correction weights from trial runs or a rotor model, with ± and what will be left.
-
-    Runs without phases are balanced by their amplitudes.
+    """Correction weights from trial runs, with or without phases, or a rotor model, and what they leave.
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 

@@ -59,14 +59,6 @@ def test_key_phasor_that_stands_elsewhere(rotor):
     assert model.W[0, 1, 0] * U == pytest.approx(read, rel=1e-9)
 
 
-def test_covariance_is_the_stated_relative_error(rotor):
-    model = model_influence(rotor, PLANES, SENSORS, SPEEDS, relative_error=0.1)
-    std = 0.1 * np.abs(model.W)
-    np.testing.assert_allclose(np.sqrt(model.channels()[..., 2, 2]), std[..., 0], rtol=1e-14)
-    np.testing.assert_allclose(np.sqrt(model.channels()[..., 5, 5]), std[..., 1], rtol=1e-14)
-    assert np.count_nonzero(model.channels()) == model.W.size * 2
-
-
 BAD = [
     ({"relative_error": -0.1}, "relative errors .* must be finite numbers"),
     ({"radii": {"left": 0.2, "right": 0.2, "mid": 1.0}}, "and of no other one"),

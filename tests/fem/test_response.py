@@ -206,15 +206,6 @@ def complex_of(frame, size, phase):
     return frame[size].to_numpy() * np.exp(1j * np.radians(frame[phase].to_numpy()))
 
 
-def test_influence_as_table_and_json():
-    rotor = dataclasses.replace(on(1e8, 2e4), stations={"A": 2}, discs=[fem.Disc(3, 1.0, 0.2)])
-    W = fem.influence(rotor, [7, 12], ["A", 22], [100.0, 200.0, 300.0])
-    frame = W.to_frame()
-    assert frame.sensor.tolist()[:4] == ["A", "A", 22, 22]
-    np.testing.assert_allclose(complex_of(frame, "influence_m_per_kg_m", "phase_lead_deg"), W.W.ravel())
-    assert "ignored" in W.to_dict()["warnings"][0]
-
-
 def test_response_and_forces_as_table_and_json():
     rotor = dataclasses.replace(on(OVAL, 2e4), stations={"A": 2})
     response = fem.unbalance_response(rotor, {"A": 1e-3, 2: 1e-3j}, [100.0, 200.0], nodes=[2, 9, 22])
@@ -262,15 +253,6 @@ def test_the_major_axis_stands_at_its_inclination(x, y):
     if found.minor > 1e-3 * found.major:
         lag = np.angle(along / across)
         assert math.isclose(lag, found.direction * np.pi / 2, abs_tol=1e-6)
-
-
-def test_known_ellipses():
-    x, y = np.array([3.0, 1.0, 2j, 1.0, 0.0]), np.array([-2j, 1j, 1.0, 1.0, 5.0])
-    found = fem.orbits(x, y)
-    np.testing.assert_allclose(found.major, [3, 1, 2, math.sqrt(2), 5])
-    np.testing.assert_allclose(found.minor, [2, 1, 1, 0, 0], atol=1e-15)
-    np.testing.assert_allclose(found.inclination, [0, 0, 0, math.pi / 4, math.pi / 2])
-    np.testing.assert_array_equal(found.direction, [1, -1, 1, 0, 0])
 
 
 def test_direction_of_whole_modes():

@@ -75,17 +75,6 @@ def test_random_systems_keep_eigenvalues_and_receptance(drawn):
     ).all()
 
 
-def test_feedthrough_of_a_force_on_a_massless_undamped_output():
-    """A mass on two springs in series; a force on the point between moves it at once by f/(k1 + k2)."""
-    k1, k2 = 3.0, 5.0
-    model = state_space(motion_of(np.diag([1.0, 0.0]), np.zeros((2, 2)), [[k1, -k1], [-k1, k1 + k2]]))
-    assert model.states == ("x1", "v_x1")
-    np.testing.assert_allclose(model.D, [[0, 0], [0, 1 / (k1 + k2)]], atol=1e-15)
-    np.testing.assert_allclose(model.A, [[0, 1], [-k1 * k2 / (k1 + k2), 0]], atol=1e-15)
-    np.testing.assert_allclose(model.B, [[0, 0], [1, k1 / (k1 + k2)]], atol=1e-15)
-    np.testing.assert_allclose(model.C, [[1, 0], [k1 / (k1 + k2), 0]], atol=1e-15)
-
-
 def test_a_rotor_with_massless_pedestals_and_shaft():
     """A massless shaft with discs, on damped cross-coupled bearings; one on a foot that is damped in y."""
     rotor = fem.Rotor(

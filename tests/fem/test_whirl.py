@@ -84,36 +84,6 @@ def test_rigid_rotor_on_two_bearings():
     assert np.abs(found.log_decrements).max() < 1e-6
 
 
-@pytest.mark.parametrize("speed", [0.0, 50.0, 300.0])
-def test_jeffcott_on_anisotropic_damped_supports(speed):
-    """A point mass between springs and dampers of x and y, coupled by kxy: a 2 × 2 quadratic problem."""
-    m, K, C = 12.0, np.array([[2e5, 3e4], [-1e4, 5e5]]), np.array([[300.0, 20.0], [20.0, 700.0]])
-    half = (tuple(K[0] / 2), tuple(K[1] / 2)), (tuple(C[0] / 2), tuple(C[1] / 2))
-    rotor = fem.Rotor(
-        [0.1, 0.1],
-        0.1,
-        density=1e-9,
-        discs=[fem.Disc(2, m)],
-        supports=[fem.Support(1, *half), fem.Support(3, *half)],
-    )
-    # The shaft is a spring in series: stiffness 48 E I / L³ of the middle against both ends.
-    ks = 48 * 2.1e11 * math.pi / 64 * 0.1**4 / 0.2**3
-    # Unknowns: disc x, y, bearings x, y (together).
-    M = np.diag([m, m, 0.0, 0.0])
-    D = np.zeros((4, 4))
-    D[2:, 2:] = C
-    spring = ks * np.block([[np.eye(2), -np.eye(2)], [-np.eye(2), np.eye(2)]])
-    spring[2:, 2:] += K
-    inverse = np.linalg.inv(spring)
-    mu = np.linalg.eigvals(np.block([[np.zeros((4, 4)), np.eye(4)], [-inverse @ M, -inverse @ D]]))
-    lam = 1 / mu[np.abs(mu) > 1e-9]
-    lam = lam[lam.imag > 0.1 * np.abs(lam)]
-    found = fem.whirl_modes(rotor, speed, 2)
-    np.testing.assert_allclose(found.eigenvalues, lam[np.argsort(lam.imag)], rtol=1e-8)
-    # Two bearings without mass creep in two directions, with the middle or against each other.
-    assert found.real.size == 4
-
-
 def test_directions_of_a_symmetric_rotor():
     rotor = dataclasses.replace(
         machine(), supports=[fem.Support(s.node, 1e8, 1e4) for s in machine().supports]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,6 @@ holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
 holes-minmax                balance {TURBO}/holes.toml --split --method minmax
 holes-unsplit               balance {TURBO}/holes.toml
 model-job                   balance {MODEL_JOB}
-model-job-assumed           balance {MODEL_JOB}
 model-job-ridge             balance {MODEL_JOB} --ridge 0.05
 model-job-weighted          balance {MODEL_JOB} --method weighted --report sheet.html
 computed                    balance sample_data/model_job/modelled.toml --coefficients computed
@@ -280,31 +280,7 @@ fit-printed                 fit {FIT}/three_masses/model.toml {FIT}/three_masses
 fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 """
 
-EXERCISES = (
-    *(
-        "section_1_6",
-        "section_1_7",
-        "section_1_8",
-        "task_1_1",
-        "task_1_2",
-        "task_2_1",
-        "task_2_2",
-        "task_2_3",
-    ),
-    *("task_3_1", "task_3_2", "task_3_3", "task_4_1", "task_4_2", "task_4_3", "task_5_1", "task_5_2"),
-    *("task_6_1", "task_6_2", "task_7_1", "task_7_2", "task_8_1", "task_8_2"),
-)
-PRINTED_ONLY = (
-    "section_1_8",
-    "task_5_1",
-    "task_5_2",
-    "task_6_1",
-    "task_6_2",
-    "task_7_1",
-    "task_7_2",
-    "task_8_1",
-    "task_8_2",
-)
+EXERCISES = sorted((Path(__file__).parents[2] / IDENTIFY).glob("*/data*.csv"))
 RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
 COMMANDS = (
     *(
@@ -412,16 +388,11 @@ def _all() -> list[Case]:
         + _listed(BALANCE_COMMANDS, "balance")
         + _listed(MODEL_COMMANDS, "models")
     )
-    for name in EXERCISES:
-        data = ["data"] if name in PRINTED_ONLY else ["data", "data_exact"]
-        cases += [
-            Case(
-                f"identify-{name}" + table.removeprefix("data").replace("_", "-"),
-                f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv",
-                "models",
-            )
-            for table in data
-        ]
+    for data in EXERCISES:
+        name, table = data.parent.name, data.stem
+        exact = table.removeprefix("data").replace("_", "-")
+        command = f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv"
+        cases.append(Case(f"identify-{name}{exact}", command, "models"))
     cases += [
         Case(f"fit-{name}", f"fit {FIT}/{name}/model.toml {FIT}/{name}/record.csv", "models")
         for name in RECORDS

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from golden.cases import CASES, COMMANDS, EXERCISES, REFUSED, STORED
+from golden.cases import CASES, COMMANDS, REFUSED, STORED
 from golden.comparing import compare
 from golden.document import arrays, rounded, thinned
 from golden.parent import apart
@@ -130,4 +130,3 @@ def test_every_command_and_every_sample_has_a_case():
     for path in sample_data().rglob("*.toml"):
         if path.name != "expected.toml" and "fleet" not in path.parts:  # `fleet fit` has the whole folder
             assert any(str(path.relative_to(sample_data())) in text for text in words), path
-    assert set(EXERCISES) == {path.parent.name for path in (sample_data() / "identify").glob("*/model.toml")}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from rotorid.samples import sample_data
@@ -79,45 +78,6 @@ def test_forbidden_angles_run_in_the_direction_of_the_job(answers, tmp_path):
     assert (mirrored["angle_deg"] + moved["angle_deg"]) % 360 == pytest.approx(0, abs=1e-3) or (
         mirrored["angle_deg"] + moved["angle_deg"]
     ) % 360 == pytest.approx(360, abs=1e-3)
-
-
-def test_weight_zero_of_a_sensor_leaves_it_out_of_the_fit(answers, tmp_path):
-    found = answers(job_with(tmp_path, '[sensors."probe 4"]\nweight = 0\n'))
-    assert {r["sensor"] for r in found["residuals"]} == {f"probe {i}" for i in (1, 2, 3, 4)}
-    assert found["corrections"] != answers(JOB)["corrections"]
-
-
-def runs(readings, planes=("a",), trials=None):
-    """Tables of a baseline and one trial run per plane; readings[run][sensor] complex."""
-    rows = ["run,speed_rpm,sensor,amplitude_um,phase_deg"]
-    for r, sensors in enumerate(readings):
-        for s, z in enumerate(sensors):
-            rows.append(f"r{r},3000,s{s},{abs(z):.9g},{np.degrees(np.angle(z)) % 360:.9g}")
-    weights = ["run,plane,mass_g,angle_deg"]
-    weights += [f"r{i + 1},{p},{(trials or [10] * len(planes))[i]},0" for i, p in enumerate(planes)]
-    return "\n".join(rows) + "\n", "\n".join(weights) + "\n"
-
-
-def refused(cli, tmp_path, tables, *args):
-    (tmp_path / "runs.csv").write_text(tables[0])
-    (tmp_path / "weights.csv").write_text(tables[1])
-    outcome = cli("balance", tmp_path / "runs.csv", tmp_path / "weights.csv", *args)
-    assert outcome.code == 2
-    assert "Traceback" not in outcome.err
-    assert outcome.out == ""
-    return outcome.err
-
-
-BASE = np.array([10 + 2j, -3 + 7j, 5 - 4j, 1 + 1j])
-EFFECT = np.array([[1, 2, -1, 0.5], [2j, 1, 1j, -1]]).T  # of 10 g in planes a and b
-
-
-def test_nothing_to_balance(cli, tmp_path):
-    effects = [EFFECT[:, 0], EFFECT[:, 1]]
-    rows, weights = runs([0 * BASE, *effects], ("a", "b"))
-    for method in METHODS:
-        message = refused(cli, tmp_path, (rows, weights), "--method", method, "--errors", "2,0")
-        assert "nothing to balance" in message
 
 
 def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):

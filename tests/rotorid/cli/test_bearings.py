@@ -41,10 +41,7 @@ def test_a_shaft_without_weight_has_its_journals_in_the_middle():
 @pytest.mark.parametrize(
     ("forces", "words"),
     [
-        ([JournalBearing(1, "DE", **BEARING)], "nothing holds the rotor, its position is not determined"),
         ([CubicSpring(1, "", 1e6), CubicSpring(5, "", 1e6)], "the rotor has no [[journal_bearing]]"),
-        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)],
-         "a squeeze film its centring spring"),
         ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e5), JournalBearing(5, "", **BEARING)],
          "% of its clearance at the squeeze film at node 1"),
     ],

@@ -37,13 +37,6 @@ def test_pictures_and_tables_are_written_and_named(cli, tmp_path):
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".png", ".png", ".xlsx"]
 
 
-def test_a_failing_command_leaves_an_old_picture_alone(cli, tmp_path):
-    picture = tmp_path / "p.png"
-    picture.write_bytes(b"old")
-    assert cli("critical", "nowhere.csv", "--plot", picture).code == 2
-    assert picture.read_bytes() == b"old"
-
-
 def test_module_and_script_are_the_same_program():
     module = subprocess.run(
         [sys.executable, "-m", "rotorid", "--version"], capture_output=True, text=True, check=True

@@ -10,7 +10,6 @@ from rotorid.samples import sample_data
 FOLDER = sample_data() / "fit"
 DECAY = '[states]\nx = "-a*x"\n[initial]\nx = "x0"\n[estimate]\na = 0.5\nx0 = 0.8\n[bounds]\na = [0, 5]\n'
 OWN = f'per_record = ["x0"]\n{DECAY}'
-ONE = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[estimate]\na = 0.5\n'
 TWO = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[outputs]\ny = "x"\nz = "2*x"\n[estimate]\na = 0.5\n'
 
 
@@ -165,25 +164,3 @@ def test_samples_give_the_truth_within_their_intervals(cli, folder, truth):
     for name, value in truth.items():
         entry = found["parameters"][name]
         assert abs(entry["value"] - value) < 4 * entry["std"] + 1e-9, name
-
-
-def test_missing_samples(cli, tmp_path):
-    model = saved(tmp_path, "m.toml", ONE)
-    lines = decay(n=30).splitlines()
-    lines[5], lines[9] = "0.400,", "0.800,NaN"
-    record = saved(tmp_path, "r.csv", "\n".join(lines))
-    refused = cli("fit", model, record)
-    assert refused.code == 2
-    assert "--allow-missing" in refused.err
-    found = cli("fit", model, record, "--allow-missing", "--json").json
-    assert found["parameters"]["a"]["value"] == pytest.approx(1.3, rel=2e-3)
-
-
-def test_a_combination_is_named(cli, tmp_path):
-    model = saved(tmp_path, "m.toml", ONE.replace("-a*x", "-a*b*x") + "b = 2\n")
-    outcome = cli("fit", model, saved(tmp_path, "r.csv", decay(n=20)), "--json")
-    assert outcome.code == 0
-    found = outcome.json
-    assert found["identifiable"] is False
-    assert found["parameters"]["a"]["value"] is None
-    assert found["unidentifiable"]

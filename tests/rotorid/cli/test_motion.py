@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import fem
-from fem import JournalBearing, MuszynskaSeal
+from fem import MuszynskaSeal
 from rotorid.commands.motion import MotionOptions, motion
 from rotorid.files import read_rotor, write_rotor
 from rotorid.samples import sample_data
@@ -43,18 +42,6 @@ def test_a_shaft_that_touches_a_seal_in_a_run_up(cli, tmp_path, unbalance):
     time, speed = map(float, found.groups())
     assert 1200 < speed < 1500
     assert speed == pytest.approx(1000 + 1000 * time / 3.3, rel=1e-5)
-
-
-def test_a_bearing_table_that_ends(cli):
-    table = fem.Support(1, np.array([3e7, 4e7])[:, None, None] * np.eye(2), 1e3, speeds=(100.0, 200.0))
-    rotor = fem.Rotor(
-        length=[0.3, 0.3],
-        outer_diameter=0.1,
-        supports=[table],
-        forces=[JournalBearing(3, "", 0.05, 0.1, 1e-4, 0.02)],
-    )
-    with pytest.raises(ValueError, match="its table holds"):
-        motion(rotor, MotionOptions(run_up=(150.0, 250.0), time=1.0))
 
 
 def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):

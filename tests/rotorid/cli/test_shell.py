@@ -2,16 +2,13 @@
 
 import hashlib
 import io
-import itertools
 import os
 import signal
-import stat
 import subprocess
 import sys
 
 import pytest
 
-from rotorid.files.disk import write_files
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"
@@ -96,50 +93,6 @@ def test_a_table_from_standard_input(cli, monkeypatch):
     assert "standard input: expected a file that can be read (it is closed)" in cli("critical", "-").err
 
 
-def test_the_hash_is_that_of_what_was_read(cli, tmp_path, monkeypatch):
-    import fem
-
-    path = tmp_path / "rotor.csv"
-    path.write_bytes(ROTOR.read_bytes())
-    critical = fem.critical_speeds
-
-    def meanwhile(*words, **options):
-        path.write_bytes(b"another file")
-        return critical(*words, **options)
-
-    monkeypatch.setattr(fem, "critical_speeds", meanwhile)
-    outcome = cli("critical", path, "--json")
-    assert path.read_bytes() == b"another file"
-    expected = hashlib.sha256(ROTOR.read_bytes()).hexdigest()
-    assert outcome.json["provenance"]["inputs"][0]["sha256"] == expected
-
-
-def test_mode_and_link_of_a_file_stay(tmp_path):
-    (tmp_path / "sub").mkdir()
-    target, link = tmp_path / "sub" / "real.csv", tmp_path / "link.csv"
-    target.write_bytes(b"old")
-    target.chmod(0o640)
-    link.symlink_to(target)
-    dangling, new = tmp_path / "dangling.csv", tmp_path / "sub" / "new.csv"
-    dangling.symlink_to(new)
-    long = tmp_path / ("x" * 250 + ".csv")
-    write_files({link: b"1", dangling: b"2", long: b"3"})
-    assert link.is_symlink()
-    assert dangling.is_symlink()
-    assert [p.read_bytes() for p in (target, new, long)] == [b"1", b"2", b"3"]
-    assert stat.S_IMODE(target.stat().st_mode) == 0o640
-    assert len(list(tmp_path.rglob("*"))) == 6
-
-
-def test_what_is_written_is_on_the_disk_before_it_replaces(tmp_path, monkeypatch):
-    done = []
-    sync, replace = os.fsync, os.replace
-    monkeypatch.setattr(os, "fsync", lambda fd: (done.append("sync"), sync(fd))[1])
-    monkeypatch.setattr(os, "replace", lambda *a: (done.append("replace"), replace(*a))[1])
-    write_files({tmp_path / "a.csv": b"1", tmp_path / "b.csv": b"2"})
-    assert done == ["sync", "sync", "replace", "replace"]
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
 def test_a_pipe_is_no_target(cli, tmp_path):
     os.mkfifo(tmp_path / "o.csv")
@@ -194,21 +147,19 @@ def test_extreme_options_are_answered_or_refused(cli):
                 assert "Traceback" not in printed, what
 
 
-def test_speeds_are_bounded():
-    from rotorid.commands.quantities import FASTEST, band, speeds
+@pytest.mark.parametrize("way", [["-OO"], pytest.param([], marks=pytest.mark.full)])
+def test_without_docstrings_commands_work_and_their_help_is_the_same(way, tmp_path):
+    def output(way, *words, **environment):
+        command = [sys.executable, *way, "-m", "rotorid", *map(str, words)]
+        done = subprocess.run(
+            command, capture_output=True, env={**os.environ, **environment}, cwd=tmp_path, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
-    for text, unit in itertools.product(("1e9", "9e9", "1e300"), ("rpm", "Hz", "")):
-        if float(text) * {"rpm": 0.105, "Hz": 6.28, "": 1.0}[unit] > FASTEST:
-            with pytest.raises(ValueError, match="speeds must be 0 or from 1e-09 to"):
-                speeds(text + unit)
-            with pytest.raises(ValueError, match="speeds must be 0"):
-                band(f"1:{text}{unit}")
-
-
-def test_without_docstrings_there_are_no_options():
-    done = subprocess.run([sys.executable, "-OO", "-m", "rotorid", "demo"], capture_output=True, timeout=120)
-    assert (done.returncode, done.stdout) == (2, b"")
-    assert done.stderr.startswith(b"rotorid: python -OO drops the texts")
+    level = {} if way else {"PYTHONOPTIMIZE": "2"}
+    for words in (["balance", "--help"], [], ["critical", ROTOR, "-n", "2"]):
+        assert output(way, *words, **level) == output([], *words) != b""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="limits of a process")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
 
-from rotorid.files import read_influence
 from rotorid.samples import sample_data
 
 DATA = sample_data()
@@ -41,17 +39,3 @@ def test_the_sheets_of_results(cli, tmp_path):
         row[0] for row in book["results"].iter_rows(values_only=True) if str(row[0]).startswith("# warn")
     ]
     assert warned == [f"# warning: {text}" for text in document["warnings"]]
-
-
-def test_the_influence_coefficients_of_the_results_are_a_table(cli, tmp_path):
-    sheet, stored = tmp_path / "sheet.xlsx", tmp_path / "influence.json"
-    for path in (sheet, stored):
-        assert cli("balance", TURBO / "job.toml", "--output", path).code == 0
-    book = openpyxl.load_workbook(sheet)
-    for title in book.sheetnames:
-        if title != "results influence":
-            del book[title]
-    book.save(tmp_path / "only.xlsx")
-    ours, saved = read_influence(tmp_path / "only.xlsx"), read_influence(stored)
-    np.testing.assert_allclose(ours.W, saved.W, rtol=1e-14)  # the deleting program keeps 16 digits
-    assert ours.sensors == saved.sensors

@@ -26,7 +26,6 @@ from rotorid.samples import sample_data
 SAMPLES = sample_data()
 TURBO = SAMPLES / "turbo_job/job.toml"
 TABLES = [TURBO.with_name("runs.csv"), TURBO.with_name("weights.csv")]
-BK = SAMPLES / "bk_two_plane/job.toml"
 MODEL_JOB = SAMPLES / "model_job/job.toml"
 TASK = SAMPLES / "identify/task_5_1/model.toml", SAMPLES / "identify/task_5_1/data.csv"
 QUASI = SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinearization/record_noisy.csv"
@@ -80,8 +79,6 @@ def weight(**options):
             weight,
             {"holes": 24, "pieces": [0.01, 0.02], "taken": {"9": 0.01}, "per_hole": 2},
         ),
-        ("split|35g@-120|--two|20g,30g", lambda **o: split(WEIGHT.conjugate(), SplitOptions(**o)),
-         {"two": [0.02, 0.03]}),
         ("split|35g@120|--drill|16mm|--radius|100mm", weight, {"drill": 0.016, "radius": 0.1}),
         (
             "tolerance|--mass|500kg|--speed|3000rpm|--grade|G2.5|--planes|left=100mm,right=600mm|--bearings|0mm,700mm|--centre|320mm",
@@ -92,11 +89,6 @@ def weight(**options):
             "trial-weight|--load|500N|--speed|3000rpm|--radius|0.2m|--reading-phase|9|--lag|below|--sensor-angle|30|--phase|lag",
             lambda **o: trial_weight(None, TrialWeightOptions(**o)),
             {**LOAD, "reading_phase": 9, "lag": "below", "sensor_angle": 30, "phase": "lag"},
-        ),
-        (
-            f"trial-weight|{BK}|--plane|1|--radius|100mm|--load|9N|--share|30",
-            lambda **o: trial_weight(BK, TrialWeightOptions(**o)),
-            {"plane": ["1"], "radius": 0.1, "load": 9, "share": 30},
         ),
         (
             f"unbalance|{MODEL_JOB}|--stations|6,12,19",

@@ -47,13 +47,6 @@ def test_rest_loses_stability_where_the_linear_rotor_does(cli, tmp_path):
     assert {"amplitude_2_m", "amplitude_22_m", "largest_multiplier"} <= {*table.columns}
 
 
-def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
-    (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n12,5000,30\n")
-    told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv")
-    assert told.code == 2
-    assert "a period of its own" in told.err
-
-
 def test_no_bifurcation_says_what_was_tried(cli, tmp_path):
     (tmp_path / "damper.toml").write_text(DAMPER)
     found = cli("periodic", tmp_path / "damper.toml", "--speeds", "590:600")

@@ -3,11 +3,9 @@
 import pandas as pd
 import pytest
 
-from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"
-BOOK = sample_data() / "book_task_9"
 
 
 @pytest.mark.parametrize("ending", ["csv", "xlsx"])
@@ -19,21 +17,8 @@ def test_cells_of_the_other_kind_are_blank_in_files(cli, tmp_path, ending):
     assert table["node"].isna().tolist() == table["mode"].notna().tolist() == [False] * 3 + [True] * 3
 
 
-def test_forces_stand_at_masses(cli, tmp_path):
-    path = tmp_path / "m.toml"
-    words = ("reduce", ROTOR, "--nodes", "7,12,18", "--output", path, "--force")
-    assert cli(*words, "12").code == 0
-    assert '"f_x12"' in path.read_text()
-
-
 def test_what_the_warning_of_a_negative_mass_proposes(cli):
     words = ("reduce", ROTOR, "--nodes", "3,4,20", "--modes", "2")
     assert "or --nonnegative" in " ".join(cli(*words).out.split())
     masses = cli(*words, "--nonnegative", "--json").json["masses_kg"]
     assert min(masses) >= 0 < max(masses)
-
-
-def test_a_measured_rotor_is_used_beside_its_model():
-    found = reduce(ROTOR, ReduceOptions(measured=BOOK / "modes.csv"))
-    assert [entry["file"] for entry in found.provenance["inputs"]] == [str(ROTOR), str(BOOK / "modes.csv")]
-    assert found.document["source"] == "measured"

@@ -79,13 +79,3 @@ def test_pulses_that_are_alike_do_not_compare_records(tmp_path):
     )
     with pytest.raises((ValueError, InputError), match="vectors of different records cannot be compared"):
         vectors([tmp_path / "w.toml"])
-
-
-def test_a_job_names_what_is_wrong_with_its_records(cli, tmp_path):
-    (tmp_path / "w.toml").write_text('tacho = "1"\nrecords = { a = "gone.wav" }\n', encoding="utf-8")
-    (tmp_path / "w.csv").write_text("run,plane,mass_g,angle_deg\n", encoding="utf-8")
-    (tmp_path / "job.toml").write_text('runs = "w.toml"\nweights = "w.csv"\n', encoding="utf-8")
-    result = cli("balance", tmp_path / "job.toml")
-    assert result.code == 2
-    assert "gone.wav" in result.err
-    assert "a file that exists" in result.err.replace("\n", " ")

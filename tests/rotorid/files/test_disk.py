@@ -22,11 +22,14 @@ def two(tmp_path):
 def test_what_is_written_replaces_the_file_behind_a_link_and_keeps_its_rights(tmp_path, two):
     (tmp_path / "a.csv").chmod(0o640)
     (tmp_path / "link").symlink_to("a.csv")
-    write_files({tmp_path / "link": b"new a", tmp_path / "b.csv": b"new b"})
+    (tmp_path / "b.csv").unlink()
+    (tmp_path / "dangling").symlink_to("b.csv")
+    write_files({tmp_path / "link": b"new a", tmp_path / "dangling": b"new b"})
     assert {path: path.read_bytes() for path in two} == two
+    assert (tmp_path / "dangling").is_symlink()
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "a.csv").stat().st_mode & 0o777 == 0o640
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 @pytest.mark.parametrize("fault", ["a full disk", "the first cannot be replaced", "a last look"])

@@ -52,18 +52,6 @@ def test_amplitudes_are_those_of_the_written_equation(equation, known, estimate,
     np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 
-def test_matrices_and_derivatives_agree_with_the_written_equation():
-    model = harmonic_model(["(T1*T2*p**2 + T1**2*p + 3)*S = T2*F"], estimate=["T1", "T2"])
-    theta, h, p = np.array([0.7, 1.9]), 1e-6, 1j * W
-    A = model.matrices(theta, W)[:, 0]
-    np.testing.assert_allclose(A[:, 0], 0.7 * 1.9 * p**2 + 0.7**2 * p + 3, rtol=1e-14)
-    np.testing.assert_allclose(A[:, 1], -1.9, rtol=1e-14)
-    slopes = model.polynomials(theta)[1]
-    for j, step in enumerate(h * np.eye(2)):
-        numeric = (model.polynomials(theta + step)[0] - model.polynomials(theta - step)[0]) / (2 * h)
-        np.testing.assert_allclose(slopes[:, j], numeric, rtol=1e-8, atol=1e-8)
-
-
 @each_of(
     ("equations", "known", "estimate", "message"),
     [
@@ -126,14 +114,6 @@ def test_bad_inputs_are_refused():
 def test_combinations_in_words(equation, known, estimate, words):
     model = harmonic_model([equation], known=known, estimate=estimate)
     assert set(model.combinations.words) == words
-
-
-def test_combinations_have_the_coefficients_that_their_words_say():
-    model = harmonic_model([PUMP], known={"T0": 0.3, "K": 10}, estimate=["T1", "T2", "zeta"])
-    row = model.combinations.rows[model.combinations.words.index("K*T1 + 2*T0*zeta")]
-    values = dict(zip(model.combinations.monomials, row, strict=True))
-    assert values[(("T1", 1),)] == pytest.approx(10, rel=1e-15)
-    assert values[(("zeta", 1),)] == pytest.approx(0.6, rel=1e-15)
 
 
 POINT = {"a": Fraction(2, 3), "b": Fraction(-5, 4), "c": Fraction(7)}

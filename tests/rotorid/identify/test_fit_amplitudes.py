@@ -173,23 +173,6 @@ def test_errors_weight_each_reading():
     )
 
 
-def test_only_the_difference_is_determined():
-    equation = "(m*p**2 + b*p + c)*Z - delta*b*p*Z = F"
-    model = harmonic_model([equation], known={"m": 10.0}, estimate=["c", "b", "delta"])
-    w = np.array([80.0, 100.0, 120.0])
-    signals = {"Z": 5.0 / (-10 * w**2 + 1j * w * 400 + 1e5), "F": 5.0}
-    data = experiments(model, w, signals, errors=STATED, free=False)
-    result = identify(model, data)
-    assert result.values[0] == pytest.approx(1e5, rel=1e-8)
-    assert np.isnan(result.values[1:]).all()
-    (combination,) = result.combinations
-    assert combination.words == "b*(1 - delta)"
-    assert combination.value == pytest.approx(400, rel=1e-8)
-    one = harmonic_model(["(m*p**2 + d*p + c)*Z = F"], known={"m": 10.0}, estimate=["c", "d"])
-    assert combination.std == pytest.approx(identify(one, data).std[1], rel=1e-6)
-    assert any("c and b*(1 - delta)" in text for text in result.unidentifiable)
-
-
 @pytest.mark.parametrize(
     ("equations", "known", "truth"),
     [

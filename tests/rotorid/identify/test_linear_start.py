@@ -2,16 +2,13 @@
 
 import numpy as np
 import pytest
-from book_task_9 import COMPLIANCE, FREQUENCIES, SHAPES
 from harmonic_cases import FEEDBACK, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotorid.identify import AmplitudeErrors, harmonic_model, identify
-from rotorid.identify.amplitudes import Experiments, experiments
-from rotorid.identify.linear_start import System, build_rows, recover
-from rotorid.reduction import equivalent_masses
-from rotorid.regression import stack
+from rotorid.identify import harmonic_model, identify
+from rotorid.identify.amplitudes import experiments
+from rotorid.identify.linear_start import System, recover
 
 MASS = ["(m*p**2 + alpha*p + c)*X = F"]
 TASK_51 = {"F": 10.0, "X": [-0.1j, -3.3e-3 - 2.2e-4j, -1.2e-3 - 4.7e-5j]}
@@ -19,52 +16,6 @@ TASK_51 = {"F": 10.0, "X": [-0.1j, -3.3e-3 - 2.2e-4j, -1.2e-3 - 4.7e-5j]}
 
 def mass():
     return harmonic_model(MASS, known={"m": 10.0}, estimate=["c", "alpha"])
-
-
-def test_formula_50_is_one_more_model():
-    alpha = {f"a{i + 1}{j + 1}": COMPLIANCE[i, j] for i in range(3) for j in range(i, 3)}
-    rows = [[f"a{min(i, j)}{max(i, j)}*m{j}*X{j}" for j in (1, 2, 3)] for i in (1, 2, 3)]
-    equations = [f"{' + '.join(row)} = -X{i}/p**2" for i, row in enumerate(rows, 1)]
-    model = harmonic_model(equations, known=alpha, estimate=["m1", "m2", "m3"])
-    data = experiments(model, FREQUENCIES[:2], {f"X{j + 1}": SHAPES[j, :2] for j in range(3)})
-    linear = identify(model, data).linear
-    masses = equivalent_masses(COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2])
-    np.testing.assert_allclose(linear.recovery.values, masses.values, rtol=1e-9)
-    assert linear.estimate.condition_number == pytest.approx(masses.condition_number, rel=1e-6)
-
-
-TWO_MASSES = [
-    "(m1*p**2 + (a1 + a12)*p + c1 + c2)*X1 - (a12*p + c2)*X2 = F",
-    "-(a12*p + c2)*X1 + (m2*p**2 + (a2 + a12)*p + c2)*X2 = 0",
-]
-TWO_MASS_NUMBERS = {"m1": 3.0, "m2": 2.0, "c1": 500.0, "c2": 300.0}
-
-
-def lesson_1():
-    return harmonic_model(TWO_MASSES, known=TWO_MASS_NUMBERS, estimate=["a1", "a12", "a2"])
-
-
-def test_rows_of_lesson_1_are_those_of_an_independent_derivation():
-    """The third row of the print is another one."""
-    w, x1, x2, force = 7.0, 0.31 - 0.22j, -0.17 + 0.41j, 5.0
-    K, Y, *_ = build_rows(lesson_1(), experiments(lesson_1(), [w], {"F": force, "X1": [x1], "X2": [x2]}))
-    m1, m2, c1, c2 = TWO_MASS_NUMBERS.values()
-    # damper forces by hand: iω(a1 x1 + a12 (x1 − x2)), iω(a2 x2 + a12 (x2 − x1))
-    left = stack(1j * w * np.array([[x1, x1 - x2, 0], [0, x2 - x1, x2]]))
-    right = [force + m1 * w**2 * x1 - (c1 + c2) * x1 + c2 * x2, m2 * w**2 * x2 - c2 * x2 + c2 * x1]
-    np.testing.assert_allclose(K, left, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(Y, stack(np.array(right)), rtol=1e-13)
-
-
-def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
-    truth = np.array([4.0, 1.5, 2.5])
-    signals = simulate(lesson_1(), truth, np.array([8.0, 15.0, 20.0]), {"F": 5.0}).signals
-    signals["X2"][1] = np.nan
-    data = experiments(lesson_1(), [8.0, 15.0, 20.0], signals, names=["a", "b", "c"])
-    result = identify(lesson_1(), data)
-    np.testing.assert_allclose(result.values, truth, rtol=1e-11)
-    assert result.left_out == ("experiment b: X2 not measured",)
-    assert not result.linear.rows.used[1].any()
 
 
 @pytest.mark.parametrize(
@@ -83,21 +34,6 @@ def test_rows_that_need_a_missing_amplitude_are_left_out_and_named():
 def test_measurements_and_options_that_do_not_fit_are_refused(frequencies, signals, options, message):
     with pytest.raises(ValueError, match=message):
         identify(mass(), experiments(mass(), frequencies, signals, free=False), **options)
-
-
-def test_experiments_check_themselves():
-    one, free = {"X": np.ones(1, dtype=complex)}, np.zeros(1, dtype=bool)
-    for arguments, message in (
-        (((), np.zeros(0), {}, np.zeros(0, dtype=bool)), "no experiments"),
-        ((("1",), np.array([np.nan]), one, free), "frequencies must be finite"),
-        ((("1",), np.ones(1), {"X": np.ones(2, dtype=complex)}, free), "X: 1 finite values are needed"),
-        ((("1",), np.ones(1), one, free, None, {"X": np.ones((2, 2))}), "X: 1 finite values are needed"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            Experiments(*arguments)
-    for errors, message in (((-0.1,), "not negative"), ((), "greater than zero")):
-        with pytest.raises(ValueError, match=message):
-            AmplitudeErrors(*errors)
 
 
 def test_one_experiment_cannot_tell_stiffness_from_mass():

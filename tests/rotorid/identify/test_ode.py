@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from cases import each_of
-from timedomain_cases import book_model
 
 from rotorid.identify.expressions import FUNCTIONS
 from rotorid.identify.ode import SimulationError, ode_model
@@ -48,24 +47,6 @@ def test_linear_only_with_constant_coefficients(rate, linear):
     assert model.linear_driven is linear
 
 
-def test_matrices_and_their_derivatives():
-    model = ode_model(
-        {"x": "v", "v": "(-k*x - c*v + g*m)/m"},
-        initial={"x": "x0", "v": 0.5},
-        estimate={"m": 2.0, "c": 0.3, "x0": 0.1},
-        known={"k": 8, "g": 9.81},
-    )
-    table = model.matrices([2.0, 0.3, 0.1])
-    (a, *da), (b, *db) = table[:, :, :2], table[:, :, 2]
-    np.testing.assert_allclose(a, [[0, 1], [-4, -0.15]], rtol=1e-15)
-    np.testing.assert_allclose(b, [0, 9.81], rtol=1e-15)
-    np.testing.assert_allclose(da, [[[0, 0], [2, 0.075]], [[0, 0], [0, -0.5]], np.zeros((2, 2))], rtol=1e-15)
-    assert not np.any(db)
-    np.testing.assert_array_equal(model.x0([2.0, 0.3, 0.1]), [[0.1, 0, 0, 1], [0.5, 0, 0, 0]])
-    with pytest.raises(ValueError, match="not linear"):
-        book_model().matrices([1, 1, 1])
-
-
 @each_of(
     ("changes", "message"),
     [
@@ -97,15 +78,6 @@ def test_bad_models_are_refused_with_the_place(changes, message):
     options = {"states": {"x": "-a*x"}, "initial": {"x": 1.0}, "estimate": {"a": 1.0}} | changes
     with pytest.raises(ValueError, match=message):
         ode_model(options.pop("states"), **options)
-
-
-def test_record_keeps_missing_samples_and_shares_nothing():
-    t = np.arange(3.0)
-    record = Record(t, {"y": [1, np.nan, 3]}, {"u": [0, 1, 0]}, {"y": 0.1})
-    t[0] = 5.0
-    assert record.t[0] == 0.0
-    assert len(record) == 3
-    np.testing.assert_array_equal(record.outputs["y"], [1, np.nan, 3])
 
 
 @each_of(
@@ -146,20 +118,6 @@ def by_hand(force="0"):
     states = {"y1": "v_y1", "v_y1": first, "y2": "v_y2", "v_y2": second}
     outputs = {"y1": "y1", "y2": "y2"}
     return ode_model(states, initial={"v_y1": 0, "y2": 0, **STATE}, outputs=outputs, **COMMON)
-
-
-def test_functions_and_matrices_agree_with_the_system_by_hand():
-    model, plain = second_order(*MATRICES, initial=STATE, **COMMON), by_hand()
-    assert model.linear_driven
-    assert model.states == plain.states
-    ours, theirs = (m.matrices(m.start) for m in (model, plain))
-    np.testing.assert_allclose(ours, theirs, rtol=1e-13, atol=1e-15)
-    t, x = np.arange(3.0), np.random.default_rng(1).standard_normal((3, 4))
-    for name in ("f", "h"):
-        ours, theirs = (getattr(m, name)(t, x, model.start) for m in (model, plain))
-        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-15)
-        one = getattr(model, name)(0.0, x[0], model.start)
-        np.testing.assert_allclose(one, ours[0], rtol=1e-12, atol=1e-15)
 
 
 def test_forces_of_time_inputs_and_states():

@@ -60,26 +60,6 @@ def differences(model, theta, t, h=1e-3, **options):
     )
 
 
-@pytest.mark.parametrize("integrator", ["expm", "dop853", "lsoda"])
-def test_damped_oscillator_and_its_sensitivities(integrator):
-    """The closed form, and its derivatives by complex steps, exact to rounding."""
-    model = ode_model(
-        {"x": "v", "v": "-w**2*x - 2*d*v"}, initial={"x": 1.0, "v": 0.0}, outputs={"x": "x"},
-        estimate={"w": 2.0, "d": 0.3},
-    )  # fmt: skip
-    t, h = np.linspace(0, 12, 61), 1e-30
-
-    def exact(w, d):
-        f = np.sqrt(w**2 - d**2)
-        return np.exp(-d * t) * (np.cos(f * t) + d / f * np.sin(f * t))
-
-    slopes = np.stack([exact(2 + 1j * h, 0.3 + 0j).imag / h, exact(2 + 0j, 0.3 + 1j * h).imag / h], 1)
-    run = simulate(model, [2.0, 0.3], t, integrator=integrator)
-    tolerance = 1e-13 if integrator == "expm" else 1e-8
-    np.testing.assert_allclose(run.x[:, 0], exact(2.0, 0.3), atol=tolerance)
-    np.testing.assert_allclose(run.y_theta[:, 0], slopes, atol=tolerance)
-
-
 @pytest.mark.parametrize("integrator", [*ADAPTIVE, *STEPS])
 @pytest.mark.parametrize("make", [book_model, chain, pendulum])
 def test_sensitivities_against_differences(make, integrator):

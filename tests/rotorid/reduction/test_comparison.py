@@ -124,12 +124,7 @@ def test_what_no_steady_response_follows_is_said():
     ("speeds", "options", "message"),
     [
         ([10.0, 5.0], {}, "ascend"),
-        ([-1.0, 5.0], {}, "not negative"),
-        ([np.nan], {}, "finite"),
-        (["a"], {}, "numbers"),
-        ([], {}, "at least one"),
         ([10.0], {"bands": 1.0}, "part of the critical speed"),
-        ([10.0], {"bands": np.nan}, "part of the critical speed"),
         ([0.0, 135.0], {}, "other speeds, or narrower bands"),
     ],
 )
@@ -166,19 +161,6 @@ def growth(pair, speed):
     """Largest Re λ / |λ| of the state space's eigenvalues: another way than the search's."""
     values = pair.eigenvalues(speed)
     return float((values.real / np.abs(values)).max())
-
-
-@pytest.mark.parametrize("ratio", [0.0, 1.0])
-def test_internal_damping(ratio):
-    """c_i = β k: with c_e outside, (c_e + c_i) ω = c_i Ω at the threshold, and ω = ω0, in both models."""
-    material, expected = 1e-4, CRITICAL * (1 + ratio)
-    outside = fem.Support(2, 0.0, ratio * material * STIFFNESS)
-    cost = compare_stability(jeffcott(outside, material=material), 2.3 * expected)
-    for model in (cost.full, cost.small):
-        assert model.threshold == pytest.approx(expected, rel=1e-6)
-        assert model.frequency == pytest.approx(CRITICAL, rel=1e-6)
-        assert model.whirl_ratio == pytest.approx(1 / (1 + ratio), rel=1e-6)
-        assert (model.mode, model.direction) == (2, 1)  # backward whirl comes first
 
 
 def test_modal_damping_is_external():
@@ -278,8 +260,6 @@ def test_no_motion_is_left_out():
     ("highest", "options", "message"),
     [
         (10.0, {"lowest": 20.0}, "range of speeds is empty"),
-        (10.0, {"lowest": -5.0}, "not negative"),
-        (np.nan, {}, "finite"),
         (10.0, {"steps": 0}, "at least one step"),
         (10.0, {"steps": 2.5}, "at least one step"),
     ],

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import each_of
-from exact_solutions import exactly, frequency_response, whirl_exactly
+from exact_solutions import exactly, whirl_exactly
 from fem_rotors import rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -151,26 +151,6 @@ def test_condensed_supports_are_formula_50(rotor, reduction):
     np.testing.assert_allclose(mine.K, theirs.K, rtol=1e-9)
     np.testing.assert_array_equal(mine.M, theirs.M)
     np.testing.assert_allclose(np.sort(eigenvalues(small).imag)[-6::2], reduction.frequencies, rtol=1e-10)
-
-
-def test_state_space_has_the_same_eigenvalues_and_response():
-    discs = [fem.Disc(4, 30.0, 0.6, 0.3), fem.Disc(8, 20.0, 0.4, 0.2)]
-    rotor = full_machine(discs=discs, model=fem.Model(True, True, True))
-    small = small_model(rotor, (4, 8), (30.0, 20.0), modal_damping=(0.01,))
-    model, motion = small.state_space(250.0), small.motion(250.0)
-    assert model.inputs == ("f_x4", "f_x8", "f_y4", "f_y8")
-    assert model.outputs == ("x4", "x8", "y4", "y8")
-    for value in model.eigenvalues:
-        sigma = np.linalg.svd(value**2 * motion.M + value * motion.C + motion.K, compute_uv=False)
-        assert sigma[-1] < 1e-10 * sigma[0]
-    # unbalance U: f_x = Re(U Ω² e^{iΩt}), f_y = Im: f_y is −i times f_x
-    H = frequency_response(model, 250.0)[0]
-    expected = 250.0**2 * (H[:2, :2] - 1j * H[:2, 2:])
-    for k, node in enumerate((4, 8)):
-        x = small.deflections(np.array([250.0]), {node: 1.0})[0, :2]
-        np.testing.assert_allclose(x, expected[:, k], rtol=1e-9)
-    bearing = small.state_space(250.0, inputs=["f_x1"], outputs=["x1", "v_x4"])
-    assert frequency_response(bearing, 250.0).shape == (1, 2, 1)
 
 
 def test_damped_supports_cannot_be_condensed():

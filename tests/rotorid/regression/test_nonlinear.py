@@ -111,21 +111,6 @@ def test_a_parameter_at_its_bound_is_named_and_held():
     assert "slope stands at its bound" in fit.bound_warning
 
 
-def test_a_product_cannot_be_split_and_the_words_say_so():
-    t = np.linspace(1, 2, 8)
-    fit = nonlinear_least_squares(
-        lambda x: x[0] * x[1] * t + x[2] - 6 * t,
-        lambda x: np.stack((x[1] * t, x[0] * t, np.ones(8)), axis=1),
-        [1.0, 4.0, 0.5],
-        names=["a", "b", "c"],
-        sigma_stated=True,
-    )
-    assert (fit.estimate.rank, fit.estimate.undetermined) == (2, ("a", "b"))
-    a, b, c = fit.estimate.solution
-    assert (a * b, c) == pytest.approx((6, 0), rel=1e-9, abs=1e-9)
-    assert "a and b by themselves are not" in fit.estimate.describe_rank()
-
-
 @pytest.mark.parametrize("stated", [True, False])
 def test_a_robust_loss_shrugs_off_gross_errors(stated):
     K, y = line(seed=3, m=60, sigma=0.1)

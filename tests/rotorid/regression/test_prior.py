@@ -185,12 +185,6 @@ def test_a_wrong_prior_in_a_file_is_named(tmp_path, read, text, expected):
     assert "key prior" in str(raised.value)
 
 
-def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL + "b = [1, 0.5]\n", encoding="utf-8")
-    assert dict(read_ode_model(path).prior) == {"b": (1.0, 0.5)}
-
-
 def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():
     """[Q] (2.35), without the minus signs that the scan has lost, to half a unit of its last digit."""
     folder = sample_data() / "fit" / "quasilinearization"

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from balance_sheets import DATA, hard, on_top, parts_of, sheet_of
+from balance_sheets import DATA, hard, on_top, sheet_of
 from matplotlib.figure import Figure
 from sheets import disagreements
 
@@ -177,18 +177,6 @@ def test_the_readings_drawn_are_those_of_what_is_mounted(monkeypatch):
     assert dots[np.argsort(dots[:, 0]), 1] == pytest.approx([row["after"] for row in shown])
     band = np.array(closer.collections[0].get_segments())[:, 1, 1]
     assert band == pytest.approx(np.add([row["after"] for row in shown], report.result.within.ravel()))
-
-
-def test_pieces_are_drawn_in_their_holes():
-    from matplotlib.patches import Circle
-
-    _, report = parts_of(DATA / "turbo_job" / "holes.toml", split=True)
-    for plane in report.result.planes:
-        drawn = draw_plane(Figure().add_subplot(), report.result, plane, report.mounted)
-        full = [p for p in drawn.patches if isinstance(p, Circle) and p.get_facecolor()[:3] == (0.2,) * 3]
-        rows = [row for row in report.mounted.to_dict()["holes"] if row["plane"] == plane]
-        angles = sorted(np.degrees(np.angle(complex(*p.center))) % 360 for p in full)
-        assert angles == pytest.approx(sorted(row["angle_deg"] for row in rows), abs=1e-6)
 
 
 def test_no_piece_is_to_be_added_where_all_is_done(tmp_path):

@@ -7,7 +7,6 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -103,19 +102,6 @@ def test_more_samples_continue_a_study(tmp_path, threads):
     assert grown.read_bytes() == at_once.read_bytes()
     fewer = study(file, StudyOptions(samples=50, results=grown), threads)
     assert (len(fewer.result), grown.read_bytes()) == (50, at_once.read_bytes())
-
-
-def test_a_study_that_breaks_before_its_file_is_written_is_whole_the_next_time(
-    tmp_path, threads, monkeypatch
-):
-    file = tmp_path / "x.parquet"
-    monkeypatch.setattr(samples, "write_files", Mock(side_effect=OSError("disk full")))
-    with pytest.raises(OSError, match="full"):
-        drawn(number, file, threads)
-    monkeypatch.undo()
-    assert not file.exists()
-    assert drawn(number, file, threads) == pq.read_table(file)["x"].to_pylist() == NUMBERS
-    assert not list(tmp_path.glob("*.lock"))
 
 
 def test_a_file_of_another_study_is_refused_as_it_is(tmp_path, threads):

@@ -15,7 +15,7 @@ from rotorid.files.problems import InputError
 from rotorid.study import StudyOptions, study
 from rotorid.study.study_file import UNDETERMINED, UNSTABLE, read_study
 
-pq = pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
+pytest.importorskip("pyarrow.parquet", reason="without the extra rotorid[fleet]")
 
 
 def run(file, **options):
@@ -122,12 +122,3 @@ def test_what_is_wrong_with_a_file_is_told_with_its_key(tmp_path, old, new, word
         read_study(write(tmp_path, STUDY.replace(old, new)))
     assert words in str(told.value)
     assert len(told.value.problems) <= 5
-
-
-def test_the_command(cli, tmp_path):
-    file = write(tmp_path, TWO)
-    outcome = cli("study", file, "--json", "--results", tmp_path / "kept.parquet")
-    assert outcome.code == 0, outcome.err
-    assert {"probability", "interval", "samples"} < set(outcome.json)
-    assert b'"seed": 1' in pq.read_schema(tmp_path / "kept.parquet").metadata[b"study"]
-    assert cli("study", file, "--samples", "0").code == 2

