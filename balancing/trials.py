@@ -77,7 +77,7 @@ class Placement(NamedTuple):
 
 _EXACT = Placement()
 TURNED = "the rotor on its arbor"
-"""The plane that stands for a rotor turned on its arbor (`balancing.index`): no weight is misplaced there."""
+"""The plane that stands for a rotor turned on its arbor (`special_runs`): no weight is misplaced there."""
 
 TRIAL_WEIGHTS = "times the trial weight"
 """The unit of weights that are relative."""
@@ -217,7 +217,7 @@ class Trials:
 
     @property
     def turned(self) -> Trials:
-        """The runs with one plane more, the first, that stands for the index: see `balancing.index`."""
+        """The runs with one plane more, the first, that stands for the index: see `special_runs`."""
         if self.index is None:
             return self
         turn = np.exp(1j * self.index)
