@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -54,7 +54,13 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
     ax.axhline(0, color="0.8", lw=4, zorder=0)
     colors = np.where(estimate.determined, BLUE, "0.6")
-    look = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009, "edgecolor": "black"}
+    look: dict[str, Any] = {
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1,
+        "width": 0.009,
+        "edgecolor": "black",
+    }
     ax.quiver(places, 0 * places, tips.real, tips.imag, color=colors, linewidth=0.8, **look)
     ax.plot(places + edges.real.T, edges.imag.T, color="black", lw=1)
     ax.set_title("blue: determined, with 95 % regions; grey: not determined by the readings", fontsize=TEXT)
