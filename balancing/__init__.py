@@ -56,11 +56,13 @@ from balancing.verdict import (
     zones_of,
 )
 from balancing.what_if import WhatIf, mode_made_worse, what_if
+from balancing.without_phase import AmplitudeSolution, WithoutPhase, balance_without_phase
 
 __all__ = [
     "GRADES",
     "METHODS",
     "TRIAL_WEIGHTS",
+    "AmplitudeSolution",
     "CheckComparison",
     "Conditioning",
     "ConventionTest",
@@ -92,8 +94,10 @@ __all__ = [
     "Unknowns",
     "Verdict",
     "WhatIf",
+    "WithoutPhase",
     "Zones",
     "after_check_run",
+    "balance_without_phase",
     "change_of_run",
     "check_runs",
     "combine",

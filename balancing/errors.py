@@ -132,8 +132,13 @@ def reading_of(trials: Trials) -> Reading:
     ----------
     trials
         The runs.
+
+    Raises
+    ------
+    ValueError
+        For readings without phases.
     """
-    stated, scatter = trials.errors, _scatter(trials)
+    stated, scatter = trials.with_phases().errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
     if stated is None:
         estimate = _from_repeats(*scatter)

@@ -334,7 +334,7 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
     nothing = np.zeros(len(trials.runs))
     speeds = match_speeds(influence.speeds, trials.speeds, "baseline readings")
     at = np.ix_(speeds, [trials.sensors.index(name) for name in influence.sensors])
-    arrays = {name: getattr(trials, name) for name in ("readings", "steps", "covariance")}
+    arrays = {name: getattr(trials.with_phases(), name) for name in ("readings", "steps", "covariance")}
     return replace(
         trials,
         speeds=influence.speeds,

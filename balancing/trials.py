@@ -10,7 +10,6 @@ import numpy as np
 
 from balancing.conventions import Labels
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
-from rotorid.base.arrays import off_axis as off_axis
 from rotorid.base.text import RPM
 
 Arc = tuple[float, float]
@@ -139,6 +138,8 @@ class Trials:
         it was not. Weights count from the rotor's mark then, phases from that of the arbor.
     relative
         What the weights are relative to; None: nothing, their masses and places are known.
+    amplitudes_only
+        Whether phases are not known: the readings are amplitudes, ≥ 0, which `balance_without_phase` takes.
 
     Raises
     ------
@@ -162,6 +163,7 @@ class Trials:
     drift: float = 0.0
     index: FloatArray | None = None
     relative: Relative | None = None
+    amplitudes_only: bool = False
 
     def __post_init__(self) -> None:
         keep(
@@ -180,6 +182,8 @@ class Trials:
                 f"readings must have shape (repeats, {R} runs, {S} speeds, {C} sensors); got {readings.shape}"
             )
         self._check_readings(readings)
+        if self.amplitudes_only:
+            readings = np.abs(readings).astype(complex)
         weights = np.array(self.weights, dtype=complex)
         if weights.shape != (R, P) or not np.isfinite(weights).all():
             raise ValueError(f"weights must be finite, of shape ({R} runs, {P} planes); got {weights.shape}")
@@ -214,6 +218,15 @@ class Trials:
                 f"{self.speeds[s] * RPM:.6g} rpm is missing or infinite: every sensor must be read in every "
                 "run at every speed; leave out the sensor or the speed, or repeat the run"
             )
+
+    def with_phases(self) -> Trials:
+        """The same; ValueError where their phases are not known."""
+        if self.amplitudes_only:
+            raise ValueError(
+                "these readings have no phases: they are balanced by rotorid balance "
+                "(balancing.balance_without_phase), and tell nothing else"
+            )
+        return self
 
     @property
     def turned(self) -> Trials:

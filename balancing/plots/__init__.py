@@ -3,7 +3,7 @@
 from balancing.plots.along_shaft import draw_tolerance, draw_unbalance
 from balancing.plots.correction import correction_figure, residual_figure
 from balancing.plots.discs import draw_disc, draw_plane, weight_figure
-from balancing.plots.polar import draw_trial_weight, trial_figure
+from balancing.plots.polar import draw_trial_weight, solutions_figure, trial_figure
 
 __all__ = [
     "correction_figure",
@@ -13,6 +13,7 @@ __all__ = [
     "draw_trial_weight",
     "draw_unbalance",
     "residual_figure",
+    "solutions_figure",
     "trial_figure",
     "weight_figure",
 ]

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from balancing.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import COLORS, MARKERS, TEXT, legend_below, new_figure
+from rotorid.base.text import cut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
     from balancing.trial_weight import TrialWeight
+    from balancing.without_phase import WithoutPhase
 
 Shown = Callable[[ArrayLike], tuple[FloatArray, FloatArray]]
 """`Labels.weight` or `Labels.vibration`: size and angle in degrees as the job writes them."""
@@ -87,6 +89,27 @@ def on_paper(labels: Labels, vectors: ArrayLike) -> ComplexArray:
 def unit(labels: Labels) -> str:
     """Unit of the readings, as it stands under the name of an axis, for short axes too."""
     return f",\n{labels.vibration_in}" if labels.vibration_in else ""
+
+
+def solutions_figure(result: WithoutPhase) -> Figure:
+    """Solutions without phase, with what the errors allow of each, and the weights of the runs."""
+    labels, planes = result.labels, result.planes
+    figure = new_figure(5 * len(planes), 5.4)
+    for p, plane in enumerate(planes):
+        ax = figure.add_subplot(1, len(planes), p + 1, projection="polar")
+        polar = polar_axes(ax, labels.angles_on_paper, f"Plane {cut(plane, 24)!r}, {labels.weight_in}")
+        tried = result.trials.weights[:, p]
+        for k, one in enumerate(result.solutions[: len(COLORS)]):
+            look, (size, angle) = of_plane(k), labels.weight(one.draws[::4, p])
+            polar.plot(np.deg2rad(angle), size, ".", ms=2, alpha=0.25, color=look["color"])
+            name = f"solution {k + 1}: {labels.weight_at(one.weights[p])}"
+            draw_line(polar, labels.weight, [0, one.weights[p]], lw=2, label=name, **look)
+        size, angle = labels.weight(tried[tried != 0])
+        polar.plot(np.deg2rad(angle), size, "o", mfc="white", color="black", label="weights of the runs")
+        every = np.array([*tried, *(one.weights[p] for one in result.solutions)])
+        from_zero(polar, labels.weight, every, 2.5 * np.abs(tried).max() * labels.weight_scale)
+    legend_below(figure, figure.axes)
+    return figure
 
 
 def trial_figure(weights: Sequence[TrialWeight]) -> Figure:

@@ -82,11 +82,10 @@ class Answer:
         numbers, hidden = _shortened(_wrapped(self.numbers), room - first, most)
         fitting = sum(end <= room - len(numbers) for end in accumulate(map(len, remarks)))
         shown = remarks[: max(fitting, 1)]
-        more = self.more if len(self.more) < COLUMNS // 2 else "the tables"
         rest = [
             counted(hidden, "more line") if hidden else "",
             counted(others, "more remark") if (others := len(remarks) - len(shown)) else "",
-            more if self.tables else "",
+            self.more if self.tables else "",
         ]
         where = cut(capital("; ".join(filter(None, rest))), COLUMNS - len(": --table."))
         blocks = (
@@ -126,16 +125,19 @@ def together(answers: Iterable[Answer]) -> Answer:
     """Answers beside each other as one: their judgements first."""
     each = list(answers)
 
+    def joined(field: str, between: str) -> str:
+        return between.join(filter(None, dict.fromkeys(getattr(one, field) for one in each)))
+
     def all_of(field: str) -> tuple[str, ...]:
         return tuple(dict.fromkeys(words for one in each for words in getattr(one, field)))
 
     return Answer(
-        "\n".join(filter(None, (one.judgement for one in each))),
-        "\n\n".join(filter(None, (one.numbers for one in each))),
+        joined("judgement", "\n"),
+        joined("numbers", "\n\n"),
         all_of("warnings"),
         all_of("notes"),
         all_of("tables"),
-        "; ".join(dict.fromkeys(one.more for one in each if one.tables)),
+        joined("more", "; "),
         to_mount=any(one.to_mount for one in each),
     )
 
@@ -155,14 +157,14 @@ def kinds(clauses: Iterable[str]) -> list[str]:
 
 
 def _worst(same: list[str]) -> str:
-    """The clause whose quantity that differs most, in ratio, is the largest (after "only" the smallest)."""
-    each = [_QUANTITY.findall(re.sub(r"'[^']*'", "", clause)) for clause in same]
-    worst, most = same[0], 1.0
-    for column in zip(*each, strict=False):
-        sizes = [max(abs(float(number)), 1e-300) ** (-1 if less else 1) for less, number in column]
-        if (ratio := max(sizes) / min(sizes)) > most:
-            worst, most = same[sizes.index(max(sizes))], ratio
-    return worst
+    """The clause whose first quantity that differs is the largest (after "only" the smallest)."""
+    return max(
+        same,
+        key=lambda clause: [
+            float(number) * (-1 if less else 1)
+            for less, number in _QUANTITY.findall(re.sub(r"'[^']*'", "", clause))
+        ],
+    )
 
 
 def _wrapped(words: str) -> list[str]:

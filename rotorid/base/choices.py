@@ -46,13 +46,11 @@ def find(methods: Sequence[Method[_T]], name: str, what: str) -> Method[_T]:
 def suggest(name: str, choices: Iterable[str]) -> str | None:
     """The choice nearest to a misspelt name, or None.
 
-    First one that only has its unit more, then a similar one, then the only one that begins so.
+    First one that only has its unit more, then a similar one.
     """
     word, spelt = name.casefold(), {each.casefold(): each for each in reversed([*choices])}
-    begun = [each for each in spelt if each.startswith(word)]
-    unit_missing = [each for each in begun if each.startswith(f"{word}_")][-1:]
-    only = begun if len(begun) == 1 and len(name) > 2 else []
-    nearest = unit_missing or difflib.get_close_matches(word, spelt, n=1) or only
+    unit_missing = [each for each in spelt if each.startswith(f"{word}_")][-1:]
+    nearest = unit_missing or difflib.get_close_matches(word, spelt, n=1)
     return spelt[nearest[0]] if nearest else None
 
 

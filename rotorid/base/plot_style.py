@@ -35,7 +35,7 @@ def new_axes(size: tuple[float, float] = (WIDTH, 4.2), **options: Any) -> Axes: 
     """Make axes of a new figure, size in inches; options as for `add_subplot`."""
     from matplotlib import pyplot as plt
 
-    _, ax = plt.subplots(figsize=size, layout="constrained", subplot_kw=options)
+    ax: Axes = plt.figure(figsize=size, layout="constrained").add_subplot(**options)
     return ax
 
 
@@ -127,7 +127,8 @@ def plain_numbers(ax: _AxesBase) -> None:
 
 def second_scale(ax: Axes, unit: float = RPM, label: str = "speed, rad/s", side: str = "top") -> None:
     """A second scale, of values in this unit, above the axes or right of them."""
-    make: Callable[..., _AxesBase] = ax.secondary_xaxis if side == "top" else ax.secondary_yaxis
+    axis = "x" if side == "top" else "y"
+    make: Callable[..., _AxesBase] = getattr(ax, f"secondary_{axis}axis")
     scale = make(side, functions=(lambda x: np.asarray(x) / unit, lambda x: np.asarray(x) * unit))
     scale.tick_params(labelsize=TEXT)
-    (scale.set_xlabel if side == "top" else scale.set_ylabel)(label, fontsize=TEXT)
+    getattr(scale, f"set_{axis}label")(label, fontsize=TEXT)

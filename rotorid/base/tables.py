@@ -41,12 +41,10 @@ if TYPE_CHECKING:
 Value = str | int | float | bool | None
 LONGEST_TITLE = 31
 """Characters of the name of a sheet in a workbook."""
-NARROW, LETTERS = 6, 50
-"""Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
+NARROW = 4
+"""Columns that a telephone shows side by side; rows of wider tables become blocks there."""
 LONG, THINNED = 60, 13
 """Rows of a table that a page shows whole, and of a longer one so many."""
-OLDEST = (1980, 1, 1, 0, 0, 0)
-"""Date of a part of an archive."""
 NOTHING, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 """In HTML, where nothing is known, and before negative numbers."""
 
@@ -105,22 +103,11 @@ class Table:
     note
         What a reader must know about it.
 
-    Raises
-    ------
-    ValueError
-        For columns of different lengths, lists in their cells, and without any.
     """
 
     name: str
     columns: tuple[Column, ...]
     note: str = ""
-
-    def __post_init__(self) -> None:
-        if len({len(column.values) for column in self.columns}) != 1:
-            raise ValueError(f"the table {self.name!r} must have columns of one length")
-        for column in self.columns:
-            if any(isinstance(value, list | dict) for value in column.values):
-                raise ValueError(f"the column {column.heading!r} must be one-dimensional")
 
     def under(self, place: str) -> Table:
         """The same, of a result that stands at this place of a document."""
@@ -189,7 +176,7 @@ def csv(table: Table) -> bytes:
 def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
     """A workbook (.xlsx) with a sheet for each table, behind the sheets of a `book` and opened there.
 
-    Its date and those of its parts are that of `now`.
+    Its date is that of `now`; its parts have none.
     """
     import openpyxl
     from openpyxl.packaging.custom import IntProperty
@@ -208,32 +195,22 @@ def excel(*tables: Table, book: Any = None) -> bytes:  # noqa: ANN401
         _fill(book.create_sheet(table.name[:LONGEST_TITLE]), table)
     book.active = first
     book.properties.modified = date
-    saved, dated = io.BytesIO(), io.BytesIO()
+    saved, undated = io.BytesIO(), io.BytesIO()
     ExcelWriter(book, zipfile.ZipFile(saved, "w")).save()
-    with zipfile.ZipFile(saved) as parts, zipfile.ZipFile(dated, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(saved) as parts, zipfile.ZipFile(undated, "w") as archive:
         for part in parts.namelist():
-            info = zipfile.ZipInfo(part, max(date.timetuple()[:6], OLDEST))
-            archive.writestr(info, parts.read(part), zipfile.ZIP_DEFLATED)
-    return dated.getvalue()
+            archive.writestr(zipfile.ZipInfo(part), parts.read(part), zipfile.ZIP_DEFLATED)
+    return undated.getvalue()
 
 
 def _fill(sheet: Any, table: Table) -> None:  # noqa: ANN401
     """Note, headings and rows of a table in a sheet."""
-    from openpyxl.styles import Font
     from openpyxl.utils import get_column_letter
 
     above = [(f"# {line}",) for line in table.note.splitlines()]
-    for number, row in enumerate([*above, table.headings, *table.rows], start=1):
-        for place, value in enumerate(row, start=1):
-            written = sheet.cell(number, place)
-            if isinstance(value, str):
-                written.value, written.data_type = one_line(value), "s"  # never a formula
-            elif isinstance(value, float):  # of which openpyxl would keep 16 digits
-                written.value, written.data_type = repr(value), "n"
-            else:
-                written.value = value
+    for row in (*above, table.headings, *table.rows):
+        sheet.append([guarded(value) if isinstance(value, str) else value for value in row])
     for place, heading in enumerate(table.headings, start=1):
-        sheet.cell(len(above) + 1, place).font = Font(bold=True)
         sheet.column_dimensions[get_column_letter(place)].width = max(12, len(heading) + 2)
     sheet.freeze_panes = f"A{len(above) + 2}"
 
@@ -249,16 +226,15 @@ def html(table: Table, longest: int = LONG) -> Markup:
     rows: Sequence[int] = range(count)
     if count > longest:
         rows = [round(i * (count - 1) / (THINNED - 1)) for i in range(THINNED)]
-    heads, cells, letters = "", [], 0
+    heads, cells = "", []
     for column in table.columns:
         heading, texts, kind = escape(column.heading), column.texts, "" if column.words else ' class="n"'
-        letters += max(map(len, (column.heading, *texts)))
         heads += f"<th{kind}>{heading}</th>"
         shown = (_number(column, row, escape(texts[row] or NOTHING)) for row in rows)
         cells.append([f'<td{kind} data-label="{heading}">{each}</td>' for each in shown])
     body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in zip(*cells, strict=True))
     caption = f"<caption>{escape(table.name)}</caption>\n" if table.name else ""
-    wide = ' class="blocks"' if len(cells) > NARROW or letters > LETTERS else ""
+    wide = ' class="blocks"' if len(cells) > NARROW else ""
     thinned = f"{len(rows)} of {count} rows; --output writes all." if len(rows) < count else ""
     words = " ".join(filter(None, (table.note, thinned)))
     note = f'\n<p class="note">{escape(words)}</p>' if words else ""

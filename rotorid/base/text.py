@@ -131,8 +131,8 @@ def phase_deg(z: ArrayLike) -> FloatArray:
     """Phases of complex numbers, 0 ≤ phase < 360 degrees."""
     import numpy as np
 
-    phase = np.mod(np.degrees(np.angle(np.asarray(z))), 360.0)
-    return np.where(phase >= 360.0, 0.0, phase)  # −1e-20 modulo 360 is rounded to 360
+    # −1e-20 modulo 360 is rounded to 360
+    return np.asarray(np.degrees(np.angle(np.asarray(z))) % 360.0 % 360.0)
 
 
 @dataclass(frozen=True)

@@ -33,12 +33,10 @@ def _end_with_parent() -> None:
 @contextmanager
 def single_threads() -> Iterator[None]:
     """One thread of linear algebra in processes that start now: more change digits, and are slower."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ[name] for name in names if name in os.environ}
-    os.environ.update(dict.fromkeys(names, "1"))
+    before = dict(os.environ)
+    os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
     try:
         yield
     finally:
-        for name in names:
-            del os.environ[name]
+        os.environ.clear()
         os.environ.update(before)

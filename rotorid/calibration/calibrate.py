@@ -119,9 +119,8 @@ def calibrate(
         raise ValueError(f"no data have readings of {lost[0]}: {', '.join(shown)}")
     check_different(rotor, equations.paths)
     names = tuple(unknown.label for unknown in unknowns)
-    limits = dict(zip(names, (unknown.limits(rotor) for unknown in unknowns), strict=True))
     prior = prior_rows(names, {unknown.label: unknown.prior for unknown in unknowns if unknown.prior})
-    bounds = np.array([*limits.values()], dtype=float)
+    bounds = np.array([unknown.limits(rotor) for unknown in unknowns], dtype=float)
     bounds = np.where(np.isnan(bounds), (-np.inf, np.inf), bounds)
     first = np.clip([unknown.first(rotor) for unknown in unknowns], *bounds.T)
     equations.weigh(first)
@@ -134,7 +133,7 @@ def calibrate(
             begin,
             names=names,
             sigma_stated=True,
-            bounds=limits,
+            bounds=bounds,
             near=near,
             prior=prior,
         )

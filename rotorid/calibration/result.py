@@ -99,8 +99,10 @@ class CalibratedRotor:
     @property
     def std(self) -> FloatArray:
         """One standard deviation (n,); NaN at a bound and where not determined."""
-        of_fit = np.full(len(self.names), np.nan) if self.fit.std is None else self.fit.std
-        return np.where(np.isnan(of_fit), np.nan, np.sqrt(np.diag(self.covariance)))
+        of_fit = self.fit.estimate.std
+        return np.where(
+            np.isnan(np.nan if of_fit is None else of_fit), np.nan, np.sqrt(np.diag(self.covariance))
+        )
 
     @property
     def data_share(self) -> FloatArray:
@@ -154,7 +156,7 @@ class CalibratedRotor:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
-        warnings = list(self.fit.end_warnings)
+        warnings = [*filter(None, (self.undetermined, self.fit.bound_warning))]
         if self.chance < LEVEL and self.fit.converged:
             times, errors = np.sqrt(self.chi_square / self.dof), "stated" if self.stated else "assumed"
             lack = f" ({percent(self.lack_of_fit)} % of what weights do)" if self.lack_of_fit else ""

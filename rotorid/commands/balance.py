@@ -22,6 +22,7 @@ from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, count
 from rotorid.commands.quantities import one_of
 from rotorid.commands.special_runs import special
 from rotorid.commands.tolerance import ToleranceOptions, permissible
+from rotorid.commands.without_phase import balanced_without_phase
 from rotorid.report.options import check_choices
 from rotorid.report.outcome import Outcome, command, provenance, table_of
 
@@ -84,6 +85,8 @@ class Balance(Outcome):
 def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcome:
     """Correction weights from trial runs or a rotor model, with ± and what will be left.
 
+    Runs without phases are balanced by their amplitudes.
+
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
@@ -106,6 +109,8 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcom
     options = options or BalanceOptions()
     _check(options)
     read, files, again = job_of(job, options)
+    if read.trials.amplitudes_only:
+        return balanced_without_phase(read, options)
     if options.weights is not None:
         from rotorid.commands.what_if import predicted
 

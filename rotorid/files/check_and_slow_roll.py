@@ -98,7 +98,7 @@ def make_slow_roll(
         if len(runs.runs) > 1:
             expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
             problems.add(expected, place, None, "run", runs.runs[1])
-        given, vectors, lowest = runs.sensors, runs.mean[0], float(trials.speeds.min())
+        given, vectors, lowest = runs.sensors, runs.with_phases().mean[0], float(trials.speeds.min())
         near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
         if len(runs.speeds) == 1:
             vectors = vectors[0]
@@ -154,7 +154,12 @@ def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, pro
 
 def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
     """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors, and warnings."""
-    left, labels, errors, words = trials.readings - vectors, trials.labels, trials.errors, list[str]()
+    left, labels, errors, words = (
+        trials.with_phases().readings - vectors,
+        trials.labels,
+        trials.errors,
+        list[str](),
+    )
     S, size = np.abs(np.broadcast_to(vectors, left.shape[2:])), np.abs(trials.mean)
 
     def shown(amplitude: float) -> str:
@@ -209,6 +214,9 @@ def check_runs(
     check = in_planes(check, groups)
     before, band, runs = len(problems), conventions.speed_tolerance_percent, source_name(sources[0])
     weights = source_name(sources[1] or sources[0])
+    if check.amplitudes_only and not job.amplitudes_only:
+        problems.add("phases, as the runs of the job have", runs, None, "phase")
+    check = replace(check, amplitudes_only=job.amplitudes_only)
     _complain(outside(check, job, planes, band), runs, weights, problems)
     near = [nearest_speed(job.speeds, v, band) for v in check.speeds.tolist()]
     for k, at in enumerate(near):

@@ -23,7 +23,7 @@ from balancing import (
     unknowns,
 )
 from fem import Sensor as Probe
-from rotorid.base.arrays import ComplexArray, FloatArray, off_axis
+from rotorid.base.arrays import ComplexArray, FloatArray, polar
 from rotorid.base.text import counted, listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
@@ -307,11 +307,12 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     if rotor is not None:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
     shares = np.array([share for group in groups.values() for share in group.values()], dtype=complex)
-    vectors = [trials.weights, shares, np.exp(1j * np.radians(degrees))]
+    vectors = [trials.weights, shares, polar(1.0, np.radians(degrees))]
     vectors += [] if check is None else [check.weights]
     machine = units.vibration(trials.labels.vibration_unit).kind == "unbalance"  # phases are angles then
-    matters = {"phase": not machine, "angles": machine or any(map(off_axis, vectors))}
-    labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters[name]))
+    matters = {"phase": not machine, "angles": machine or any(np.imag(each).any() for each in vectors)}
+    matters = {} if trials.amplitudes_only else matters  # they tell no direction of turning, and need none
+    labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters.get(name)))
     return Job(
         trials=replace(trials, labels=labels),
         influence=None if influence is None else replace(influence, labels=labels),

@@ -46,6 +46,8 @@ _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
 MOUNTED = "note of weights: "
 """Begins the name of a column of weights, which belong into a weights table."""
+_BLANK = {"", "n.a.", "n/a", "na", "-", "--", "?", "none"}
+"""Cells of a column of phases that nobody knows."""
 _OF_READING = ("run", "speed", "repeat")
 _NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
@@ -202,6 +204,32 @@ def read_runs_grids(
         except InputError as error:
             problems.extend(error.problems)
     return grids if len(grids) == len(files or (source,)) else None
+
+
+def without_phases(grids: Sequence[Grid]) -> tuple[list[Grid], str]:
+    """Long runs tables without their column of phases, and what to say, where these are no phases.
+
+    All are blank (or n.a.), or all 0 in three runs or more.
+    """
+    places = [
+        next((k for k, name in enumerate(grid.header) if name.startswith("phase")), None) for grid in grids
+    ]
+    cells, runs = set[str](), set[str]()
+    for grid, k in zip(grids, places, strict=True):
+        cells |= {show(row[k]).strip().casefold() for _, row in grid.rows} if k is not None else {""}
+        run = grid.header.index("run") if "run" in grid.header else None
+        runs |= {show(row[run]) for _, row in grid.rows} if run is not None else set()
+    zero = len(runs) > 2 and all(_DECIMAL.fullmatch(cell) and float(cell) == 0 for cell in cells)
+    if not (zero or cells <= _BLANK) or all(k is None for k in places):
+        return list(grids), ""
+    cut = []
+    for grid, k in zip(grids, places, strict=True):
+        keep = [j for j in range(len(grid.header)) if j != k and not grid.header[j].startswith("phase_std")]
+        named = tuple(tuple(names[j] for j in keep) for names in grid.named)
+        rows = tuple((number, tuple(row[j] for j in keep)) for number, row in grid.rows)
+        cut.append(replace(grid, header=tuple(grid.header[j] for j in keep), rows=rows, named=named))
+    words = "all phases are 0: they are taken as not known, and the amplitudes alone are used"
+    return cut, words if zero else ""
 
 
 def joined(grids: Sequence[Grid] | None, problems: Problems) -> Grid | None:
@@ -392,8 +420,9 @@ def _by_name(
     if len(sensors) == 1 and len(loose) == 1 and not loose.keys() & next(iter(sensors.values())).keys():
         next(iter(sensors.values())).update(loose)  # one sensor, named in one of its headings
         loose = {}
+    lone = pair == READING and not any(column.stem == "phase" for column in columns)
     for by_stem in (loose, *sensors.values()):
-        if by_stem and (by_stem is loose or len(by_stem) < 2):
+        if by_stem and (by_stem is loose or len(by_stem) < 2) and not (lone and "amplitude" in by_stem):
             one = next(iter(sensors))
             words = f"in columns such as '{one} {pair[0]}' and '{one} {pair[1]}'"
             raise _unclear(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Labels, ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray, off_axis, turned
+from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
@@ -30,6 +30,7 @@ from rotorid.files.layout import (
     joined,
     read_runs_grids,
     stated_phase,
+    without_phases,
 )
 from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import Unit, one_of
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
+_UNKNOWN = replace(PHASE, required=False)
 COLUMNS = (
     Column("run"),
     SPEED,
@@ -53,6 +55,8 @@ COLUMNS = (
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
+AMPLITUDES = tuple(_UNKNOWN if column is PHASE else column for column in COLUMNS)
+"""Those of a runs table that may have no phases."""
 OVER_SPEED = (
     *(column for column in COLUMNS if column.stem not in ("repeat", "time_s")),
     Column("time", one_of(units.TIME), ("time_s",), required=False),
@@ -130,8 +134,10 @@ def read_trials(
     trials = problems.need(make_trials(runs, weights, conventions, errors, problems))
     problems.stop()
     assumed: tuple[str, ...] = ("phase",) if phase is None else ()
-    if angles is None and off_axis(trials.weights):
+    if angles is None and trials.weights.imag.any():
         assumed += ("angles",)
+    if trials.amplitudes_only:  # they tell no direction of turning, and need none
+        assumed = ()
     return replace(trials, labels=replace(trials.labels, assumed=assumed))
 
 
@@ -173,12 +179,17 @@ def read_runs(
         Collects the complaints.
     """
     grids = read_runs_grids(source, conventions, problems)
-    if grids is None or (len(grids) > 1 and not all(readings_table(grid, problems) for grid in grids)):
+    grids, blank = (None, "") if grids is None else without_phases(grids)
+    columns = AMPLITUDES
+    if grids is None or (
+        len(grids) > 1 and not all(readings_table(grid, problems, columns) for grid in grids)
+    ):
         return None, None
     grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
-    table = None if grid is None else readings_table(grid, problems)
+    table = None if grid is None else readings_table(grid, problems, columns)
     if table is None:
         return None, None
+    known = "phase" in table
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start, band = len(problems), conventions.speed_tolerance_percent
@@ -198,13 +209,9 @@ def read_runs(
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
-    turn, labels = None, conventions.labels
-    if "index" in table and len(problems) == start:
-        by_run = dict(zip(run[::-1], table.numbers("index")[::-1], strict=True))
-        turn = labels.with_rotation(np.array([by_run[name] for name in runs]))
-        same = np.array([by_run[name] for name in run]) == table.numbers("index")
-        table.complain_where(~same, "index", "one index a run, the same in all its rows")
-    if not len(problems):
+    labels = conventions.labels
+    turn = _index(table, runs, labels) if "index" in table and len(problems) == start else None
+    if not len(problems) and known:
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
@@ -220,7 +227,7 @@ def read_runs(
     unit = table.unit("amplitude")
     if unit.kind == "unbalance":  # of a calibrated machine, at angles as those of weights
         labels = replace(labels, phase="lead" if labels.angle_sign > 0 else "lag")
-    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase", 0.0))
     labels = replace(
         labels,
         vibration_unit=unit.name,
@@ -234,7 +241,8 @@ def read_runs(
         for name in table.grid.header
         if name.startswith(MOUNTED)
     ]
-    stated = np.moveaxis(covariances(table, vectors), 0, -1) if "phase_std" in table else None
+    stated = np.moveaxis(covariances(table, vectors), 0, -1) if known and "phase_std" in table else None
+    nothing, noted = np.zeros(len(table)), [blank] if blank else []
     return runs, Trials(
         runs,
         speeds,
@@ -243,11 +251,21 @@ def read_runs(
         placed(vectors),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged))),
-        steps=placed(np.array([table.steps("amplitude"), table.steps("phase")])),
+        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
+        steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if known else nothing])),
         covariance=None if stated is None else placed(stated),
         index=turn,
+        amplitudes_only=not known,
     )
+
+
+def _index(table: Table, runs: Sequence[str], labels: Labels) -> FloatArray:
+    """By what angle the rotor was turned on its arbor in each run, rad with the rotation; notes a problem."""
+    run, index = table.texts("run"), table.numbers("index")
+    by_run = dict(zip(run[::-1], index[::-1], strict=True))
+    same = np.array([by_run[name] for name in run]) == index
+    table.complain_where(~same, "index", "one index a run, the same in all its rows")
+    return np.asarray(labels.with_rotation(np.array([by_run[name] for name in runs])))
 
 
 def _merge_speeds(
@@ -431,7 +449,7 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     problems.stop()
     unit, sweeps = table.unit("amplitude"), []
     labels = Labels(unit.name, unit.scale, phase=phase, speed_unit=table.unit("speed").name)
-    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase"))
+    vectors = labels.vibration_from(table.numbers("amplitude"), table.numbers("phase", 0.0))
     stated = covariances(table, vectors) if "amplitude_std" in table else None
     runs, names, speeds = np.array(table.texts("run")), table.texts("sensor"), table.numbers("speed")
     for run in dict.fromkeys(runs.tolist()):

@@ -8,8 +8,9 @@ error, or else with that of this amplitude.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from rotorid.identify.operator_model import (
     nearest_mode,
     reference_amplitude,
 )
+from rotorid.regression.prior import Function
 
 RAD_PER_S = Shown("frequency, rad/s")
 THIN = 0.01
@@ -404,3 +406,13 @@ def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: Co
             amplitudes[:, [j]], errors, covariances[name][:, None] if name in covariances else None
         )[:, 0]
     return whiten
+
+
+def evaluated_once(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
+    """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
+
+    @lru_cache(maxsize=1)
+    def at(numbers: bytes) -> tuple[AnyArray, ...]:
+        return both(np.frombuffer(numbers))
+
+    return lambda x: at(x.tobytes())[0], lambda x: at(x.tobytes())[1]

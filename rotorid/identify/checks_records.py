@@ -23,7 +23,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import Iterations, Problem, at
+from rotorid.identify.record_residuals import Iterations, Problem
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Combination, Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
@@ -57,9 +57,9 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     prior = effect(problem.prior, J, r, theta, at_bounds=path.at_bounds)
     if prior is not None:
         if prior.alone:  # in the words of the nonlinear model, not of its tangents
-            alone = at(least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=JACOBIAN_RCOND), theta, r)
+            alone = least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=JACOBIAN_RCOND).at(theta, r)
             prior = replace(prior, alone=combined(problem, alone).describe_rank())
-        estimate, r = prior.apart(estimate), prior.best  # of the data alone
+        estimate, r = prior.apart(estimate), -prior.data.residuals  # of the data alone
     seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
     rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False

@@ -23,7 +23,7 @@ import numpy as np
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
-from rotorid.identify.amplitudes import Comparison, Experiments, compare
+from rotorid.identify.amplitudes import Comparison, Experiments, compare, evaluated_once
 from rotorid.identify.combinations import NAME, why_several
 from rotorid.identify.linear_start import SAME, LinearFit, build_rows, linear_fit, passive_elements, several
 from rotorid.identify.ode import check_known
@@ -34,9 +34,7 @@ from rotorid.regression.estimate import Combination, Estimate, only_determined
 from rotorid.regression.linear import normal_matrix
 from rotorid.regression.nonlinear import (
     LOSSES,
-    Bounds,
     NonlinearEstimate,
-    evaluated_once,
     nonlinear_least_squares,
 )
 from rotorid.regression.prior import PriorEffect, PriorValues, effect, prior_rows
@@ -49,6 +47,7 @@ WITHIN = 1e-6
 """A combination is determined if no more than this share of its slope lies outside what the data see."""
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
+Bounds = Mapping[str, tuple[float | None, float | None]]
 OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
 """A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
 
@@ -109,7 +108,7 @@ def _check(
     for what, names in (("start", start), ("bounds", bounds), ("prior", prior)):
         check_known(what, names, "parameter", model.parameters)
     for name, (low, high) in bounds.items():
-        if low is not None and high is not None and not low <= high:
+        if low is not None and high is not None and not low < high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     if prior and not experiments.stated:
         raise ValueError(
@@ -187,13 +186,13 @@ def output_error(
             point,
             names=names,
             sigma_stated=data.stated,
-            bounds=bounds or None,
+            bounds=np.array([(bounds or {}).get(name, (None, None)) for name in names], dtype=float),
             loss=loss,
             near=left < REWEIGHTINGS,
             prior=added,
         )
         iterations += fit.iterations
-        std = np.zeros(len(begin)) if fit.std is None else fit.std
+        std = np.zeros(len(begin)) if fit.estimate.std is None else fit.estimate.std
         if left < REWEIGHTINGS and (std > 0).any():
             moved = float((np.abs(fit.estimate.solution - point)[std > 0] / std[std > 0]).max())
         point = fit.estimate.solution
@@ -239,7 +238,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
     if covariance is not None:
         covariance = np.where(apart[:, None] | apart, np.nan, covariance)
 
-    warnings = [w for w in fit.end_warnings if w != estimate.describe_rank()]
+    warnings = [*filter(None, ("" if converged else fit.message, fit.bound_warning))]
     warnings += unexplained(estimate, stated=data.stated) if converged else []
     return Identification(
         model=model,

@@ -21,7 +21,7 @@ from rotorid.identify.record_residuals import RTOL, Iterations, Problem
 from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
-from rotorid.regression.nonlinear import inside, nonlinear_least_squares
+from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.regression.prior import prior_rows
 
 MOST_STARTS, OTHERS, MOST_WARNINGS = 10_000, 7, 3
@@ -106,7 +106,7 @@ def fit(  # noqa: PLR0913
     _check(model, several, method, integrator, loss)
     problem = Problem(model, several, integrator, rtol)
     (low, high), names = problem.model.bounds.T, problem.model.parameters
-    begin = inside(_start(problem, start or {}), low, high)
+    begin = np.clip(_start(problem, start or {}), low, high)
     priors = for_copies(model, len(several), model.prior)
     problem.prior = prior_rows(names, priors, ridge, begin, problem.jacobian)
 
@@ -124,7 +124,7 @@ def fit(  # noqa: PLR0913
             theta,
             names=names,
             sigma_stated=problem.stated,
-            bounds={name: (a, b) for name, a, b in zip(names, low, high, strict=True)},
+            bounds=problem.model.bounds,
             loss=loss,
             max_iterations=max_iterations,
             near=loss == "linear",

@@ -12,10 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
-from rotorid.identify.amplitudes import trusted
+from rotorid.identify.amplitudes import evaluated_once, trusted
 from rotorid.identify.answers import Answers, SteadyAnswers, swept_answers
 from rotorid.identify.modes_result import RARE, FittedModes, Readings, projected
-from rotorid.regression.nonlinear import NonlinearEstimate, evaluated_once, nonlinear_least_squares
+from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
@@ -103,7 +103,7 @@ def _search(
             q,
             names=names,
             sigma_stated=stated,
-            bounds=dict(zip(names, limits, strict=True)),
+            bounds=limits,
             near=turn > 0,
         )
         q = fit.estimate.solution

@@ -162,7 +162,9 @@ class FittedModes:
     @cached_property
     def values(self) -> FloatArray:
         """ω_r in rad/s and ζ_r, and their standard deviations, (4, k); NaN where these are unknown."""
-        std = np.full_like(self.fit.values, np.nan) if self.fit.std is None else self.fit.std
+        std = (
+            np.full_like(self.fit.values, np.nan) if self.fit.estimate.std is None else self.fit.estimate.std
+        )
         return np.vstack((self.fit.estimate.solution, std)).reshape(4, -1)
 
     @cached_property
@@ -218,7 +220,7 @@ class FittedModes:
         """Why there are no modes to go on with, in words: at most one clause a mode."""
         words, by_noise = [] if self.fit.converged else [self.fit.message], self.by_noise()
         speeds = self.readings.speeds
-        intervals = self.fit.std is not None
+        intervals = self.fit.estimate.std is not None
         for mode, ((low, high), values) in enumerate(zip(self.ends, self.values.T, strict=True)):
             omega, zeta, error, other = values
             near = speeds[(3 * low - 2 * high <= speeds) & (speeds <= 3 * high - 2 * low)]

@@ -46,6 +46,11 @@ class Iterations(NonlinearEstimate):
     regression: tuple[FloatArray, FloatArray] | None = None
     stopped_by: str | None = None
 
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,); NaN at a bound or where not determined; None where errors are unknown."""
+        return self.estimate.std
+
 
 class Problem:
     """Residuals y(t, θ) − measured, divided by the standard deviations where these are known.
@@ -190,13 +195,6 @@ class Problem:
 def _table(columns: Mapping[str, float | FloatArray], outputs: Sequence[str], samples: int) -> FloatArray:
     """Columns of the outputs, (samples, n_y), NaN where there are none."""
     return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs], axis=-1)
-
-
-def at(step: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
-    """The estimate of a step, as one of the parameters themselves."""
-    values = np.where(np.isnan(step.values), np.nan, theta)
-    chi = float(residuals @ residuals) if step.errors_stated else None
-    return replace(step, values=values, solution=theta, residuals=residuals, chi_square=chi)
 
 
 def negligible(size: FloatArray, theta: FloatArray, step: Estimate, limits: tuple[float, float]) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.identify.ode import SimulationError
-from rotorid.identify.record_residuals import Iterations, Problem, at, negligible
+from rotorid.identify.record_residuals import Iterations, Problem, negligible
 from rotorid.regression.estimate import Estimate
 
 Step = tuple[FloatArray, FloatArray, Estimate | None, FloatArray, bool, bool]
@@ -86,7 +86,7 @@ def iterate(
     if not np.isfinite(r).all():
         converged, message, r = False, "not converged: the states diverge", -last.residuals
     return Iterations(
-        at(last, history[-1], r),
+        last.at(history[-1], r),
         np.array(history),
         np.array(costs),
         converged,

@@ -188,20 +188,20 @@ def equivalent_masses(
     if B.ndim != 2:
         raise ValueError("equivalent_masses takes one model at a time; for many at once use design")
     names = [f"m{i + 1}" for i in range(B.shape[1])]
-    weights = np.where(np.abs(B).max(axis=1) > 0, 1.0, 0.0)  # rows of weight 0 are no degrees of freedom
-    if not weights.any():
+    used = B.any(axis=1)  # a row of zeros is no degree of freedom
+    if not used.any():
         raise ValueError("every row of the regression is zero: these modes and compliances say nothing")
-    free = least_squares(B, D, names=names, weights=weights)
-    return _nonnegative(free, B, D, weights) if nonnegative else free
+    free = least_squares(B[used], D[used], names=names)
+    return _nonnegative(free, B[used], D[used]) if nonnegative else free
 
 
-def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray, weights: FloatArray) -> Estimate:
+def _nonnegative(free: Estimate, B: FloatArray, D: FloatArray) -> Estimate:
     """The masses ≥ 0 with the least residual; covariance of the regression of the positive masses alone."""
     from scipy.optimize import nnls
 
     norms = np.linalg.norm(B, axis=0)
     start, _ = nnls(B / np.where(norms > 0, norms, 1.0), D / (np.linalg.norm(D) or 1.0))
-    inner = least_squares(B * (start > 0), D, names=free.names, weights=weights)
+    inner = least_squares(B * (start > 0), D, names=free.names)
     solution, unknown = inner.solution * (start > 0), np.where(np.isnan(free.values), np.nan, 0.0)
     covariance = inner.covariance
     return dataclasses.replace(

@@ -1,13 +1,12 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
-from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
+from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, echelon
 from rotorid.regression.linear import (
     RCOND,
     covariance_root,
     gain,
     least_squares,
     solution,
-    solution_and_rank,
     stack,
     stretch,
     unstretch,
@@ -19,12 +18,10 @@ __all__ = [
     "Combination",
     "Estimate",
     "covariance_root",
-    "coverage_factor",
     "echelon",
     "gain",
     "least_squares",
     "solution",
-    "solution_and_rank",
     "stack",
     "stretch",
     "unstretch",

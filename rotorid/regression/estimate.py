@@ -7,7 +7,7 @@ basis of the row space of K in reduced echelon form, such as "b − 0.5·d".
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,14 +33,11 @@ class Combination:
         The combination, such as "b − 0.5·d" or "b*(1 - delta)".
     value, std
         Its estimate and one standard deviation, None where that is unknown.
-    coefficients
-        Of the parameters, shape (n,), where it is linear (a tangent, where it is not); None: in words only.
     """
 
     words: str
     value: float
     std: float | None
-    coefficients: FloatArray | None = None
 
     def line(self) -> str:
         """One line of text: "b − 0.5·d = 3.1 ± 0.2"."""
@@ -72,17 +69,14 @@ class Uncertain:
         return None if self.covariance is None else np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
-    def coverage_factor(self) -> float | None:
-        """Half width of the 95 % interval in standard deviations; None where there is no interval."""
-        return coverage_factor(None if self.errors_stated else self.dof)
-
-    @property
     def ci95(self) -> FloatArray | None:
-        """95 % intervals, shape (n, 2); None where errors are unknown."""
-        std, factor = self.std, self.coverage_factor
-        if std is None or factor is None:
+        """95 % intervals (n, 2), normal ones of stated errors, else Student's t; None where unknown."""
+        from scipy.special import ndtri, stdtrit
+
+        if (std := self.std) is None or not (self.errors_stated or self.dof > 0):
             return None
-        return self.values[:, None] + factor * std[:, None] * [-1.0, 1.0]
+        factor = ndtri(0.975) if self.errors_stated else stdtrit(self.dof, 0.975)
+        return self.values[:, None] + np.outer(factor * std, [-1.0, 1.0])
 
     @property
     def correlation(self) -> FloatArray | None:
@@ -112,7 +106,10 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
     for row in records(parameter_columns(names, numbers)):
         name, value, std, *ends = row.values()
-        digits = value_digits(value or 0.0, std or 0.0)
+        digits = 6
+        if value and std:  # two digits of the standard deviation show
+            first, last = np.floor(np.log10((abs(value), std)))
+            digits = int(np.clip(2 + first - last, 6, 10))
         estimate, *interval = ("" if each is None else f"{each:.{digits}g}" for each in (value, *ends))
         error = "" if std is None else error_figures(std)
         share = percent(std / abs(value)) if error and value else ""
@@ -206,8 +203,18 @@ class Estimate(Answered, Uncertain):
     def combination(self, words: str, value: float, slope: FloatArray) -> Combination:
         """One of this value and these derivatives (n,) by the parameters, with its standard deviation."""
         cov = self.solution_covariance
-        std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
-        return Combination(words, value, std, slope)
+        std = None if cov is None else float(np.sqrt((slope @ cov @ slope).clip(0.0)))
+        return Combination(words, value, std)
+
+    def at(self, theta: FloatArray, residuals: FloatArray) -> Estimate:
+        """Of a step: the estimate of the parameters (n,) where it ends, with the residuals (m,) there."""
+        return replace(
+            self,
+            values=np.where(np.isnan(self.values), np.nan, theta),
+            solution=theta,
+            residuals=residuals,
+            chi_square=float(residuals @ residuals) if self.errors_stated else None,
+        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -260,32 +267,6 @@ class Estimate(Answered, Uncertain):
         return Answer(sentence(self.describe_rank()), "\n".join(lines), notes=tuple(notes))
 
 
-def coverage_factor(dof: float | None) -> float | None:
-    """Half width of a 95 % interval in standard deviations.
-
-    Parameters
-    ----------
-    dof
-        Degrees of freedom of the variance; None for a stated (known) variance.
-
-    Returns
-    -------
-    1.96 for a known variance, Student's t otherwise, None at dof = 0, where no interval exists.
-    """
-    from scipy.special import ndtri, stdtrit
-
-    if dof is None:
-        return float(ndtri(0.975))
-    return float(stdtrit(dof, 0.975)) if dof > 0 else None
-
-
-def value_digits(value: float, std: float) -> int:
-    """Significant digits of a value that show two of its standard deviation, from six to ten."""
-    if not (0 < std < np.inf and value):
-        return 6
-    return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 10))
-
-
 def combination_words(coefficients: FloatArray, names: Sequence[str]) -> str:
     """Write a linear combination as an engineer would: "b − 0.5·d"."""
     words = ""
@@ -313,20 +294,17 @@ def unit_columns(A: AnyArray) -> tuple[AnyArray, FloatArray]:
     return A / scale[..., None, :], scale
 
 
-def echelon(space: FloatArray) -> list[FloatArray]:
-    """Reduced row echelon form with clean zeros; columns are compared after scaling to unit length."""
+def echelon(space: FloatArray) -> FloatArray:
+    """Reduced row echelon form with clean zeros; columns are compared after scaling to unit length.
+
+    Whole and half numbers that rounding has blurred become exact again.
+    """
     A, scale = unit_columns(space)
     pivots: list[int] = []
     for column in range(A.shape[1]):
-        more = [*pivots, column]
-        if np.linalg.matrix_rank(A[:, more], WORD_TOLERANCE) == len(more):
-            pivots = more
+        if np.linalg.matrix_rank(A[:, [*pivots, column]], WORD_TOLERANCE) > len(pivots):
+            pivots.append(column)
     reduced = np.linalg.lstsq(A[:, pivots], A, rcond=None)[0]
-    reduced[np.abs(reduced) <= WORD_TOLERANCE] = 0.0
-    return [_snapped(row * scale / scale[p]) for row, p in zip(reduced, pivots, strict=True)]
-
-
-def _snapped(row: FloatArray) -> FloatArray:
-    """Whole and half numbers that rounding has blurred become exact again."""
-    near = np.round(2 * row) / 2
-    return np.where(np.abs(row - near) <= WORD_TOLERANCE * np.maximum(1.0, np.abs(row)), near, row)
+    rows = np.where(np.abs(reduced) > WORD_TOLERANCE, reduced, 0.0) * scale / scale[pivots, None]
+    near = np.round(2 * rows) / 2
+    return np.where(np.isclose(rows, near, WORD_TOLERANCE, WORD_TOLERANCE), near, rows)

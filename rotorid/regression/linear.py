@@ -14,8 +14,7 @@ variance of the residuals and Student's t; without degrees of freedom there is n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,11 +60,8 @@ def stretch(a: ArrayLike) -> FloatArray:
     if z.ndim == 1:
         return np.ascontiguousarray(z).view(np.float64)
     *more, m, n = z.shape
-    out = np.empty((*more, m, 2, n, 2))
-    out[..., 0, :, 0] = out[..., 1, :, 1] = z.real
-    out[..., 0, :, 1] = -z.imag
-    out[..., 1, :, 0] = z.imag
-    return out.reshape(*more, 2 * m, 2 * n)
+    columns = np.stack((z, 1j * z), axis=-1).reshape(*more, m, 2 * n)
+    return np.stack((columns.real, columns.imag), axis=-2).reshape(*more, 2 * m, 2 * n)
 
 
 def unstretch(v: ArrayLike) -> ComplexArray:
@@ -109,35 +105,30 @@ def least_squares(
     Y: ArrayLike,
     *,
     names: Sequence[str] | None = None,
-    weights: ArrayLike | None = None,
     sigma: ArrayLike | None = None,
     rcond: float = RCOND,
 ) -> Estimate:
-    """Solve `K θ = Y` by weighted linear least squares.
+    """Solve `K θ = Y` by linear least squares, weighted by errors where these are stated.
 
     Parameters
     ----------
     K
-        Matrix (m, n), real; or complex for complex unknowns, then it and Y are stretched and the estimate
-        has 2n parameters "Re name", "Im name". For real unknowns in complex equations pass `stack(K)`.
+        Matrix (m, n), real: of complex equations `stretch(K)` or `stack(K)`.
     Y
         Right side (m,).
     names
         Of the n unknowns; default θ1, θ2, ….
-    weights
-        Weight of each squared residual, ≥ 0, shape of Y; a row of weight 0 is left out. Default: 1. Without
-        `sigma` only.
     sigma
-        Stated errors of Y, which weight the rows: one standard deviation of each entry, shape of Y or scalar,
-        > 0 (of real and imaginary part alike, for complex Y).
+        Stated errors of Y, which weight the rows: one standard deviation of each entry, (m,) or one number,
+        > 0. Default: rows count alike.
     rcond
         Scaled singular values below `rcond` times the largest count as zero.
 
     Raises
     ------
     ValueError
-        For shapes that do not fit, NaN or infinite entries, no rows or columns, negative weights, errors
-        that are not positive.
+        For shapes that do not fit, entries that are complex or not finite, no rows or columns, errors that
+        are not positive.
 
     Notes
     -----
@@ -153,20 +144,29 @@ def least_squares(
       a              1.05   0.11   11   -0.370597   2.4706
       b              1.95  0.087  4.4     0.84961  3.05039
     """
-    A, y, labels = _real_problem(K, Y, names)
+    A, y = np.asarray(K), np.asarray(Y)
+    if A.ndim != 2 or A.shape[:1] != y.shape or 0 in A.shape:
+        raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
     m, n = A.shape
-    over = _row_factors(weights, sigma, len(np.asarray(Y)), m)
-    white, white_y = A * over[:, None], y * over
+    labels = tuple(names or (f"θ{i + 1}" for i in range(n)))
+    if not len(labels) == len(set(labels)) == n:
+        raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
+    stated, error = sigma is not None, np.asarray(1.0 if sigma is None else sigma, dtype=np.float64)
+    if error.shape not in ((), (m,)) or not ((error > 0) & (error < np.inf)).all():
+        raise ValueError(f"errors need one finite number above 0 per row of Y, {m}; got {error.shape}")
+    white, white_y = A / error[..., None], y / error
+    if np.iscomplexobj(white) or not (np.isfinite(white).all() and np.isfinite(white_y).all()):
+        raise ValueError("K and Y must be real and finite")
     unit, scale = unit_columns(white)
     U, s, Vt = np.linalg.svd(unit, full_matrices=False)
     rank = int(np.count_nonzero(s > rcond * s[0]))
+    Vt[:, ~white.any(axis=0)] = 0.0  # rounding, beside which there is nothing
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
     x = x + inverse @ (white_y - white @ x)
     left = white_y - white @ x
-    chi_square, stated = float(left @ left), sigma is not None
-    dof = int(np.count_nonzero(over)) - rank
+    chi_square, dof = float(left @ left), m - rank
     covariance: FloatArray | None = None
     if stated or dof > 0:
         covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof)
@@ -229,14 +229,7 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
     [1.0, 2.0]
     """
-    return solution_and_rank(A, y, rcond=rcond)[0]
-
-
-def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tuple[Any, int]:
-    """As `solution`, and the rank of A: below n the equations leave combinations of x open."""
-    unit, scale = unit_columns(np.asarray(A))
-    x, _, rank, _ = np.linalg.lstsq(unit, np.asarray(y), rcond=rcond)
-    return (x.T / scale).T, int(rank)
+    return gain(A, rcond=rcond) @ y
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
@@ -251,44 +244,7 @@ def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
     return np.asarray(scale[..., :, None] * root)
 
 
-def _real_problem(
-    K: ArrayLike, Y: ArrayLike, names: Sequence[str] | None
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """The equations, real, and names of their unknowns."""
-    A, y = np.asarray(K), np.asarray(Y)
-    if A.ndim != 2 or A.shape[:1] != y.shape or 0 in A.shape:
-        raise ValueError(f"K must be (m, n) and Y (m,), not empty; got {A.shape} and {y.shape}")
-    n = A.shape[1]
-    labels = tuple(names or (f"θ{i + 1}" for i in range(n)))
-    if not len(labels) == len(set(labels)) == n:
-        raise ValueError(f"{n} different names are needed for the {n} columns of K; got {list(labels)}")
-    if np.iscomplexobj(A) or np.iscomplexobj(y):
-        A, y = stretch(A), stretch(y)
-        labels = tuple(f"{part} {name}" for name in labels for part in ("Re", "Im"))
-    A, y = A.astype(np.float64), y.astype(np.float64)
-    if not (np.isfinite(A).all() and np.isfinite(y).all()):
-        raise ValueError("K and Y must be finite")
-    return A, y, labels
-
-
-def _row_factors(weights: ArrayLike | None, sigma: ArrayLike | None, rows: int, m: int) -> FloatArray:
-    """What makes the m real rows of so many rows of Y weigh alike, (m,)."""
-    if weights is not None and sigma is not None:
-        raise ValueError("give either weights or errors of Y, not both")
-    stated = sigma is not None
-    each = np.asarray(sigma if stated else 1.0 if weights is None else weights, dtype=np.float64)
-    right = (each > 0 if stated else each >= 0).all() and each.any() and np.isfinite(each).all()
-    if not right or each.shape not in ((), (rows,)):
-        raise ValueError(
-            f"weights and errors need one finite entry per row of Y, {rows}: errors greater than zero, "
-            f"weights not negative and not all 0; got {each.shape}"
-        )
-    over = 1.0 / each if stated else np.sqrt(each)
-    return np.repeat(np.broadcast_to(over, rows), m // rows)
-
-
-@dataclass(frozen=True, eq=False)
-class NormalMatrix:
+class NormalMatrix(NamedTuple):
     """KᵀK (n, n) of the data's rows, [Q] (2.28), to look at: nothing is solved by it.
 
     Rows are taken over their errors where these are known, in the units of the unknowns. The condition number
@@ -307,11 +263,10 @@ class NormalMatrix:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return plain(vars(self))
+        return plain(self._asdict())
 
 
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
-    s = np.linalg.svd(K, compute_uv=False)
-    full = solution_and_rank(K, np.zeros(len(K)), rcond=JACOBIAN_RCOND)[1] == len(names)
-    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)
+    full = np.linalg.matrix_rank(unit_columns(K)[0], JACOBIAN_RCOND) == len(names)
+    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(K) ** 2:.4g}") if full else np.inf)

@@ -12,22 +12,19 @@ from the pseudo-residuals ψ(r) over the mean of ψ′ (P. J. Huber, Robust Stat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import Any
+from itertools import compress
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, least_squares
 from rotorid.regression.prior import Function, Prior
-
-Bounds = Mapping[str, tuple[float | None, float | None]]
 
 LOSSES = ("linear", "huber")
 HUBER = 1.345
@@ -79,11 +76,6 @@ class NonlinearEstimate:
         return self.estimate.values
 
     @property
-    def std(self) -> FloatArray | None:
-        """Standard deviations (n,); NaN at a bound or where not determined; None where errors are unknown."""
-        return self.estimate.std
-
-    @property
     def ci95(self) -> FloatArray | None:
         """95 % intervals (n, 2); NaN at a bound; None where errors are unknown."""
         return self.estimate.ci95
@@ -97,12 +89,6 @@ class NonlinearEstimate:
         )
         return f"{words} hold it fixed" if self.at_bounds else ""
 
-    @property
-    def end_warnings(self) -> tuple[str, ...]:
-        """What a user must know of the end of the search before trusting the numbers."""
-        rank = self.estimate.describe_rank() if self.converged and not self.estimate.full_rank else ""
-        return tuple(filter(None, ("" if self.converged else self.message, self.bound_warning, rank)))
-
 
 def nonlinear_least_squares(  # noqa: PLR0913
     residual: Function,
@@ -111,7 +97,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     *,
     names: Sequence[str],
     sigma_stated: bool,
-    bounds: Bounds | None = None,
+    bounds: ArrayLike = (-np.inf, np.inf),
     loss: str = "linear",
     max_iterations: int = 200,
     near: bool = False,
@@ -133,7 +119,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     sigma_stated
         Whether a residual of 1 means one stated standard deviation (normal intervals, not rescaled).
     bounds
-        {name: (lower, upper)}, None for no bound.
+        Lower and upper bounds of the parameters, (n, 2) or the same (2,) for all; NaN or ±inf for none.
     loss
         One of `LOSSES`; with "huber" the spread is taken from the residuals and intervals are Student's.
     max_iterations
@@ -146,8 +132,8 @@ def nonlinear_least_squares(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        For shapes that do not fit, unknown names or losses, empty bounds, residuals that are not finite at
-        the start, a robust loss with a prior.
+        For an unknown loss, empty bounds, residuals that are not finite at the start, a robust loss with a
+        prior.
 
     Notes
     -----
@@ -164,53 +150,47 @@ def nonlinear_least_squares(  # noqa: PLR0913
     >>> print(np.round(fit.values, 3), fit.converged)
     [2.    0.501] True
     """
-    labels = tuple(names)
-    first = np.asarray(start, dtype=np.float64)
-    n, robust = len(labels), one_of(loss, "loss", LOSSES) != "linear"
-    if first.shape != (n,) or n == 0 or len(set(labels)) != n or not np.isfinite(first).all():
-        raise ValueError(f"{n} different names need as many finite starting values; got {list(first)}")
-    lower, upper = _limits(bounds or {}, labels)
-    first = inside(first, lower, upper)
-    r0 = np.asarray(residual(first), dtype=np.float64)
-    if r0.ndim != 1 or not np.isfinite(r0).all():
+    labels, robust = tuple(names), one_of(loss, "loss", LOSSES) != "linear"
+    limits = np.array(bounds, dtype=np.float64)
+    limits = np.where(np.isnan(limits), (-np.inf, np.inf), limits)
+    lower, upper = np.broadcast_to(limits, (len(labels), 2)).T
+    first = np.clip(np.asarray(start, dtype=np.float64), lower, upper)
+    rows = len(r0 := residual(first))
+    if not np.isfinite(r0).all():
         raise ValueError("the residuals at the starting values are not finite: choose other starting values")
-    if prior is not None and len(prior):
+    if prior:
         if robust:
             raise ValueError("a prior or a ridge needs the loss linear: a robust loss would discount it, too")
         residual, jacobian = prior.beside(residual, jacobian)
     search = _Search(labels, residual, jacobian, lower, upper, sigma_stated)
     x, why, small = first, "", False
     if near and not robust:
-        x, judged, small = search.polish(first)
+        x, estimate, small = search.polish(first)
     if not small:
         x, ended = search.drive(first, robust, max_iterations)
-        x, judged, small = search.polish(x)
-        tried = counted(max_iterations, "evaluation")
-        why = "" if small else "the minimum was not reached: the last step is not yet small"
-        why = why if ended else f"not converged after {tried}: raise max_iterations or start nearer"
-    if why:
-        judged = replace(judged, covariance=None, solution_covariance=None)
+        x, estimate, small = search.polish(x)
+        if not (small and ended):
+            why = "not converged: raise max_iterations or start nearer"
+    at_bounds = (x <= lower) | (x >= upper)
+    unknown = np.where(at_bounds, np.nan, 0.0)
+    covariance, of_solution = (
+        None if why or each is None else each + np.add.outer(unknown, unknown)
+        for each in (estimate.covariance, estimate.solution_covariance)
+    )
     path, costs = zip(*search.path, strict=True)
     return NonlinearEstimate(
-        estimate=replace(judged, residuals=judged.residuals[: len(r0)]),
+        estimate=replace(
+            estimate,
+            covariance=covariance,
+            solution_covariance=of_solution,
+            residuals=estimate.residuals[:rows],
+        ),
         history=np.array(path),
         costs=np.array(costs),
         converged=not why,
         message=why or f"converged in {counted(len(path) - 1, 'iteration')}",
-        at_bounds=tuple(labels[j] for j in np.flatnonzero((x <= lower) | (x >= upper))),
+        at_bounds=tuple(compress(labels, at_bounds)),
     )
-
-
-def _limits(bounds: Bounds, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper bounds (n,), infinite where there are none."""
-    if others := bounds.keys() - {*names}:
-        raise ValueError(f"bounds are given for {min(others)!r}, which is not estimated: {', '.join(names)}")
-    limits = np.array([bounds.get(name, (None, None)) for name in names], dtype=float)
-    lower, upper = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
-    for name, low, high in zip(names, lower, upper, strict=True):
-        if not low < high:
-            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low:g}, {high:g}")
-    return lower, upper
 
 
 @dataclass(eq=False)
@@ -241,13 +221,12 @@ class _Search:
         for run in range(3 if robust and not self.stated else 1):
             if run:
                 r = np.abs(self.residual(x))
-                rms = max(float(np.sqrt(np.mean(r**2))), np.finfo(float).tiny)
-                self.limit = HUBER * (1.4826 * float(np.median(r)) or rms)
+                self.limit = HUBER * max(1.4826 * float(np.median(r)), 1e-9 * float(r.max()), TINY)
             self.path.clear()
             with np.errstate(all="ignore"):  # the driver shortens steps that overflow
                 end = driver(
-                    lambda x: np.array(self.residual(x), dtype=np.float64),  # copies: it scales in place
-                    inside(x, self.lower, self.upper, 1e-10),
+                    lambda x: np.array(self.residual(x)),  # copies: it scales in place
+                    x,
                     jac=self._at_accepted,
                     bounds=(self.lower, self.upper),
                     x_scale="jac",
@@ -264,25 +243,25 @@ class _Search:
 
     def polish(self, x: FloatArray) -> tuple[FloatArray, Estimate, bool]:
         """Gauss–Newton to the last digits; the kernel's judgement; whether the last step is negligible."""
-        r = np.asarray(self.residual(x), dtype=np.float64)
-        cost, (step, estimate, size) = self._pass(x, r), self._judged(x, r)
+        r = self.residual(x)
+        cost, (step, size) = self._pass(x, r), self._step(x, r)
         for _ in range(POLISH):
             if size < 1e-9:
                 break
-            new = inside(x + step, self.lower, self.upper)
+            new = np.clip(x + step.solution, self.lower, self.upper)
             with np.errstate(all="ignore"):  # a step too far is refused
-                r = np.asarray(self.residual(new), dtype=np.float64)
-                better = np.isfinite(r).all() and self._cost(r) <= cost * (1 + 1e-9)
+                new_r = self.residual(new)
+                better = np.isfinite(new_r).all() and self._cost(new_r) <= cost * (1 + 1e-9)
             if not better:
                 break
-            judged = self._judged(new, r)
-            if judged[2] > 0.9 * size:  # rounding is all that is left, or Gauss–Newton does not contract here
+            further = self._step(new, new_r)
+            if further[1] > 0.9 * size:  # it does not contract here, or rounding is all that is left
                 break
-            x, cost, (step, estimate, size) = new, self._pass(new, r), judged
-        std = np.zeros(len(x)) if estimate.std is None else estimate.std
-        sure = std > 0
-        slight = bool(sure.any()) and float((np.abs(step[sure]) / std[sure]).max()) < 1e-3
-        return x, estimate, size < 1e-6 or slight
+            x, r, cost, (step, size) = new, new_r, self._pass(new, new_r), further
+        moved = float(np.sum((self.slopes(x) @ step.solution) ** 2))
+        left = 1.0 if step.errors_stated else float(step.residuals @ step.residuals) / max(step.dof, 1)
+        # over their errors the step moves the data by more than any parameter over its own
+        return x, step.at(x, r), size < 1e-6 or moved < 1e-6 * left
 
     def _cost(self, r: FloatArray) -> float:
         """Half the sum of the loss of residuals (m,)."""
@@ -298,60 +277,30 @@ class _Search:
 
     def _at_accepted(self, x: FloatArray) -> FloatArray:
         """Derivatives for the driver, which asks for them at accepted points only."""
-        self._pass(x, np.asarray(self.residual(x)))
-        return np.array(self.slopes(x), dtype=np.float64)
+        self._pass(x, self.residual(x))
+        return np.array(self.slopes(x))
 
-    def _judged(self, x: FloatArray, r: FloatArray) -> tuple[FloatArray, Estimate, float]:
-        """The Gauss–Newton step (n,), the kernel's estimate at x, the largest relative change by the step.
+    def _step(self, x: FloatArray, r: FloatArray) -> tuple[Estimate, float]:
+        """The Gauss–Newton step as the kernel estimates it, and its largest relative change of a parameter.
 
-        A parameter at a bound is held by a row of its own, and has no standard deviation.
+        A parameter at a bound is held by a row of its own.
         """
-        J = np.asarray(self.slopes(x), dtype=np.float64)
-        free = (x > self.lower) & (x < self.upper)
+        J, free = self.slopes(x), (x > self.lower) & (x < self.upper)
         held = np.eye(len(x))[~free]
-        stated = self.stated and np.isinf(self.limit)
-        inner = float(np.mean(np.abs(r) <= self.limit))
-        pseudo = np.clip(r, -self.limit, self.limit) / max(inner, 0.05)
-        estimate = least_squares(
+        pseudo = np.clip(r, -self.limit, self.limit) / max(float(np.mean(np.abs(r) <= self.limit)), 0.05)
+        step = least_squares(
             np.vstack((J * free, held)),
             np.append(-pseudo, np.zeros(len(held))),
             names=self.names,
-            sigma=1.0 if stated else None,
+            sigma=1.0 if self.stated and np.isinf(self.limit) else None,
             rcond=JACOBIAN_RCOND,
         )
-        step = np.where(free, estimate.solution, 0.0)
-        without = np.where(free[:, None] & free, 0.0, np.nan)
-        seen, both = ~np.isnan(estimate.values), (estimate.covariance, estimate.solution_covariance)
-        covariance, full = (None if each is None else each + without for each in both)
-        judged = replace(
-            estimate,
-            values=np.where(seen, x, np.nan),
-            solution=x.copy(),
-            covariance=covariance,
-            residuals=r,
-            chi_square=float(r @ r) if stated else None,
-            solution_covariance=full,
-        )
+        step = replace(step, solution=step.solution * free)
         # one that moves the residuals by less than a millionth of what others do counts as so large: one that
         # is 0 has no size
         slopes, size = np.linalg.norm(J, axis=0), np.abs(x)
         size = np.maximum(size, NEGLIGIBLE * (slopes * size).max() / np.maximum(slopes, TINY))
-        change = np.abs(step[seen]) / np.maximum(size[seen], TINY)
-        if not seen.all():
-            rows = estimate.row_space
-            along = np.abs(rows @ step) / np.maximum(np.abs(rows) @ np.abs(x), TINY)
-            change = np.append(change, along)
-        return step, judged, float(change.max(initial=0.0))
-
-
-def evaluated_once(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
-    """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
-
-    @lru_cache(maxsize=1)
-    def at(numbers: bytes) -> tuple[AnyArray, ...]:
-        return both(np.frombuffer(numbers))
-
-    return lambda x: at(x.tobytes())[0], lambda x: at(x.tobytes())[1]
+        return step, float((np.abs(step.solution) / np.maximum(size, TINY)).max())
 
 
 def search_from(
@@ -364,19 +313,17 @@ def search_from(
     """
     from scipy.optimize import least_squares as driver
 
-    options: dict[str, Any] = {"max_nfev": limit}
-    if jacobian is not None:
-        enough = len(residual(start)) >= len(start)
-        options |= {"jac": jacobian, "x_scale": "jac", "method": "lm" if enough else "trf"}
+    enough = jacobian is not None and len(residual(start)) >= len(start)
     with np.errstate(all="ignore"):
         try:
-            end = driver(residual, start, **options)
+            end = driver(
+                residual,
+                start,
+                jac=jacobian or "2-point",
+                x_scale="jac" if jacobian else 1.0,
+                method="lm" if enough else "trf",
+                max_nfev=limit,
+            )
         except (ValueError, np.linalg.LinAlgError):
             return None
     return (float(end.cost), np.asarray(end.x)) if np.isfinite(end.x).all() else None
-
-
-def inside(x: FloatArray, lower: FloatArray, upper: FloatArray, margin: float = 0.0) -> FloatArray:
-    """X moved between its bounds (a little inside them for a start that the driver accepts)."""
-    gap = np.where(np.isfinite(upper - lower), upper - lower, np.maximum(np.abs(x), 1.0)) * margin
-    return np.asarray(np.clip(x, lower + gap, upper - gap))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.text import percent
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.linear import JACOBIAN_RCOND, least_squares, solution_and_rank
+from rotorid.regression.linear import JACOBIAN_RCOND, least_squares
 
 FAR = 3.0
 """Standard deviations between a prior and the data from which on they contradict each other."""
@@ -94,8 +95,8 @@ class PriorEffect:
     `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
     `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
     is what the data alone determine, in words, if that is not everything, `lost` what only the rows
-    determine, `rank` and `best` rank and residuals (m,) of the data, with what stands at a bound held there.
-    Condition numbers and rms are those without and with the prior; a nonlinear model is linearised.
+    determine, `data` the step to the best of the data, with what stands at a bound held there. Condition
+    numbers and rms are those without and with the prior; a nonlinear model is linearised.
     """
 
     rows: Prior
@@ -103,10 +104,8 @@ class PriorEffect:
     away: FloatArray
     alone: str
     lost: tuple[str, ...]
-    rank: int
-    best: FloatArray
-    condition_number: dict[str, float]
-    residual_rms: dict[str, float]
+    data: Estimate
+    sizes: dict[str, dict[str, float]]
 
     @property
     def why(self) -> dict[str, str]:
@@ -143,8 +142,8 @@ class PriorEffect:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         if self.rows.ridge:
             estimate = replace(estimate, covariance=None, solution_covariance=None)
-        chi_square = estimate.chi_square and float(self.best @ self.best)
-        return replace(estimate, chi_square=chi_square, dof=len(self.best) - self.rank)
+        chi_square = estimate.chi_square and self.data.chi_square
+        return replace(estimate, chi_square=chi_square, dof=self.data.dof)
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
@@ -157,8 +156,7 @@ class PriorEffect:
                 for name, value, std, share, away in each
             },
             "data_alone": self.alone or None,
-            "condition_number": self.condition_number,
-            "residual_rms": self.residual_rms,
+            **self.sizes,
         }
         return plain({"ridge" if rows.ridge else "prior": part})
 
@@ -168,29 +166,30 @@ def effect(
 ) -> PriorEffect | None:
     """What the rows of a prior did to the estimate (n,); None without any.
 
-    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors.
+    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors. What stands at a
+    bound is held there.
     """
-    if not len(rows):
-        return None
     moves = np.array([name not in at_bounds for name in rows.names])
-    free, nothing = K * moves, np.zeros(len(K) + len(rows))
-    alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=JACOBIAN_RCOND)
-    both = least_squares(rows.below(K), nothing, names=rows.names, rcond=JACOBIAN_RCOND)
-    std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=JACOBIAN_RCOND).std
-    assert std is not None
-    share = np.nan_to_num(1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
-    away = rows.residual(theta) / np.sqrt(np.where(share > SILENT, share, np.nan))
-    step, rank = solution_and_rank(free, -r, rcond=JACOBIAN_RCOND)
-    best = r + free @ step
-    rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (best, r))
+    if not rows or not moves.any():
+        return None
+    names = tuple(compress(rows.names, moves))
+    alone, both = (
+        least_squares(each[:, moves], right, names=names, sigma=1.0, rcond=JACOBIAN_RCOND)
+        for each, right in ((K, -r), (rows.below(K), np.zeros(len(K) + len(rows))))
+    )
+    std = np.full(len(moves), np.nan)
+    std[moves] = both.std
+    share = (1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
+    rms, full_rms = (float(np.sqrt(np.mean(each**2))) for each in (alone.residuals, r))
     return PriorEffect(
         rows=rows,
-        share=np.where(moves[rows.place], share, np.nan),
-        away=away,
+        share=share,
+        away=rows.residual(theta) / np.sqrt(np.where(share > SILENT, share, np.nan)),
         alone="" if alone.full_rank else alone.describe_rank(),
         lost=tuple(name for name in alone.undetermined if name not in both.undetermined),
-        rank=rank,
-        best=best,
-        condition_number={"without": alone.condition_number, "with": both.condition_number},
-        residual_rms={"without": rms, "with": full_rms},
+        data=alone,
+        sizes={
+            "condition_number": {"without": alone.condition_number, "with": both.condition_number},
+            "residual_rms": {"without": rms, "with": full_rms},
+        },
     )

@@ -106,14 +106,15 @@ def job_source(given: Job | Path | str, phase: str | None = None, angles: str | 
     Raises
     ------
     ValueError
-        For these with a job that is read already.
+        For these with a job that is read already; for readings without phases.
     """
     from rotorid.files import Job, read_job
 
     if not isinstance(given, Job):
-        return read_job(file_of(given, "a job"), phase=phase, angles=angles)
-    if phase is not None or angles is not None:
+        given = read_job(file_of(given, "a job"), phase=phase, angles=angles)
+    elif phase is not None or angles is not None:
         raise ValueError("the conventions of a job are stated where it is read")
+    given.trials.with_phases()
     return given
 
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rotorid.worksheet.job_files import Stamp, stamp
 
 if TYPE_CHECKING:
-    from rotorid.commands.balance import Balance
     from rotorid.files import Job
+    from rotorid.report.outcome import Outcome
 
 NOT_FINISHED = "the check run is not finished: the answer is that of the runs before it"
 _read: dict[str, Stamp] = {}
@@ -88,7 +88,7 @@ def whole_job(job: str, version: int) -> Results:
 
 
 @functools.lru_cache(maxsize=2)
-def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]:
+def _balance(job: str, version: int, checked: bool) -> tuple[Outcome, Job, list[str]]:
     """The job, in pieces where planes have holes, with the trim after its check run; warnings of reading it.
 
     It is balanced once for each version of its files.
@@ -96,12 +96,15 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]
     from rotorid.base.answer import kinds
     from rotorid.commands.balance import BalanceOptions, corrected
     from rotorid.commands.balance_solution import job_of
+    from rotorid.commands.without_phase import balanced_without_phase
 
     source = Path(job) if checked else _without_check(Path(job))
     refused = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         read, files, again = job_of(source, BalanceOptions())
+        if read.trials.amplitudes_only:
+            return balanced_without_phase(read, BalanceOptions()), read, []
         made = corrected(read, BalanceOptions(), files, again)
         split, refine = bool(read.holes), read.check is not None
         if split or refine:
@@ -109,7 +112,8 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Balance, list[str]]
                 made = corrected(read, BalanceOptions(split=split, refine=refine), files, again)
             except (ValueError, OSError, ArithmeticError) as error:
                 refused = [f"no {'trim' if refine else 'pieces'}: {error}"]
-    return made, kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning)) + refused
+    warned = kinds(str(one.message) for one in caught if issubclass(one.category, UserWarning))
+    return made, read, warned + refused
 
 
 def _without_check(path: Path) -> Job:
@@ -133,8 +137,15 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
     from rotorid.base.text import figures
     from rotorid.report.balance import to_do
 
-    made, read = _balance(*asked)
-    answer, document, labels = made.answer, made.document, made.job.trials.labels
+    made, job, read = _balance(*asked)
+    answer, document, labels = made.answer, made.document, job.trials.labels
+    shown = {
+        "judgement": answer.judgement,
+        "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
+    }
+    if job.trials.special or job.trials.amplitudes_only:  # the columns of these are others
+        tables = str(Markup("<pre>{}</pre>").format(answer.numbers))
+        return {**shown, "tables": tables, "parts": "", "notes": [*answer.notes], "to_mount": []}
     rows = document["mounting"]["holes"] if "mounting" in document else document["corrections"]
 
     def at(row: Mapping[str, Any]) -> float:  # removed from the other side
@@ -147,15 +158,11 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         Column(labels.weight_in, [row["mass"] for row in parts], figures),
         Column("at °", [row["angle_deg"] for row in parts], figures),
     )
-    tables = str(Markup("\n").join(to_do(document, made.result, made.job, boxes=False).values()))
-    if made.job.trials.special:  # the columns of these are others
-        rows, tables = [], str(Markup("<pre>{}</pre>").format(answer.numbers))
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
-        "judgement": answer.judgement,
-        "tables": tables,
+        **shown,
+        "tables": str(Markup("\n").join(to_do(document, made.result, job, boxes=False).values())),
         "parts": html(Table("parts", columns)) if parts else "",
-        "warnings": [*([] if asked[-1] else [NOT_FINISHED]), *read, *answer.warnings],
         "notes": [f"{refer}Angles count {labels.angles}, phase {labels.phase}.", *answer.notes],
         "to_mount": [{**row, "at": at(row)} for row in rows],
     }

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
 from rotorid.identify import AmplitudeErrors, Experiments, HarmonicModel, harmonic_model, identify
 from rotorid.identify.amplitudes import experiments
 from rotorid.identify.linear_start import build_rows, linear_fit
-from rotorid.regression import coverage_factor
 
 FloatArray = NDArray[np.float64]
 TWO_MASSES = (
@@ -119,13 +119,13 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
         data = simulate(case, rng, stated=stated)
         if method == "output-error":
             found = identify(case.model, data, start=dict(case.truth))
-            values[i], deviations, factor = found.values, found.std, found.coverage_factor
+            values[i], reach = found.values, np.ptp(found.ci95, axis=1) / 2
         else:
             fit = linear_fit(case.model, build_rows(case.model, data))
             values[i] = fit.recovery.values
-            deviations = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
-            factor = coverage_factor(None if stated else fit.estimate.dof)
-        inside[i] = np.abs(values[i] - truth) <= factor * deviations
+            std = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
+            reach = std * (ndtri(0.975) if stated else stdtrit(fit.estimate.dof, 0.975))
+        inside[i] = np.abs(values[i] - truth) <= reach
     std = values.std(axis=0)
     return Figures(inside.mean(axis=0), (values.mean(axis=0) - truth) / std, std / np.abs(truth))
 

@@ -108,7 +108,7 @@ def one_rotor(random: np.random.Generator, rate: float) -> Outcome:
     rotor = draw_rotor(random)
     truth = np.concatenate((rotor.omega, rotor.zeta))
     modes = fit_sweep(draw_sweep(random, rotor, rate * RPM))
-    found, std = modes.fit.estimate.solution, modes.fit.std
+    found, std = modes.fit.estimate.solution, modes.fit.estimate.std
     if len(found) != len(truth) or std is None or modes.steady is None:
         return Outcome(np.full(4, np.nan), np.full(4, np.nan), modes.warnings)
     steady = modes.steady.fit.estimate.solution / truth - 1

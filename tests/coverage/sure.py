@@ -18,6 +18,7 @@ PROGRAMS = {
     "fleet": ("coverage_fleet.py", 20, 1),
     "identify": ("coverage_identify.py", 500),
     "special": ("coverage_special.py", 1000),
+    "without phase": ("coverage_without_phase.py", 1000),
     "runup": ("coverage_runup.py", 1, 200),
     "what_if": ("coverage_what_if.py", 200),
 }

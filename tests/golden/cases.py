@@ -170,6 +170,7 @@ bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method w
 bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --errors 2,1
 static-couple               balance sample_data/bk_two_plane/static_couple.toml
 couple-alone                balance sample_data/bk_two_plane/static_couple.toml --planes couple
+no-phase                    balance sample_data/no_phase/job.toml
 left-in                     balance sample_data/left_in/job.toml
 rk4                         balance sample_data/rk4/job.toml
 rk4-1004                    balance sample_data/rk4/job_1004.toml
@@ -488,6 +489,7 @@ STORED = (
     "model-job-ridge",
     "modes-chain",
     "motion-run-up",
+    "no-phase",
     "one-shot",
     "periodic-jumps",
     "reduce-book",

@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import openpyxl
-import pytest
 
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table, csv, excel, frame, html, records, terminal, text
@@ -96,15 +95,6 @@ def test_plain_reaches_into_everything():
     values = plain({"a": {"b": (np.float64(1.0), np.int64(2), np.bool_(True), None, "x", [np.nan])}})
     assert values == {"a": {"b": [1.0, 2, True, None, "x", [None]]}}
     assert [type(value) for value in values["a"]["b"][:3]] == [float, int, bool]
-
-
-def test_columns_are_one_dimensional_and_of_one_length():
-    with pytest.raises(ValueError, match="one-dimensional"):
-        Table("shape", (Column("shape", np.eye(2)),))
-    with pytest.raises(ValueError, match="one length"):
-        Table("shapes", (Column("node", [1, 2]), Column("mode", [1.0])))
-    with pytest.raises(ValueError, match="one length"):
-        Table("nothing", ())
 
 
 def test_pandas_and_openpyxl_are_not_imported_with_it():

@@ -109,10 +109,6 @@ def test_the_date_is_that_of_source_date_epoch(monkeypatch):
     assert now().isoformat() == "2000-02-29T00:00:00+00:00"
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "")
     assert now().year > 2000
-    for wrong in ("yesterday", "1e9", "9" * 30):
-        monkeypatch.setenv("SOURCE_DATE_EPOCH", wrong)
-        with pytest.raises(ValueError, match="SOURCE_DATE_EPOCH takes whole seconds since 1970"):
-            now()
 
 
 def test_what_is_read_and_written_is_logged(tmp_path, caplog):

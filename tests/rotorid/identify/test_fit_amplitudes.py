@@ -150,7 +150,7 @@ def test_bounds_and_robust_loss_reach_the_kernel():
     data = simulate(model, truth, w, inputs, STATED, np.random.default_rng(5), stated=STATED)
     held = fitted(model, data, truth, bounds={"a1": (0.0, 30.0)}).fit
     assert (held.at_bounds, held.values[0]) == (("a1",), 30.0)
-    assert any("a1 stands at its bound" in text for text in held.end_warnings)
+    assert "a1 stands at its bound" in held.bound_warning
     clean = fitted(model, data, truth).fit.values
     data.signals["X1"][2] *= 3
     plain, robust = (fitted(model, data, truth, loss=loss).fit.values for loss in ("linear", "huber"))

@@ -218,7 +218,9 @@ def test_a_node_of_a_mode_stays_readable(tmp_path):
     path, written = tmp_path / "modes.csv", result.file_table()
     path.write_bytes(csv(written))
     percent = written.columns[written.headings.index("frequency_std_percent")].values
-    np.testing.assert_allclose(percent[::3], 100 * result.fit.std[:2] / result.fit.estimate.solution[:2])
+    np.testing.assert_allclose(
+        percent[::3], 100 * result.fit.estimate.std[:2] / result.fit.estimate.solution[:2]
+    )
     read = read_modes(path)
     share, size = read.shape_std[1, 1], abs(read.shapes[1, 1])
     assert 0.3 < share <= 10

@@ -105,7 +105,7 @@ def test_errors_that_are_not_stated_and_vectors_that_lack(changed, same):
     rotor, sweep = drawn()
     modes = fit_sweep(changed(sweep))
     truth = np.concatenate((rotor.omega, rotor.zeta))
-    assert (np.abs(solution(modes) - truth) < 4 * modes.fit.std).all()
+    assert (np.abs(solution(modes) - truth) < 4 * modes.fit.estimate.std).all()
     assert modes.warnings == ()
     assert same is None or modes.same == same
 
@@ -120,7 +120,7 @@ def test_without_times_the_motion_counts_as_steady():
 def test_a_band_chooses_a_mode():
     rotor, sweep = drawn()
     modes = fit_sweep(sweep, bands=[(0.75 * rotor.omega[0], 1.3 * rotor.omega[0])])
-    value, std = solution(modes)[0], modes.fit.std[0]
+    value, std = solution(modes)[0], modes.fit.estimate.std[0]
     assert abs(value - rotor.omega[0]) < 4 * std + 1e-3 * value
 
 

@@ -1,0 +1,23 @@
+"""Regions of corrections without phase hold the truth, and what is mounted is worth it (docs/sure.md)."""
+
+import coverage_without_phase as coverage
+import pytest
+import sure
+
+LEAST = {"four": 0.5, "seven": 0.85}
+"""Of jobs: to be mounted at 10 %; 95 % at 2 %."""
+
+
+@pytest.mark.parametrize("line", coverage.LINES, ids=lambda line: line[0])
+def test_regions_hold_and_weights_are_worth_mounting(line):
+    name, *of = line
+    inside, mount, worse = coverage.shares(coverage.simulate(400 if of[1] == 1 else 60, *of))
+    assert inside >= 0.92 - 2 * (0.08 * 0.92 / 400) ** 0.5
+    assert worse <= 0.02
+    if of[1] == 1 and of[0] > 3 and "estimated" not in name:
+        assert mount >= (0.95 if of[3] == 0.02 else LEAST[name.split()[0]]) - 0.03
+
+
+def test_the_page_has_the_lines_of_the_program(capsys):
+    coverage.main(1)
+    assert sure.titles(capsys.readouterr().out) == sure.titles("".join(sure.blocks("without phase")))

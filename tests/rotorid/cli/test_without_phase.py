@@ -1,0 +1,124 @@
+"""`rotorid balance` of runs without phases: every way in which tables lack them, and what is refused."""
+
+import shutil
+
+import openpyxl
+import pytest
+
+from rotorid.samples import sample_data
+
+READ = (8.0, 11.05, 3.82, 15.09)
+ROWS = [f"{run},1480,fan,{a}" for run, a in zip("0123", READ, strict=True)]
+WEIGHTS = "run,plane,mass_g,angle_deg\n" + "".join(f"{k + 1},P,4.5,{120 * k}\n" for k in range(3))
+HEAD = "run,speed_rpm,sensor,amplitude_mm_s"
+TABLES = {
+    "no column": [HEAD, *ROWS],
+    "blank": [f"{HEAD},phase_deg", *(f"{row}," for row in ROWS)],
+    "n.a.": [f"{HEAD},phase_deg", *(f"{row},n.a." for row in ROWS)],
+    "zero": [f"{HEAD},phase_deg", *(f"{row},0" for row in ROWS)],
+    "a column for each sensor": [
+        "Run;Speed (rpm);Fan (mm/s pk);Motor (mm/s pk)",
+        *(f"{run};1480;{a};{2 * a:.2f}" for run, a in zip("0123", READ, strict=True)),
+    ],
+}
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "weights.csv").write_text(WEIGHTS)
+    return tmp_path
+
+
+def document(cli, *words):
+    return cli("balance", *words, "--json").json
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_without_phases_in_any_layout(name, files, cli):
+    (files / "runs.csv").write_text("\n".join(TABLES[name]) + "\n")
+    made = document(cli, "runs.csv", "weights.csv")
+    assert made["method"] == "without phase"
+    assert made["corrections"][0]["mass"] == pytest.approx(4.77, abs=0.01)
+    assert made["corrections"][0]["angle_deg"] == pytest.approx(91.6, abs=0.05)
+    assert made["conventions"]["assumed"] == []
+    assert any("all phases are 0" in words for words in made["warnings"]) == (name == "zero")
+
+
+def test_a_workbook(files, cli):
+    book = openpyxl.Workbook()
+    for sheet, text in (("runs", "\n".join(TABLES["blank"])), ("weights", WEIGHTS)):
+        page = book.create_sheet(sheet)
+        for line in text.splitlines():
+            page.append(line.split(","))
+    book.save(files / "job.xlsx")
+    assert document(cli, "job.xlsx")["corrections"][0]["mass"] == pytest.approx(4.77, abs=0.01)
+
+
+def test_some_phases_are_an_error(files, cli):
+    rows = [f"{HEAD},phase_deg", f"{ROWS[0]},", *(f"{row},30" for row in ROWS[1:])]
+    (files / "runs.csv").write_text("\n".join(rows) + "\n")
+    ran = cli("balance", "runs.csv", "weights.csv")
+    assert ran.code == 2
+    assert "row 2, column phase_deg" in ran.err
+    (files / "runs.csv").write_text("\n".join([f"{HEAD},fase_deg", *(f"{row},0" for row in ROWS)]) + "\n")
+    ran = cli("balance", "runs.csv", "weights.csv")
+    assert ran.code == 2
+    assert "phase_deg" in ran.err
+
+
+def test_options_without_meaning_are_refused_in_one_message(files, cli):
+    (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
+    words = [
+        "--split",
+        "--coefficients",
+        "measured",
+        "--method",
+        "minmax",
+        "--grade",
+        "G2.5",
+        "--limit",
+        "3",
+        "--refine",
+    ]
+    ran = cli("balance", "runs.csv", "weights.csv", *words)
+    message = ran.err
+    assert ran.code == 2
+    for word in ("--split", "rotorid split", "--coefficients", "--method", "--grade", "--limit", "--refine"):
+        assert word in message
+    assert message.count("\n") == 1
+
+
+def test_a_largest_weight_pictures_and_pages(files, cli):
+    (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
+    at = ("runs.csv", "weights.csv", "--max-mass", "4g", "--errors", "5,5")
+    made = document(cli, *at)
+    assert made["corrections"][0]["mass"] == pytest.approx(4.0)
+    assert made["errors"] == {"amplitude_percent": 5.0, "origin": "stated"}
+    assert made["rms_after"] > 1.0
+    files_of = ("--plot", "p.svg", "--report", "p.html", "--output", "w.csv")
+    assert "Mount 4 g at 91.6° in plane 'P'" in cli("balance", *at, *files_of).out
+    assert "solution 1" in (files / "p.svg").read_text()
+    assert "Mount 4 g" in (files / "p.html").read_text()
+    assert (files / "w.csv").read_text().startswith("solution,plane,mass")
+    assert "no influence coefficients" in cli("balance", *at, "--output", "w.json").err
+
+
+@pytest.mark.parametrize("command", ["unbalance job.toml --stations 1", "trial-weight job.toml"])
+def test_other_commands_need_phases(command, tmp_path, monkeypatch, cli):
+    shutil.copytree(sample_data() / "no_phase", tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    ran = cli(*command.split())
+    assert ran.code == 2
+    assert "no phases" in ran.err
+
+
+@pytest.mark.parametrize("mounted", ["", 'check_weights = "mounted.csv"\n'])
+@pytest.mark.parametrize(("read", "words"), [(0.6, "as predicted"), (9.0, "not as predicted")])
+def test_a_check_run_of_a_job(read, words, mounted, tmp_path, cli):
+    shutil.copytree(sample_data() / "no_phase", tmp_path, dirs_exist_ok=True)
+    job = tmp_path / "job.toml"
+    job.write_text(f'check = "check.csv"\n{mounted}{job.read_text()}')
+    (tmp_path / "check.csv").write_text(f"{HEAD}\ncheck,1480,fan,{read}\n")
+    (tmp_path / "mounted.csv").write_text("run,plane,mass_g,angle_deg\ncheck,fan,4.8,92\n")
+    assert cli("balance", job).out.startswith(f"Check run: {words}")
