@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from balancing.correction import Correction
 from balancing.decision import HARDLY_BELOW
 from balancing.groups import PIECES
-from balancing.holes import Holes, equal_together
+from balancing.holes import Holes, content, equal_together
 from balancing.influence import Influence, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
 from balancing.regions import LEVEL
@@ -309,11 +309,10 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         if holes is None or mounting is None:
             places.append((plane, _ANY, weight, ""))
             continue
-        vectors, scale = mounting.amounts * np.exp(1j * holes.angles), labels.weight_scale
-        for h in np.flatnonzero(mounting.amounts > 0):
-            pieces = zip(mounting.counts[h], holes.pieces * scale, strict=True)
-            words = [f"{n} × {figures(piece)}" if n > 1 else figures(piece) for n, piece in pieces if n]
-            places.append((plane, holes.names[h], vectors[h], " + ".join(words)))
+        vectors = mounting.amounts * np.exp(1j * holes.angles)
+        for h in np.flatnonzero(mounting.amounts > 0).tolist():
+            words = "" if holes.free_amounts else content(holes, mounting, h, labels.weight_scale)
+            places.append((plane, holes.names[h], vectors[h], words))
     planes = [place[0] for place in places]
     size, angle = labels.weight([place[2] for place in places])
     gone = np.array([plane in c.remove for plane in planes])

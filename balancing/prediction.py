@@ -89,6 +89,15 @@ class Outlook:
         turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
         return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
 
+    def work_words(self, planes: Sequence[str], weights: ComplexArray) -> list[str]:
+        """What to add to each plane, or to take away from it, where it is something."""
+        each = zip(planes, weights, self.places(planes, weights), strict=True)
+        return [
+            f"{plane} {'less ' * (plane in self.remove)}{self.labels.weight_words(abs(w))} at {at:.0f}°"
+            for plane, w, at in each
+            if w
+        ]
+
     @property
     def within(self) -> FloatArray:
         """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""

@@ -30,7 +30,7 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
-from balancing.tables import degrees, reading_columns, vector_columns
+from balancing.tables import degrees
 from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -178,17 +178,9 @@ class ArborCorrection(Correction):
         return f"{super()._weights_text()}\n{head}\n{arbor}"
 
     def to_dict(self) -> dict[str, Any]:
-        """That of the correction with rotor_unbalance, arbor_unbalance and on_arbor_at_index_0."""
-        columns: tuple[Column, ...] = reading_columns(self.labels, self.speeds, self.sensors)
-        for name, readings in (("before", self.before), ("after", self.after)):
-            columns += vector_columns(self.labels, name, readings + self.rotor_and_arbor[1].before)
+        """That of the correction with rotor_unbalance and arbor_unbalance."""
         rotor, arbor = (records(part._weight_columns()[:6]) for part in self.unbalances)
-        further = {
-            "rotor_unbalance": rotor,
-            "arbor_unbalance": arbor,
-            "on_arbor_at_index_0": records(columns),
-        }
-        return super().to_dict() | plain(further)
+        return super().to_dict() | plain({"rotor_unbalance": rotor, "arbor_unbalance": arbor})
 
 
 def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
@@ -204,7 +196,7 @@ def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
     Returns
     -------
     ArborCorrection
-        Whose JSON has rotor_unbalance, arbor_unbalance and on_arbor_at_index_0.
+        Whose JSON has rotor_unbalance and arbor_unbalance.
     """
     at = result.planes, result.speeds
     corrections = tuple(correct(part, None, *at, refuse=False) for part in both)

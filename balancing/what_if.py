@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 from balancing.influence import Influence, match_speeds, plane_indices
 from balancing.prediction import Outlook
 from balancing.regions import LEVEL, half_width, reach, real_parts
-from balancing.tables import degrees, largest_readings, rms, small, three_figures
+from balancing.tables import largest_readings, rms, small, three_figures
 from balancing.trials import Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
@@ -107,12 +107,7 @@ class WhatIf(Outlook, Answered):
         if self.errors_known:
             left += f" ± {figures(self.rms_within * scale, 2)}"
             known = f", below {three_figures(self.check_rms * scale)} in 95 of 100 check runs"
-        sizes, places = labels.weight(self.weights)[0], self.places(self.planes, self.weights)
-        each = [
-            f"{plane} {'less ' * (plane in self.remove)}{figures(size)} {labels.weight_in} at {degrees(at)}"
-            for plane, size, at in zip(self.planes, sizes, places, strict=True)
-            if size
-        ]
+        each = self.work_words(self.planes, self.weights)
         first = f"{capital(self.word)}: with these weights rms {left} {unit}".rstrip() + f"{known}."
         on = f"On the bare rotor: {'; '.join(each) or 'nothing'}; {labels.turning_in_words()}."
         shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
