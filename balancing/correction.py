@@ -101,15 +101,6 @@ class MountDecision:
             "instead": list(self.instead),
             "rms_before": self.before * scale,
             "rms_expected": self.expected * scale,
-            "fewer_planes": [
-                {
-                    "planes": list(c.planes),
-                    "rms_after": c.rms * scale,
-                    "rms_expected": c.expected * scale,
-                    "largest_weight": float(np.abs(c.weights).max() * labels.weight_scale),
-                }
-                for c in self.choices
-            ],
             **({"worse_elsewhere": list(self.elsewhere)} if self.elsewhere else {}),
         }
 

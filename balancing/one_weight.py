@@ -30,16 +30,6 @@ from balancing.pieces import solve_discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
 
-__all__ = [
-    "Removal",
-    "Split",
-    "TwoPlanes",
-    "TwoPositions",
-    "combine",
-    "drill",
-    "split",
-    "two_positions",
-]
 STEEL = 7850.0
 """kg/m³."""
 _TIP = float(np.tan(np.radians(59.0)))
@@ -92,7 +82,8 @@ class Split:
             contents.append((f"{what} {labels.weight_in}", f"{self.holes.names[h]} ({angle:.6g}°)"))
         return equal_together(contents)
 
-    def _entries(self, labels: Labels) -> dict[str, Any]:
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types."""
         rows = []
         for h in np.flatnonzero(self.mounting.amounts):
             weight = labels.weight_entry(self.mounting.amounts[h] * np.exp(1j * self.holes.angles[h]))
@@ -103,12 +94,8 @@ class Split:
             "holes": rows,
             "mounted": labels.weight_entry(self.mounting.vector),
             "number_of_pieces": self.pieces,
+            "words": self.in_holes(labels),
         }
-
-    def to_dict(self, labels: Labels) -> dict[str, Any]:
-        """As JSON types."""
-        fewer = [one._entries(labels) for one in self.fewer]
-        return {**self._entries(labels), "words": self.in_holes(labels), "fewer_pieces": fewer}
 
     def sentence(self, labels: Labels) -> str:
         """What to mount, what it makes, and what is missing."""

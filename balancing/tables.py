@@ -149,8 +149,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
     """Errors of a reading and between runs in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
-    alone, common, effect, further = run.typical
-    whole, level = float(np.linalg.norm(run.typical)), run.level * scale
+    whole = float(np.linalg.norm(run.typical))
     return {
         "source": reading.source,
         "amplitude_percent": None if e is None else 100 * e.amplitude,
@@ -159,10 +158,7 @@ def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str
         "degrees_of_freedom": reading.dof,
         "between_runs": {
             "source": run.origin,
-            "percent": 100 * float(np.hypot(alone, common)),
-            "percent_of_effect": 100 * effect,
-            "floor": further * level,
-            "rms": whole * level,
-            "common_share": 1 - (alone / whole) ** 2 if whole else 0.0,
+            "percent": 100 * whole,
+            "rms": whole * run.level * scale,
         },
     }

@@ -32,13 +32,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, frame, records, text
+from rotorid.base.tables import Column, frame, records
 from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm
 
@@ -166,19 +165,14 @@ class TrialWeight(Answered):
         if self.force is not None:
             lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N"
             lines[0] += "" if share is None else f", {share:.3g} % of the load"
-        table: tuple[str, ...] = ()
         if self.influence is not None and self.expected is not None:
             where = self.influence.speeds, self.influence.sensors
             largest = largest_readings(labels, *where, self.influence.baseline, self.expected)
             lines.append(f"  largest with it{largest}")
-            head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
-            table = (f"{head}\n{text(self._columns(), left=2)}",)
         return Answer(
             f"Trial weight in plane {self.plane}: {size:.4g} {labels.weight_in}{at}, {angle}.",
             "\n".join(lines),
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
-            tables=table,
-            more="every reading",
             to_mount=True,
         )
 
@@ -330,14 +324,6 @@ def trial_from_coefficients(
         )
     angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
     expected = Y + w * (amount / scale * np.exp(1j * angle))
-    seen = np.abs(Y) > 1e-9 * size
-    ratio = expected[seen] / Y[seen]
-    change, turn = float(np.abs(np.abs(ratio) - 1).max()), float(np.abs(np.angle(ratio)).max())
-    if change < ENGINEERS_AMPLITUDE and turn < ENGINEERS_PHASE:
-        warnings.append(
-            f"the trial weight in plane {plane!r} changes no reading by 30 % or 30° (at most "
-            f"{100 * change:.2g} % and {math.degrees(turn):.2g}°): a larger one would be more certain"
-        )
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(

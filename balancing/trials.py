@@ -286,11 +286,10 @@ class Limits:
             keep(self, **{name: array})
         arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
         start, width = arcs.T
-        if len(self.forbidden) != len(self.max_weight):
-            raise ValueError("there must be arcs, or none, for every plane")
-        if not (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all():
+        kept = (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all()
+        if not kept or len(self.forbidden) != len(self.max_weight):
             raise ValueError(
-                f"there are arcs from no angle, or wider than 2π or than none: {arcs.tolist()} rad"
+                f"every plane needs arcs of 0 to 2π from a finite angle, or none; got {arcs.tolist()}"
             )
 
     @classmethod

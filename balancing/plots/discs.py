@@ -92,7 +92,11 @@ def draw_disc(  # noqa: PLR0913
     mark = 0.95 * zero
     ax.plot(mark.real, mark.imag, marker=(3, 0, turned + 90.0), color="black", ms=8)
     for start, width in forbidden:
-        ends = np.degrees(np.sort(labels.drawn([start, start + width]))) + 180.0 * remove + turned
+        ends = (
+            np.degrees(np.sort(labels.drawn_sign * np.array([start, start + width])))
+            + 180.0 * remove
+            + turned
+        )
         ax.add_patch(Wedge((0, 0), 1.0, *ends, width=0.32, fc="white", hatch="xxxx"))
     if holes is not None:
         _draw_holes(ax, holes, sign * zero * on_paper(labels, np.exp(1j * holes.angles)), scale)
@@ -106,8 +110,6 @@ def draw_disc(  # noqa: PLR0913
     like = "like adding, " if remove else ""
     lines = [f"{like}{name}: {labels.weight_at(vector)}" for name, vector in vectors.items() if vector]
     lines = [f"{turn_sign(labels)} rotation", *lines]
-    lines += ["hatched arcs: nothing goes there"] if forbidden else []
-    lines += ["hatched circles: taken already"] if taken.any() else []
     bottom = -_EDGE - _LINE * len(lines)
     ax.set_ylim(bottom, _EDGE)
     ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)

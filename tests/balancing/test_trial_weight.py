@@ -145,7 +145,6 @@ def test_a_trial_radius_of_its_own():
 @each_of(
     ("options", "words"),
     [
-        ({"share": 0.05}, "changes no reading by 30 % or 30°"),
         ({"share": 3.0}, "would read more than the largest reading"),
         ({"radius": 0.2, "load": 100.0}, "% of the load, more than 25 %"),
     ],
