@@ -204,8 +204,6 @@ def trial_from_force(  # noqa: PLR0913
     phase: float | None = None,
     lag: Lag | None = None,
     sensor_angle: float = 0.0,
-    key_phasor: float = 0.0,
-    quantity: Quantity = "displacement",
     labels: Labels | None = None,
 ) -> TrialWeight:
     """First trial weight without any coefficients: its force is a fraction of the load, m r ω² = f · load.
@@ -220,8 +218,8 @@ def trial_from_force(  # noqa: PLR0913
         f.
     phase, lag
         Of the initial reading, rad, positive = lead, and its expected lag; without both no angle is proposed.
-    sensor_angle, key_phasor, quantity
-        As of `opposing_angle`.
+    sensor_angle
+        Of the sensor from the key phasor, rad with the rotation.
     labels
         Units and conventions to print in.
 
@@ -247,9 +245,7 @@ def trial_from_force(  # noqa: PLR0913
             "an angle needs both the phase of the initial reading and the lag: give the other one, too"
         )
     if phase is not None and lag is not None:
-        angle = opposing_angle(
-            phase, lag.expected, sensor_angle=sensor_angle, key_phasor=key_phasor, quantity=quantity
-        )
+        angle = opposing_angle(phase, lag.expected, sensor_angle=sensor_angle)
         reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
     warnings = _force_warning(fraction)
