@@ -374,16 +374,8 @@ class Correction(Prediction, Answered):
 
     def _parts_text(self, parts: Correction) -> str:
         """Weights of groups, or of the static part and the couple."""
-        size, angle = self.labels.weight(parts.weights)
-        widths = parts._widths() if parts.region_known else [[""] * len(size)] * 2
-        each = "; ".join(
-            " ".join(f"{name} {figures(mass)} {self.labels.weight_in} {more} at {degrees(at)} {turn}".split())
-            for name, mass, more, at, turn in zip(
-                parts.planes, size, widths[0], angle, widths[1], strict=True
-            )
-        )
         how = "" if self.unknowns else f" (the sum; half the difference, opposite in {self.planes[1]!r})"
-        return fill(f"In parts: {each}{how}.", WIDTH)
+        return fill(f"In parts, {self.labels.weight_in}: {parts.in_words()}{how}.", WIDTH)
 
     def _vibration_text(self) -> str:
         columns = list(self.vibration_columns(INVISIBLE))
