@@ -173,7 +173,7 @@ class Amplitudes:
     def _refined(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minima of χ² from starts (B, 1 + 2P), and χ² there (B,)."""
         (r, J), damping = self._residuals(x), np.full((len(x), 1), 1e-2)
-        for _ in range(40):
+        for _ in range(200):
             normal, eye = np.einsum("bri,brj->bij", J, J), np.eye(x.shape[1])
             scale = damping * np.maximum(np.einsum("bii->bi", normal), 1e-9)
             gradient = np.einsum("bri,br->bi", J, r)[..., None]
@@ -183,4 +183,6 @@ class Amplitudes:
             x, r = np.where(better, x - step, x), np.where(better, r_new, r)
             J = np.where(better[..., None], J_new, J)
             damping = np.where(better, damping / 5, damping * 5).clip(1e-10, 1e6)
+            if np.all(np.abs(step) < 1e-9):
+                break
         return x, (r**2).sum(axis=1)

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = house.PACKAGES
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
 RUFF = PROJECT["ruff"]
-PAIRS, NAMES, SCREEN = 230, 102, 25
+PAIRS, NAMES, SCREEN = 230, 110, 25
 """Commands with options, without --help, and of one command: at most so many."""
 EXEMPT = 16
 """Functions that may be longer or take more than ruff's limits: at most so many."""

@@ -87,8 +87,9 @@ def attachment(item: Any) -> str:  # noqa: ANN401  all that has a node and a nam
 
 def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
     """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
-    unit = np.round(np.exp(1j * np.asarray(angle, dtype=float)), 15) + 0.0  # no negative zero
-    return np.asarray(np.asarray(size) * unit)
+    unit = np.exp(1j * np.asarray(angle, dtype=float))
+    along, across = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in (unit.real, unit.imag))
+    return np.asarray(np.asarray(size) * (along + 1j * across), dtype=complex)
 
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:

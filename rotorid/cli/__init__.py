@@ -13,9 +13,9 @@ import typer
 
 from rotorid.base.answer import COLUMNS
 from rotorid.base.choices import one_of
-from rotorid.cli.choices import Command, Commands, whole_paragraphs
+from rotorid.cli.choices import Command, whole_paragraphs
 from rotorid.cli.demo import demo
-from rotorid.commands.app import json_text, run, typer_command, written_help
+from rotorid.commands.app import json_text, run, typer_command
 from rotorid.commands.progress import plain
 
 _JOBS = {
@@ -84,16 +84,17 @@ def _work_of(name: str) -> Callable[..., Any]:
 
 def application(typed: Sequence[str] = ()) -> typer.Typer:
     """The command line: of the one command that the first word names, or of all."""
+    if sys.flags.optimize > 1:
+        raise ValueError("python -OO drops the texts that the options are made of: leave -OO away")
     app = typer.Typer(
         name="rotorid",
-        cls=Commands,
         rich_markup_mode=None if plain() else "rich",  # else without any escape code
         invoke_without_command=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": COLUMNS},
         callback=_rotorid,
-        help=whole_paragraphs(written_help(_rotorid)),
+        help=whole_paragraphs(_rotorid.__doc__ or ""),
     )
     panel_of = {name.replace("_", "-"): job for job, names in _JOBS.items() for name in names.split()}
     one = typed[0] if typed and typed[0] in panel_of else ""
@@ -107,7 +108,7 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
         fleet.command("fit", cls=Command)(typer_command(_work_of("fleet_fit")))
         app.add_typer(fleet, name="fleet", rich_help_panel="More")
         for more in (worksheet, demo, schema):
-            app.command(more.__name__, cls=Command, rich_help_panel="More", help=written_help(more))(more)
+            app.command(more.__name__, cls=Command, rich_help_panel="More")(more)
     return app
 
 
@@ -142,7 +143,7 @@ def _overview() -> str:
     lines = ["An example of each job, run in a checkout (else: rotorid demo DIR):"]
     for job, every in _JOBS.items():
         chief, *others = every.replace("_", "-").split()
-        example = written_help(_work_of(chief)).split("Example: ")[1].partition("\n\n")[0]
+        example = (_work_of(chief).__doc__ or "").split("Example: ")[1].partition("\n\n")[0]
         example, names = " ".join(example.split()), ", ".join(others)
         lines += ["", f"{job}:", f"  {example}"]
         lines += textwrap.wrap(f"also {names}", COLUMNS, initial_indent="  ", subsequent_indent="  ")
@@ -151,4 +152,4 @@ def _overview() -> str:
 
 def main() -> None:
     """Run the command line."""
-    run(application(sys.argv[1:]))
+    run(lambda: application(sys.argv[1:])())

@@ -1,27 +1,12 @@
-"""Help of commands, with the choices of the registries; a suggestion for a misspelt choice."""
+"""Help of commands, with the choices of the registries."""
 
 from __future__ import annotations
 
 import inspect
-import re
 from typing import Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup
-
-from rotorid.base.choices import suggest
-
-_CHOICE = re.compile(r"(?:Value error, )?('([^']*)' is not one of (.+?))\.?", re.DOTALL)
-
-
-class Commands(TyperGroup):
-    """All commands; a file in place of one is no option, even if its name begins with -."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - as typer declares it
-        """As typer's."""
-        if args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            ctx.fail(f"No such command {args[0]!r}: the command stands first, rotorid balance -- {args[0]}")
-        return super().resolve_command(ctx, args)
+from typer.core import TyperCommand
 
 
 class Command(TyperCommand):
@@ -40,11 +25,11 @@ class Command(TyperCommand):
         return option
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
-        """As typer's, with the nearest choice in a complaint."""
+        """As typer's, without a word of Python in a complaint."""
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as problem:
-            problem.message = nearest_choice(problem.message)
+            problem.message = problem.message.removeprefix("Value error, ")
             raise
 
 
@@ -74,12 +59,3 @@ def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no pub
         parameter._get_number_range_help_str = lambda: ""  # a refusal tells it
         if parameter.param_type_name == "argument" or parameter.is_flag:
             parameter.display_type_rich = lambda ctx: ""
-
-
-def nearest_choice(message: str) -> str:
-    """A complaint about a value that is none of a few, with the nearest one; others as they are."""
-    match = _CHOICE.fullmatch(message)
-    if match is None:
-        return message
-    near = suggest(match[2], re.findall(r"'([^']*)'", match[3]))
-    return f"{match[1]}." + (f" Did you mean {near!r}?" if near else "")

@@ -12,7 +12,6 @@ where words that begin with - are what is typed beside, or with two -- instead o
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import dataclasses
 import inspect
@@ -21,12 +20,11 @@ import itertools
 import json
 import os
 import sys
-import textwrap
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_origin
 
 import typer
 
@@ -212,7 +210,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     parameters = [*first, *options]
     run_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run_command.__annotations__ = {one.name: one.annotation for one in parameters}
-    run_command.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
+    run_command.__doc__ = inspect.cleandoc(work.__doc__ or "").partition("Parameters\n")[0]
     return run_command
 
 
@@ -268,14 +266,6 @@ def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that 
     return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in stated.items()})
 
 
-def written_help(of: Any) -> str:  # noqa: ANN401 - a function or a class
-    """The docstring, which is the help; `python -OO` drops it, the file has it still."""
-    if sys.flags.optimize < 2:
-        return of.__doc__ or ""
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(of))).body
-    return ast.get_docstring(cast("ast.FunctionDef | ast.ClassDef", definition)) or ""
-
-
 class _Documented(NamedTuple):
     """How an option is typed, what of, from which number on, and what it is."""
 
@@ -289,7 +279,7 @@ def _documentation(of: Any) -> dict[str, _Documented]:  # noqa: ANN401 - a funct
     """Of each parameter or attribute, from lines `name : FLAGS METAVAR from LEAST` and the indented below."""
     entries: dict[str, _Documented] = {}
     name = ""
-    for line in inspect.cleandoc(written_help(of)).partition("----------\n")[2].splitlines():
+    for line in inspect.cleandoc(of.__doc__ or "").partition("----------\n")[2].splitlines():
         if line.startswith(" "):
             entries[name] = entries[name]._replace(text=f"{entries[name].text} {line.strip()}".strip())
         elif line:

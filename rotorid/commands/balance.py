@@ -9,22 +9,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import LINES, Answer, together
+from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
 from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
 from rotorid.commands.balance_solution import (
     choices,
+    coefficients_of,
     job_of,
     solve,
+    special,
     with_other_conventions,
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
-from rotorid.commands.quantities import one_of
-from rotorid.commands.special_runs import special
+from rotorid.commands.model_places import next_mode
+from rotorid.commands.option_quantities import mounted_weights
+from rotorid.commands.quantities import one_of, speeds
 from rotorid.commands.tolerance import ToleranceOptions, permissible
 from rotorid.commands.without_phase import balanced_without_phase
-from rotorid.report.options import check_choices
-from rotorid.report.outcome import Outcome, command, provenance, table_of
+from rotorid.report.options import check_choices, refuse
+from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +37,11 @@ if TYPE_CHECKING:
     from rotorid.commands.balance_solution import JobGiven, Solved
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
-    from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
+
+
+_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", "grade", "rotor_mass", "service_speed")
+"""Options that mean nothing beside `weights`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,9 +73,8 @@ class Balance(Outcome):
 
     def beside(self) -> dict[str, Any]:
         """Keys of the document beside those of the correction."""
-        names = {"mounting": "mounted", "check": "check", "left_to_do": "left", "verdict": "verdict"}
-        names |= {"of_type": "of_type", "zones": "zones"}
-        parts = {key: getattr(self, name) for key, name in names.items()}
+        parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
+        parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
         return {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
@@ -111,11 +117,37 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcom
     read, files, again = job_of(job, options)
     if read.trials.amplitudes_only:
         return balanced_without_phase(read, options)
-    if options.weights is not None:
-        from rotorid.commands.what_if import predicted
+    return corrected(read, options, files, again) if options.weights is None else _what_if(read, options)
 
-        return predicted(read, options)
-    return corrected(read, options, files, again)
+
+def _what_if(job: Job, options: BalanceOptions) -> Outcome:
+    """What the weights of the options would leave, with limits and zones.
+
+    Check runs count for the coefficients where `options.refine`, and else not at all.
+    """
+    from balancing import match_speeds, verdict_of_readings, what_if, zones_of
+
+    refuse(options, _NEEDLESS, "means nothing with --weights, which are taken as they are")
+    given = mounted_weights(job, options.weights or {})
+    (influence, runs), of_type = coefficients_of(job, options)
+    chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
+    remove = [name for name, plane in job.planes.items() if plane.remove]
+    result = what_if(influence, given, runs, chosen, remove)
+    result = replace(result, worse=(*result.worse, *next_mode(job, result)))
+    verdict, limits = None, job.limits_of(influence.planes)
+    if limits is not None:
+        kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))
+        verdict = verdict_of_readings(result.influence, result.after, result.after_covariance, kept)
+    zones = zones_of(result, job.zones) if job.zones else None
+    beside = {key: part for key, part in (("verdict", verdict), ("zones", zones)) if part}
+    return outcome_of(
+        result,
+        provenance(job.files if of_type is None else of_type.files, options),
+        answer=together([result.answer, *(part.answer for part in beside.values())]),
+        keys=lambda: result.to_dict() | {key: part.to_dict() for key, part in beside.items()},
+        file=Table("weights", result.columns()),
+        title="What these weights would leave",
+    )
 
 
 def corrected(
@@ -169,11 +201,6 @@ def corrected(
             raise ValueError(f"{path.name}: {read.trials.special}")
         return influence_bytes(path, as_measured(read, influence))
 
-    def solved_equations() -> Equations:
-        from rotorid.report.equations_of_results import correction_equations
-
-        return correction_equations(result.parts or result if result.unknowns else result)
-
     outcome = Balance(
         result=result,
         provenance=made,
@@ -181,7 +208,7 @@ def corrected(
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _picture(outcome)},
-        solved=solved_equations,
+        solved=result,
         lines=LINES + 6 * bool(mounted or (left and left.pieces)),
         influence=influence,
         job=read,

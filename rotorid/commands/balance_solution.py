@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
-from rotorid.commands.amplitude_errors import Errors, percent_and_degrees
-from rotorid.commands.coefficients import choose, counted, of_planes, unknowns_of
+from rotorid.commands.coefficients import choose, counted, of_planes, stored, unknowns_of
 from rotorid.commands.model_places import next_mode
-from rotorid.commands.option_quantities import limited
+from rotorid.commands.option_quantities import Errors, limited, percent_and_degrees
 from rotorid.commands.quantities import Names, Speeds, names, speeds
-from rotorid.commands.special_runs import refuse
-from rotorid.report.options import file_of
+from rotorid.report.options import file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
@@ -29,6 +27,10 @@ if TYPE_CHECKING:
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
+
+
+_ABSOLUTE = ("influence", "coefficients", "machine_type", "max_mass", "ridge", "split", "refine", "grade")
+"""Options that need known weights."""
 
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
@@ -168,8 +170,31 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, tuple[Path, ...
 
 def _limited(job: Job, options: BalanceOptions) -> Job:
     """The job with the limits of the options, if these go with its runs."""
-    refuse(job, vars(options))
+    relative, index = job.trials.relative, job.trials.index
+    if relative:
+        refuse(options, _ABSOLUTE, "does not go with it: the trial weights of this job are not known (?)")
+        if relative.angle and job.limits and any(job.limits.forbidden):
+            raise ValueError(
+                "forbidden_deg does not go with it: the places of trial weights are not known (?)"
+            )
+        if index is not None:
+            raise ValueError("runs at several indices need trial weights that are known, without ?")
+    if index is not None:
+        refuse(options, ("machine_type", "refine"), "does not go with it: this job has an index")
+        if options.coefficients == "combined":
+            raise ValueError("--coefficients combined does not go with it: this job has an index")
     return limited(job, options.max_mass, options.limit)
+
+
+def special(result: Correction, job: Job, kind: str | None) -> Correction:
+    """A correction as multiples of unknown trial weights, or with the unbalance of the arbor."""
+    from balancing import relative_to, rotor_and_arbor, with_arbor
+
+    if job.trials.relative is not None:
+        return relative_to(result, job.trials.relative)
+    if job.trials.index is None:
+        return result
+    return with_arbor(result, rotor_and_arbor(job.trials, stored(job, kind)))
 
 
 class Solved(NamedTuple):

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rotorid.base.choices import Method
     from rotorid.identify.ode import OdeModel
     from rotorid.identify.records import Record
-    from rotorid.report.equations import Equations
 
 Values = str | Mapping[str, float]
 """As "k=2,d=0.1", or by name."""
@@ -120,7 +119,9 @@ def fit(
         records = [file_of(records, "records")]
     if not records:
         raise ValueError("give a record after the model file")
-    _check_once([Path(given) for given in records if isinstance(given, Path | str)])
+    files = [os.path.realpath(given) for given in records if isinstance(given, Path | str)]
+    if twice := [file for file in files if files.count(file) > 1]:
+        raise ValueError(f"{twice[0]}: this record is given twice; its samples would count double")
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     begin = None if options.start is None else _start(options.start, equations, len(records))
     deviations = None if options.sigma is None else sigmas(options.sigma, equations.outputs)
@@ -139,26 +140,13 @@ def fit(
         ".xlsx": lambda _: excel(*result.tables()),
     }
 
-    def solved() -> Equations:
-        from rotorid.report.equations_of_results import equations_of
-
-        return equations_of(result)
-
     return outcome_of(
         result,
         files=iterations if result.integrals else {},
         pictures={"Signals and residuals over time; parameters with 95 %.": lambda: figure_fit(result)},
         title="Parameters from time records",
-        solved=solved,
+        solved=result,
     )
-
-
-def _check_once(records: Sequence[Path]) -> None:
-    """Refuse a file that is given twice, perhaps by another name: its samples would count double."""
-    files = [os.path.realpath(path) for path in records]  # of a circle of links, too
-    for path, file in zip(records, files, strict=True):
-        if files.count(file) > 1:
-            raise ValueError(f"{path}: this record is given twice; its samples would count double")
 
 
 def _read(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
-from rotorid.commands.amplitude_errors import Errors, amplitude_errors
+from rotorid.commands.option_quantities import Errors, amplitude_errors
 from rotorid.report.options import file_of
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from rotorid.files import HarmonicFile
     from rotorid.identify import Experiments, HarmonicModel
-    from rotorid.report.equations import Equations
 
 _NO_DATA = "give a table of measured amplitudes after the model file (only --show equations does without)"
 
@@ -91,7 +90,7 @@ def identify(
         result,
         pictures={"Amplitudes or shapes, measured and predicted.": picture},
         title="Coefficients from harmonic tests",
-        solved=lambda: _equations(result),
+        solved=result,
     )
 
 
@@ -105,12 +104,5 @@ def _at_best(model: HarmonicModel) -> Outcome:
         keys={"combinations": words},
         file=Table("combinations", (Column("combination", words),)),
         lacking=_NO_DATA,
-        solved=lambda: _equations(model),
+        solved=model,
     )
-
-
-def _equations(of: object) -> Equations:
-    """K θ = Y, without data in symbols alone."""
-    from rotorid.report.equations_of_results import equations_of
-
-    return equations_of(of)

@@ -16,7 +16,6 @@ from rotorid.commands.quantities import (
     FASTEST,
     Nodes,
     Speeds,
-    acceleration,
     degrees,
     nodes,
     number,
@@ -25,7 +24,6 @@ from rotorid.commands.quantities import (
     pairs,
     two_speeds,
 )
-from rotorid.report.options import refuse
 from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
@@ -58,8 +56,6 @@ class MotionOptions:
         From one speed to another one, up or down, evenly: 500:9000rpm, 9000:500rpm.
     time : TIME
         How long, 2s.
-    acceleration : A
-        Of a run-up or a run-down, in place of its time: 300rpm/s; without a unit rad/s².
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
@@ -81,7 +77,6 @@ class MotionOptions:
     speed: str | float | None = None
     run_up: Speeds | None = None
     time: str | float | None = None
-    acceleration: str | float | None = None
     unbalance: Path | str | Mapping[int, complex] | None = None
     bow: Path | str | Mapping[int, complex] | None = None
     gravity_direction: float = -90.0
@@ -308,18 +303,12 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
     if constant:
         speed = one_speed(options.speed or 0.0, "--speed")
         ends = (speed, speed)
-        refuse(options, ("acceleration",), "belongs to --run-up")
     else:
         ends = two_speeds(options.run_up or "", "--run-up", "FIRST:LAST")
         if ends[0] == ends[1]:
             raise ValueError(f"--run-up {options.run_up!r}: two different speeds are needed; else --speed")
-    if (options.time is None) == (options.acceleration is None):
-        raise ValueError("--time is needed" if constant else "one of --time and --acceleration is needed")
     if options.time is None:
-        rate = acceleration(options.acceleration or 0.0, "--acceleration", bare=True)
-        if not rate > 0:
-            raise ValueError(f"--acceleration {options.acceleration!r} must be above 0, also down")
-        return ends, abs(ends[1] - ends[0]) / rate
+        raise ValueError("--time is needed")
     time = number(str(options.time).strip().removesuffix("s"))
     if not 0 < time < FASTEST:
         raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")

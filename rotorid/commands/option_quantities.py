@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, get_args
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import SHORT_ANGLES, Angles, listing
-from rotorid.commands.quantities import WITH_UNIT, degrees, one_of, one_speed, pairs
+from rotorid.commands.quantities import WITH_UNIT, degrees, number, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
@@ -21,6 +21,7 @@ from rotorid.files.units import Quantity, Unit, UnitError, UnitReader
 if TYPE_CHECKING:
     from balancing import Labels, Trials
     from rotorid.files import Job
+    from rotorid.identify import AmplitudeErrors
 
 Amount = str | float
 """A number with its unit, or a number in SI."""
@@ -34,6 +35,8 @@ Amplitudes = str | Sequence[str] | Mapping[str, Amount]
 """`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
 Mounted = str | Sequence[str] | Mapping[str, complex]
 """As `mounted_weights` reads them, or kg or kg·m by plane."""
+Errors = str | tuple[float, float]
+"""One standard deviation of an amplitude, percent, and of a phase, degrees: "2,1"."""
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
 _AND = re.compile(r"(?<![0-9.][eE])\+(?=\s*[0-9.])")
 _PLACED = re.compile(r"([^@#]+?)\s*([@#])\s*([^@#]+?)\s*[°º]?")
@@ -264,9 +267,7 @@ def _amplitudes(trials: Trials, given: Amplitudes) -> dict[str, Quantity]:
         return other
 
     for one in [given] if isinstance(given, str | Mapping) else given:
-        if not isinstance(one, str | Mapping):
-            raise ValueError(f"--limit {given!r}: texts are needed, such as SENSOR=20")
-        names = [one] if isinstance(one, str) else one  # names of sensors may hold commas
+        names = one if isinstance(one, Mapping) else [one]  # names of sensors may hold commas
         limits |= _limits(names, "--limit", unit_of, si, "SENSOR=20", "sensor", sensors, sensors)
     return limits
 
@@ -330,3 +331,27 @@ def grade(text: str | float) -> float:
         grades = ", ".join(f"G{g:g}" for g in GRADES)
         raise ValueError(f"there is no balance quality grade {str(text)!r}: the grades are {grades}")
     return value
+
+
+def percent_and_degrees(given: Errors) -> tuple[float, float]:
+    """Read "2,1".
+
+    Raises
+    ------
+    ValueError
+        For anything else, an amplitude's below 0 or above 1000 percent, a phase's above 360 degrees.
+    """
+    parts = [number(part) for part in given.split(",")] if isinstance(given, str) else given
+    if len(parts) != 2 or not (0 <= parts[0] <= 1000 and 0 <= parts[1] <= 360):
+        raise ValueError(f"--errors {given!r}: percent of an amplitude and degrees of a phase, 2,1")
+    return parts[0], parts[1]
+
+
+def amplitude_errors(stated: AmplitudeErrors | None, given: Errors | None) -> AmplitudeErrors | None:
+    """Errors of the model file; an option takes their place."""
+    if given is None:
+        return stated
+    from rotorid.identify import AmplitudeErrors
+
+    percent, phase = percent_and_degrees(given)
+    return AmplitudeErrors(percent / 100.0, radians(phase), stated.floor if stated else 0.0)

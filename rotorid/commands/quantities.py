@@ -197,8 +197,8 @@ def one_speed(given: str | float, what: str) -> float:
     return values[0]
 
 
-def acceleration(given: str | float, what: str, *, bare: bool = False) -> float:
-    """Read "-50rpm/s" or "0", and with `bare` any number alone, in rad/s²."""
+def acceleration(given: str | float, what: str) -> float:
+    """Read "-50rpm/s" or "0" in rad/s²."""
     if not isinstance(given, str):
         return given
     text = re.sub(r"/s(²|\^?2)$", "/s/s", given.strip())
@@ -207,7 +207,7 @@ def acceleration(given: str | float, what: str, *, bare: bool = False) -> float:
         unit = WITH_UNIT.fullmatch(size)
         if f"{size}/s" == text.lstrip("+-") and unit and spelt(unit[2]) in SPEED:
             return (-1.0 if text.startswith("-") else 1.0) * one_speed(size, what)
-    elif bare or alone == 0:
+    elif alone == 0:
         return alone
     raise ValueError(f"{what} {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
 

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.files.node_tables import MeasuredModes
     from rotorid.reduction import InputErrors, Placement, Reduction, SmallModel
-    from rotorid.report.equations import Equations
     from rotorid.report.outcome import Written
 
 Place = Literal["best", "compromise", "mac", "book"]
@@ -193,11 +192,6 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Out
             raise ValueError(f"{path}: with --keep-supports the small model is for motion: FILE.toml")
         return state_space_bytes(small or small_of(result), speed, path.suffix.lower())
 
-    def solved() -> Equations:
-        from rotorid.report.equations_of_results import equations_of
-
-        return equations_of(result)
-
     keys: dict[str, Any] = {key: part.to_dict() for key, part in parts.items()}
     return outcome_of(
         result,
@@ -206,16 +200,15 @@ def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Out
         file=lambda: table_of((placement or result).to_frame()),
         files={".toml": model, **dict.fromkeys(STATE_SPACE, state_space)},
         pictures={
-            caption: partial(_picture, key, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
+            caption: partial(_picture, parts[key]) for key, caption in _CAPTIONS.items() if key in parts
         },
         title=f"Rotor reduced to {counted(len(result.nodes), 'mass', 'masses')}",
-        solved=solved,
+        solved=result,
     )
 
 
 _CAPTIONS = {
     "stability": "Smallest logarithmic decrement over speed; below 0 a motion grows.",
-    "response": "Response of both models, and their difference.",
     "methods": "What each method loses: errors of frequencies.",
     "placement": "All ranked choices: largest error of a frequency over the largest 1 - MAC.",
     "": "Mode shapes of the small model over those it was made from.",
@@ -223,15 +216,11 @@ _CAPTIONS = {
 """Of pictures by what was asked for, the last first."""
 
 
-def _picture(key: str, part: Any) -> Figure:  # noqa: ANN401 - one of the results
-    from rotorid.base.plot_style import new_figure
+def _picture(part: Any) -> Figure:  # noqa: ANN401 - one of the results
+    from rotorid.base.plot_style import on_figure
     from rotorid.plots import plot
 
-    two = key == "response"
-    figure = new_figure(6.2 if two else 5.0)
-    axes = [*figure.subplots(2, sharex=True, height_ratios=(3, 2))] if two else figure.add_subplot()
-    plot(part, axes)
-    return figure
+    return on_figure(lambda ax: plot(part, ax), height=5.0)
 
 
 def _speed(rotor: Rotor | None, options: ReduceOptions) -> float:

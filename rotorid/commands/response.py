@@ -24,6 +24,7 @@ from rotorid.commands.quantities import (
     rising_speeds,
     sensors,
 )
+from rotorid.files.units import STANDARD_GRAVITY
 from rotorid.report.options import file_of
 from rotorid.report.outcome import Outcome, command
 
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from rotorid.base.arrays import AnyArray, FloatArray
     from rotorid.reduction import SmallModel
 
-STANDARD_GRAVITY = 9.80665  # m/s²
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
@@ -215,20 +215,6 @@ class Vibration:
         }
         others = ("bode", "shape") if finer.steady.any() and self.drawn else ("bode",)
         return dict(draw[name] for name in (one_of(view, "view", get_args(View)), *others))
-
-    def shape(self, at: int | None) -> Table:
-        """The orbit of each node at a speed."""
-        from rotorid.base.text import phase_deg
-
-        shape = self._deflected(at)
-        columns = (
-            Column("node", shape.nodes),
-            Column("position, m", shape.rotor.positions, "{:.4f}".format),
-            Column("µm peak", 1e6 * shape.major[0], figures),
-            Column("minor axis", 1e6 * shape.minor[0], figures),
-            Column("phase in x, °", phase_deg(shape.x[0]), "{:.1f}".format),
-        )
-        return Table(f"deflected shape at {rpm_text(shape.speeds[0])}", columns)
 
     def _margins(self, chief: Sequence[Peak]) -> str:
         """Whether margins are as required, and what to do where that is unknown."""
@@ -438,10 +424,8 @@ def response(
         sentences=(*result.sentences([peak for _, peak in chief]), *filter(None, [standard])),
         tables=(*_peak_table("peaks", chief), result.largest()),
         more=(
-            _mounted(model, result.response.unbalance),
             *result.forces(),
             *_peak_table("peaks of every reading", every, "peaks"),
-            *([result.shape(at)] if options.view == "shape" and result.finer.steady.any() else []),
         ),
         file=result.file(),
         keys=result.to_dict(),
@@ -486,22 +470,6 @@ def _solved(
         std, doubts = error_band(model, "the amplitudes", amplitudes)
     coarse = replace(coarse, windows=finer.windows, warnings=(*finer.warnings, *doubts))
     return Vibration(response=coarse, finer=finer, std=std, sensors=places, peaks=peaks, operating=operating)
-
-
-def _mounted(rotor: Rotor | SmallModel, unbalance: Mapping[int, complex]) -> Table:
-    """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    from rotorid.base.text import phase_deg
-
-    nodes, stations = sorted(unbalance), getattr(rotor, "stations", {})
-    names = [" ".join([str(node), *(name for name, at in stations.items() if at == node)]) for node in nodes]
-    columns = (
-        Column("node", names),
-        Column("unbalance, g·mm", [1e6 * abs(unbalance[node]) for node in nodes], "{:.6g}".format),
-        Column(
-            "angle, ° with the rotation", [float(phase_deg(unbalance[n])) for n in nodes], "{:.6g}".format
-        ),
-    )
-    return Table("what is mounted", columns)
 
 
 def _places(rotor: Rotor | SmallModel, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, cast
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
-from rotorid.commands.amplitude_errors import Errors, amplitude_errors
 from rotorid.commands.fit import Values, sigmas
+from rotorid.commands.option_quantities import Errors, amplitude_errors
 from rotorid.commands.quantities import (
     Speeds,
     Times,

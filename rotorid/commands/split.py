@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.tables import Column, Table
 from rotorid.commands.option_quantities import length, positions, size, vectors, weight, weights
@@ -117,13 +117,13 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     radius = None if options.radius is None else size(options.radius, "--radius")
     how = {"holes": _in_holes, "two": _at_two_angles, "drill": _drilled}.get(ways[0])
     placed = how(target, labels, radius, options) if how else _in_planes(each, options)
-    keys = placed.to_dict(labels)
-    rows, below = _rows(keys), placed.lines(labels) if isinstance(placed, Split) else []
+    below = placed.lines(labels) if isinstance(placed, Split) else []
     return Outcome(
         result=placed,
         sentences=(placed.sentence(labels), *below),
-        file=Table("weight", tuple(Column(name, [row[name] for row in rows]) for name in rows[0])),
-        keys=keys,
+        file=Table("weight", (Column("weight", ()),)),
+        lacking="there is no table of one weight: see to_dict()",
+        keys=placed.to_dict(labels),
         pictures={"": lambda: _figure(placed, labels, target)},
     )
 
@@ -221,33 +221,6 @@ def _listed(given: str | Sequence[float]) -> list[float]:
             "the number of equally spaced ones"
         )
     return angles
-
-
-def _rows(answer: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What is mounted or taken away, place by place."""
-    mass = f"mass_{answer['unit']}"
-    if "holes" in answer:
-        pieces = [
-            " + ".join(f"{one['count']} × {one['mass']:g}" for one in row["pieces"])
-            for row in answer["holes"]
-        ]
-        return [
-            {"hole": row["hole"], "angle_deg": row["angle_deg"], mass: row["mass"], "pieces": words}
-            for row, words in zip(answer["holes"], pieces, strict=True)
-        ]
-    if "planes" in answer:
-        return [
-            {"plane": row["plane"], "angle_deg": row["angle_deg"], mass: row["mass"]}
-            for row in answer["planes"]
-        ]
-    if "solutions" in answer:
-        return [
-            {"solution": k, "angle_deg": angle, mass: size}
-            for k, solution in enumerate(answer["solutions"], start=1)
-            for angle, size in zip(solution["angles_deg"], answer["masses"], strict=True)
-        ]
-    scaled = {"mass_g": "mass_kg", "radius_mm": "radius_m", "depth_mm": "depth_m"}
-    return [{"angle_deg": answer["angle_deg"], **{name: 1e3 * answer[key] for name, key in scaled.items()}}]
 
 
 def _figure(placed: OneWeight, labels: Labels, target: complex) -> Figure:

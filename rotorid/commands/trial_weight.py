@@ -13,7 +13,6 @@ from rotorid.base.text import SHORT_ANGLES, Angles, Phase
 from rotorid.commands.coefficients import choose, used_planes
 from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
 from rotorid.commands.quantities import Names, degrees, names, number, one_of
-from rotorid.commands.response import STANDARD_GRAVITY
 from rotorid.files import units
 from rotorid.report.options import job_source, refuse
 from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance, table_of
@@ -133,7 +132,7 @@ def _load(given: Amount) -> float:
     if isinstance(given, str):
         load_units = units.MASS | units.FORCE
         value, unit = read_with_unit(given, "--load", units.one_of(load_units), "250kg or 2500N")
-        amount = unit.to_si(value) * (STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
+        amount = unit.to_si(value) * (units.STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
     if not amount > 0:
         raise ValueError(f"--load {given!r}: expected a value above 0, such as 250kg or 2500N")
     return amount

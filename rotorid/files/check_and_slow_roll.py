@@ -13,7 +13,7 @@ amplitude and the phase error, floor'² = floor² + (e max|S|)².
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,7 @@ from rotorid.files.problems import Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
 
 if TYPE_CHECKING:
-    from rotorid.files.job_models import Errors, Vector
+    from rotorid.files.job_models import Errors
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
@@ -63,15 +63,14 @@ def outside(
 
 
 def make_slow_roll(
-    source: Source | Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
+    source: Source, trials: Trials, conventions: Conventions, problems: Problems
 ) -> tuple[ComplexArray, tuple[str, ...]] | None:
     """Slow-roll vectors for the sensors of a job and what to say of them, or None and problems.
 
     Parameters
     ----------
     source
-        A runs table, or by sensor `amplitude` (in its unit, or without one in that of the readings) and
-        `phase_deg`.
+        A runs table.
     trials
         Its readings, for names, units and speeds.
     conventions
@@ -85,64 +84,44 @@ def make_slow_roll(
     sensor that has none.
     """
     before, words, sensors = len(problems), list[str](), trials.sensors
-    if isinstance(source, Mapping):
-        given, vectors = tuple(source), _stated(source, trials, conventions, problems)
+    its = Problems()  # those of the job must not hide what is wrong here
+    runs = make_trials(source, None, replace(conventions, run="slow roll"), None, its)
+    problems.extend(its)
+    if runs is None:
+        return None
+    place, band = source_name(source), conventions.speed_tolerance_percent
+    _complain(outside(runs, trials, ()), place, place, problems)
+    if len(runs.runs) > 1:
+        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
+        problems.add(expected, place, None, "run", runs.runs[1])
+    given, vectors, lowest = runs.sensors, runs.with_phases().mean[0], float(trials.speeds.min())
+    near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
+    if len(runs.speeds) == 1:
+        vectors = vectors[0]
+        if runs.speeds[0] > SLOW * lowest:
+            slow = trials.labels.speed_words(float(runs.speeds[0]))
+            words.append(
+                f"the slow-roll vectors were read at {slow}, which is not slow against "
+                f"{trials.labels.speed_words(lowest)}: vibration that is subtracted with them is left "
+                "unbalanced"
+            )
+    elif None in near:
+        unit = units.SPEED[trials.labels.speed_unit]
+        missing = show_speed(float(trials.speeds[near.index(None)]), unit)
+        expected = "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
+        expected += f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
+        problems.add(expected, place, None, "speed")
     else:
-        its = Problems()  # those of the job must not hide what is wrong here
-        runs = make_trials(source, None, replace(conventions, run="slow roll"), None, its)
-        problems.extend(its)
-        if runs is None:
-            return None
-        place, band = source_name(source), conventions.speed_tolerance_percent
-        _complain(outside(runs, trials, ()), place, place, problems)
-        if len(runs.runs) > 1:
-            expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
-            problems.add(expected, place, None, "run", runs.runs[1])
-        given, vectors, lowest = runs.sensors, runs.with_phases().mean[0], float(trials.speeds.min())
-        near = [nearest_speed(runs.speeds, speed, band) for speed in trials.speeds.tolist()]
-        if len(runs.speeds) == 1:
-            vectors = vectors[0]
-            if runs.speeds[0] > SLOW * lowest:
-                slow = trials.labels.speed_words(float(runs.speeds[0]))
-                words.append(
-                    f"the slow-roll vectors were read at {slow}, which is not slow against "
-                    f"{trials.labels.speed_words(lowest)}: vibration that is subtracted with them is left "
-                    "unbalanced"
-                )
-        elif None in near:
-            unit = units.SPEED[trials.labels.speed_unit]
-            missing = show_speed(float(trials.speeds[near.index(None)]), unit)
-            expected = "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
-            expected += f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
-            problems.add(expected, place, None, "speed")
-        else:
-            vectors = vectors[near]
+        vectors = vectors[near]
     if len(problems) > before:
         return None
     if lacking := [repr(name) for name in sensors if name not in given]:
         words.append(
             f"there is no slow-roll vector for {listing(lacking, 'and')}: what is read there is used as it "
-            "is (amplitude = 0 says that nothing is to be subtracted)"
+            "is (an amplitude of 0 says that nothing is to be subtracted)"
         )
     at = [given.index(name) if name in given else len(given) for name in sensors]
     return np.insert(vectors, len(given), 0.0, axis=-1)[..., at], tuple(words)
-
-
-def _stated(
-    source: Mapping[str, Vector], trials: Trials, conventions: Conventions, problems: Problems
-) -> ComplexArray:
-    """Vectors that the job itself states; problems where they are none of its readings."""
-    usual, sizes, sensors = units.vibration(trials.labels.vibration_unit), list[float](), trials.sensors
-    for name, vector in source.items():
-        unit = vector.amplitude.unit if vector.amplitude.unit.name else usual
-        sizes.append(unit.to_si(vector.amplitude.value))
-        if name not in sensors:
-            hint = f"{did_you_mean(name, sensors)}; its sensors are {listing(sensors, 'and')}"
-            vector.complain(problems, "", f"a sensor of the runs table, not {name!r}{hint}")
-        elif unit.kind != usual.kind:
-            unit_words = f"{usual.name or 'no unit'}, as the readings have, or in a unit that converts to it"
-            vector.complain(problems, "amplitude", f"an amplitude in {unit_words}")
-    return conventions.labels.vibration_from(sizes, np.radians([vector.phase for vector in source.values()]))
 
 
 def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, problems: Problems) -> None:
@@ -153,33 +132,13 @@ def _complain(more: Iterable[tuple[str, str, str]], runs: str, weights: str, pro
 
 
 def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
-    """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors, and warnings."""
-    left, labels, errors, words = (
-        trials.with_phases().readings - vectors,
-        trials.labels,
-        trials.errors,
-        list[str](),
-    )
-    S, size = np.abs(np.broadcast_to(vectors, left.shape[2:])), np.abs(trials.mean)
-
-    def shown(amplitude: float) -> str:
-        return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_in}".rstrip()
-
-    for r, s, c in np.argwhere(size < S * (1.0 - 1e-12))[:1]:
-        words.append(
-            f"the slow-roll vector of sensor {trials.sensors[c]!r}, {shown(S[s, c])}, is larger than "
-            f"its reading in run {trials.runs[r]!r} at {labels.speed_words(float(trials.speeds[s]))}, "
-            f"{shown(size[r, s, c])}: check its unit, and that the readings have not been corrected already"
-        )
-    largest = float(S.max(initial=0.0))
-    if errors is not None and (share := max(errors.amplitude, errors.phase) * largest):
+    """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors."""
+    left, errors = trials.with_phases().readings - vectors, trials.errors
+    if errors is not None:
+        share = max(errors.amplitude, errors.phase) * float(np.abs(vectors).max(initial=0.0))
         errors = replace(errors, floor=float(np.hypot(errors.floor, share)))
-        words.append(
-            "the stated errors hold for the amplitudes as measured: of the slow-roll vectors, up to "
-            f"{shown(largest)}, they add {shown(share)} to the floor"
-        )
     steps = None if trials.steps is None else _turned(trials.steps, trials.readings, left)
-    return replace(trials, readings=left, errors=errors, warnings=(*trials.warnings, *words), steps=steps)
+    return replace(trials, readings=left, errors=errors, steps=steps)
 
 
 def _turned(steps: FloatArray, measured: ComplexArray, left: ComplexArray) -> FloatArray:

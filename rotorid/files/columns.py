@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsIndex
@@ -275,7 +273,8 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
         k: name for k, name in enumerate(grid.header) if name and not name.casefold().startswith(REMARKS)
     }
     meant = {k: column_of(name, columns) for k, name in names.items()}
-    near = {k: nearest(names[k], columns) for k, column in meant.items() if column is None}
+    usual = [example for column in columns for example in column.names]
+    near = {k: suggest(names[k], usual) for k, column in meant.items() if column is None}
     misspelt = frozenset(one.stem for name in near.values() if name and (one := column_of(name, columns)))
     stems = misspelt.union(column.stem for column in meant.values() if column is not None)
     missing = [column for column in columns if column.required and column.stem not in stems]
@@ -317,16 +316,6 @@ def column_of(name: str, columns: Sequence[Column]) -> Column | None:
         if name == column.stem or (column.unit is not None and name.startswith(f"{column.stem}_"))
     ]
     return max(fitting, key=lambda column: len(column.stem), default=None)
-
-
-def nearest(name: str, columns: Sequence[Column]) -> str | None:
-    """The name of a column that was probably meant: `amplitude_um` for `Amplitude [um]`."""
-    plain = re.sub(r"[^\w/%]+|_+", "_", name).strip("_")
-    for column in sorted(columns, key=lambda column: -len(column.stem)):
-        if column.unit is not None and plain.casefold().startswith(f"{column.stem}_"):
-            with suppress(UnitError):
-                return f"{column.stem}_{column.unit(plain[len(column.stem) + 1 :]).name}"
-    return suggest(name, [example for column in columns for example in column.names])
 
 
 def _has_columns(

@@ -40,8 +40,6 @@ _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
-_STATED = {"phase": "phase.*(lag|lead)", "angles": "angles.*((?:with|against) rotation)"}
-"""What the heading of the phases, or a comment of older versions, says about conventions."""
 
 
 def _units(name: str) -> tuple[Unit, Unit, bool]:
@@ -117,15 +115,15 @@ def load_influence(
     """As `read_influence`, from a file or from the cells of a sheet, and the conventions that it states."""
     if isinstance(source, Path) and source.suffix.lower() == ".json":
         influence = _from_json(source)
-        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in _STATED}
+        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
     else:
         problems = Problems()
         grid = read_grid(source, "influence", problems)
         table = problems.need(make_table(_tidied(grid), COLUMNS, problems))
         if table.unit("influence") == UNCLEAR:
             problems.stop()
-        text = "\n".join((table.fields["phase"].name, *reversed(table.grid.comments)))
-        stated = {key: match[1] for key, words in _STATED.items() if (match := re.search(words, text))}
+        heading = re.search("lag|lead", table.fields["phase"].name)
+        stated = {"phase": heading[0]} if heading else {}
         usual = {"phase": phase or "lead", "angles": angles or "with rotation"}
         influence = _from_table(table, Labels(**{**usual, **stated}))
     its = influence.labels
@@ -224,8 +222,6 @@ def _of_document(stored: Mapping[str, Any]) -> Influence:
     )
     if not (chances.sum() > 0 and min(chances.min(), sizes.min()) >= 0):
         raise ValueError("sizes of errors and probabilities must be 0 or more")
-    if not np.linalg.eigvalsh(covariance).min() >= -1e-6 * np.abs(covariance).max():
-        raise ValueError("a covariance is none")
     stated = None if reading["errors"] is None else ReadingErrors(**reading["errors"])
     run = run | {"sizes": sizes.reshape(-1, 4), "probability": chances / chances.sum()}
     common = _complex(stored["common"]).reshape(-1, *covariance.shape[:2], covariance.shape[2] // 2)

@@ -24,7 +24,7 @@ from balancing import (
 )
 from fem import Sensor as Probe
 from rotorid.base.arrays import ComplexArray, FloatArray, polar
-from rotorid.base.text import counted, listing
+from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.job_models import (
@@ -262,7 +262,7 @@ def open_job(path: Path, problems: Problems) -> WrittenJob:
 
 def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # noqa: ANN401
     """The job of these settings and tables, or an `InputError`; `stated` as of `read_job`."""
-    settings = _stating(written.read(problems), stated)
+    settings = _stating(written.read(problems), **stated)
     problems.stop()
     tables, records = tables_of(written, settings)
     for key in READINGS:
@@ -334,21 +334,20 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     )
 
 
-_ERRORS = {"amplitude_error_percent": "amplitude_percent", "phase_error_deg": "phase_deg"}
-
-
-def _stating(settings: JobSettings, stated: Mapping[str, Any]) -> JobSettings:
+def _stating(
+    settings: JobSettings,
+    *,
+    phase: str | None = None,
+    angles: str | None = None,
+    amplitude_error_percent: float | None = None,
+    phase_error_deg: float | None = None,
+) -> JobSettings:
     """The settings of a job with what the caller states in their place."""
-    known = ("phase", "angles", *_ERRORS)
-    if unknown := [name for name in stated if name not in known]:
-        raise TypeError(
-            f"a job is read with {listing(known, 'and')}, not {listing(unknown, 'and')}: other errors "
-            "are stated in the job, [errors]"
-        )
-    given = {name: value for name, value in stated.items() if value is not None}
-    if errors := {_ERRORS[name]: given.pop(name) for name in given.keys() & _ERRORS}:
+    errors = {"amplitude_percent": amplitude_error_percent, "phase_deg": phase_error_deg}
+    given: dict[str, Any] = {"phase": phase, "angles": angles}
+    if errors := {name: value for name, value in errors.items() if value is not None}:
         given["errors"] = (settings.errors or Errors.model_construct()).model_copy(update=errors)
-    return settings.model_copy(update=given)
+    return settings.model_copy(update={name: value for name, value in given.items() if value is not None})
 
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
@@ -400,9 +399,9 @@ def _readings(
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels
     labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
-    notes = [] if source is None else _on_conventions(conventions, labels, stated, source_name(source))
+    notes = [] if source is None else _on_conventions(conventions, labels, source_name(source))
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
-    vectors, slow_roll = tables.get("slow_roll", settings.slow_roll), None
+    vectors, slow_roll = tables.get("slow_roll"), None
     if vectors is not None:
         from rotorid.files.check_and_slow_roll import make_slow_roll, subtract_slow_roll
 
@@ -412,20 +411,13 @@ def _readings(
     return trials, influence, conventions, slow_roll
 
 
-def _on_conventions(
-    conventions: Conventions, labels: Labels, stated: Mapping[str, Any], name: str
-) -> list[str]:
-    """What readings take from stored coefficients that state their conventions, and where both differ."""
+def _on_conventions(conventions: Conventions, labels: Labels, name: str) -> list[str]:
+    """What readings take from stored coefficients that state their conventions."""
     usual, notes = Labels(), []
     adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
     if words := " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted):
         notes.append(
             f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
-        )
-    if stated.get("phase", labels.phase) != labels.phase:
-        notes.append(
-            f"the readings are taken with phase = {labels.phase}, as stated, and the coefficients with "
-            f"phase = {stated['phase']}, as {name} says"
         )
     return notes
 

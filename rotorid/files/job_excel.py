@@ -176,7 +176,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
 
 
 def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
-    """The workbook of a job without its results, with what openpyxl would change: comments, last digits."""
+    """The workbook of a job without its results."""
     import openpyxl
 
     with warnings.catch_warnings():
@@ -185,11 +185,6 @@ def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
     for sheet in book.worksheets:
         if sheet.title.strip().casefold().startswith(RESULTS):
             book.remove(sheet)
-        for cell in (cell for row in sheet.iter_rows() for cell in row):
-            if cell.comment is not None:
-                cell.comment.width, cell.comment.height = 320, 160
-            if isinstance(cell.value, float):  # of which openpyxl would keep 16 digits; 17 are needed
-                cell.value, cell.data_type = repr(cell.value), "n"
     return book
 
 

@@ -9,7 +9,7 @@ from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from balancing import Labels, Placement, ReadingErrors, RunScatter, Trials
 from rotorid.base.text import Angles, Phase, Rotation, View, listing
@@ -55,7 +55,7 @@ _PAIR = re.compile(rf"{_ANY_NUMBER}\s*(?:-|\N{{EN DASH}}|\.\.|:|to)\s*{_ANY_NUMB
 
 
 def named_tables(settings: Mapping[str, Any]) -> dict[str, str]:
-    """The files of `TABLES` that a job names, by key; vectors at slow speed and `WEIGHTS` are none."""
+    """The files of `TABLES` that a job names, by key; `WEIGHTS` is none."""
     named = {key: settings.get(key) for key in TABLES}
     return {
         key: name
@@ -109,10 +109,6 @@ def _share(value: object) -> tuple[float, float]:
     if not (size and abs(degrees) <= 360.0):
         raise ValueError('a ratio other than 0 at an angle from -360 to 360 degrees, such as "1@180"')
     return size, degrees
-
-
-def _kind(value: object) -> str:
-    return "file" if isinstance(value, str) else "vectors"
 
 
 Arcs = Annotated[
@@ -340,20 +336,6 @@ class KeyPhasor(Settings):
     )
 
 
-class Vector(Settings):
-    """`[slow_roll.SENSOR]`."""
-
-    amplitude: Annotated[Quantity, of(NotNegative)] = key(
-        "the amplitude at slow speed, in the unit of the readings; or `amplitude_<unit>`",
-        "amplitude amplitude_um amplitude_mm_s amplitude_m_s2",
-        units=units.VIBRATION,
-    )
-    phase: Turn = key(
-        "the phase at slow speed, counted as the readings count it",
-        "phase_deg",
-    )
-
-
 class Zones(Settings):
     """`[zones]`."""
 
@@ -393,18 +375,7 @@ class JobSettings(Settings):
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
         'where there are holes, else the weights; `"weights"`: these, although there are holes',
     )
-    slow_roll: (
-        Annotated[
-            Annotated[File, Tag("file")] | Annotated[dict[str, Vector], Field(min_length=1), Tag("vectors")],
-            Discriminator(_kind),
-        ]
-        | None
-    ) = optional(
-        "a runs table of one run at slow speed, to be subtracted from every reading; or "
-        "`[slow_roll.SENSOR]`, see below",
-        expected="vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at "
-        'slow speed, slow_roll = "slow.csv"',
-    )
+    slow_roll: File | None = optional("a runs table of one run at slow speed, subtracted from every reading")
     key_phasor: KeyPhasor | None = optional("where the key phasor stands, see below")
     speed_weights: by_name(NotNegative) = key(  # type: ignore[valid-type]
         "a table of weights by speed in the fit, 0: only for the limits",

@@ -44,12 +44,10 @@ _WITH_UNIT = re.compile(rf"({NUMBER})\s*([^\s0-9].*)")
 _AT = rf"\bat\b(?=\s*{NUMBER}\s*(?:°|º|deg|degrees?)?$)"  # not `10 g at 90° in P1`
 _VECTOR = re.compile(rf"({NUMBER}[^@<∠]*?)\s*(?:[@<∠/]|{_AT}|(?<=\s)L(?=[0-9]))\s*({NUMBER}[^@<∠/]*)")
 _DECIMAL = re.compile(r"[+-]?[0-9]+(?:\.[0-9]*)?")
-MOUNTED = "note of weights: "
-"""Begins the name of a column of weights, which belong into a weights table."""
 _BLANK = {"", "n.a.", "n/a", "na", "-", "--", "?", "none"}
 """Cells of a column of phases that nobody knows."""
 _OF_READING = ("run", "speed", "repeat")
-_NO_DATA = ("", "note", "mounted")
+_NO_DATA = ("", "note")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
@@ -83,11 +81,6 @@ class Conventions:
         Whether the job has limits in rms, so that mm/s alone are rms.
     run
         Name of the only run, for tables without a column of runs; empty: they need one.
-
-    Raises
-    ------
-    ValueError
-        For a tolerance that is not allowed.
     """
 
     labels: Labels = field(default_factory=Labels)
@@ -99,13 +92,6 @@ class Conventions:
     removed: frozenset[str] = frozenset()
     rms: bool = False
     run: str = ""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
-            raise ValueError(
-                f"speed_tolerance_percent must be from 0 to {LARGEST_TOLERANCE:g}, "
-                f"not {self.speed_tolerance_percent!r}"
-            )
 
 
 def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
@@ -138,8 +124,6 @@ class _Column(NamedTuple):
     def name(self, place: int) -> str:
         """The name that it has in such a table; that of a remark is of no other column."""
         name, stem = self.heading.name, self.stem
-        if stem == "mounted":
-            return f"{MOUNTED}{name}"
         if stem == "note" and name != "time_s" and not name.casefold().startswith(_NOTES):
             return f"note {place} {name}"
         if stem in ("", "note"):

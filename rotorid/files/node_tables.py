@@ -245,7 +245,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
 
 
 def read_compliance(
-    path: str | Path, nodes: Sequence[Node] | None = None, rotor: Rotor | None = None
+    path: str | Path, nodes: Sequence[Node] | None = None
 ) -> tuple[tuple[Node, ...], FloatArray]:
     """Read a table of compliances: deflection at `node` under unit force at `force_node`.
 
@@ -258,8 +258,6 @@ def read_compliance(
         The file; in a workbook the sheet `compliance`, or else the first one.
     nodes
         The nodes wanted, in this order; by default those of the table as they come.
-    rotor
-        Knows the nodes, and the names of stations that a node may be. Without it every name is a label.
 
     Returns
     -------
@@ -272,7 +270,7 @@ def read_compliance(
     """
     problems = Problems()
     table = read_table(path, "compliance", COMPLIANCE_COLUMNS, problems)
-    ends = {stem: _nodes(table, stem, rotor) for stem in ("node", "force_node")}
+    ends = {stem: _nodes(table, stem, None) for stem in ("node", "force_node")}
     problems.stop()
     order = tuple(dict.fromkeys([*ends["node"], *ends["force_node"]] if nodes is None else nodes))
     for stem, named in ends.items():

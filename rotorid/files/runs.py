@@ -25,7 +25,6 @@ from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
 from rotorid.files.layout import (
     DEFAULT_TOLERANCE,
-    MOUNTED,
     Conventions,
     joined,
     read_runs_grids,
@@ -236,11 +235,6 @@ def read_runs(
         weight_scale=1e3,
         speed_unit=table.unit("speed").name,
     )
-    passed_over = [
-        f"column {name.removeprefix(MOUNTED)!r} is passed over: weights stand in the weights table"
-        for name in table.grid.header
-        if name.startswith(MOUNTED)
-    ]
     stated = np.moveaxis(covariances(table, vectors), 0, -1) if known and "phase_std" in table else None
     nothing, noted = np.zeros(len(table)), [blank] if blank else []
     return runs, Trials(
@@ -251,7 +245,7 @@ def read_runs(
         placed(vectors),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
+        warnings=(*words, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
         steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if known else nothing])),
         covariance=None if stated is None else placed(stated),
         index=turn,

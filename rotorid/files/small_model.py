@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
@@ -27,13 +26,12 @@ from rotorid.files.attached import (
     support_tables,
     whole,
 )
-from rotorid.files.problems import InputError, Problems, TableWarning, refusal
+from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"
 """Before the name of a coordinate: the force on it."""
-_HELD = 1e-6  # of the largest stiffness: beyond, it is no rounding
 
 
 class UnbalanceKeys(Place):
@@ -142,13 +140,6 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     for node, value in unbalance:
         parts["unbalance"][node] += value
     model = whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow)))
-    held = float(model.stiffness.sum())
-    if abs(held) > _HELD * np.abs(model.stiffness).max() and (model.supports or model.forces):
-        words = (
-            f"the shaft alone, with all digits: it resists a shift with {held:.4g} N/m, and what holds it "
-            "stands in tables such as [[bearing]]"
-        )
-        warnings.warn(f"{path}, key {ARRAYS['stiffness']}: {words}", TableWarning, stacklevel=3)
     return model, {**file.equations}
 
 

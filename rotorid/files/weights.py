@@ -2,12 +2,14 @@
 
 The unit of a weight stands in the heading (`mass_g`, `Weight [oz·in]`), in a column `unit` or in every cell.
 Its angle is one in degrees (`270°`), a hole, blade or position of the job's plane by its name, or a clock:
-12 is the mark and the hours run as the job's angles count, 30° each. What is removed acts 180° away.
+12 is the mark and the hours run as the job's angles count, 30° each. What is removed acts 180° away. A `?` is
+a mass or place that nobody knows: all of a plane are one weight at one place, for which 1 and 0 stand in.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,13 +20,12 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.cells import Grid, NotANumber, parse_number, show
+from rotorid.files.cells import Cell, Grid, NotANumber, parse_number, show
 from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.layout import NUMBER, Conventions, long_rows
 from rotorid.files.problems import InputError, Problems
 from rotorid.files.units import Unit, one_of
-from rotorid.files.unknown_weights import Unknown, relative_weights, without_marks
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")
 COLUMNS = (
@@ -39,6 +40,9 @@ _BESIDE = (*_PLACES[1:], "action", "unit", "pieces")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
 _CLOCK = re.compile(r"(1[0-2]|0?[0-9])(?::([0-5][0-9])(?::00)?)?(?:\s*(?:o['’]?clock|h))?", re.IGNORECASE)
 _HOLE = re.compile(r"(?:hole|blade|vane|position|pos\.?|no\.|#)\s*(\S+)", re.IGNORECASE)
+
+_Unknown = set[tuple[int, str, str]]
+"""Row, plane (empty where a column has it) and quantity of each `?`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +73,9 @@ def read_weights(
         Collects the complaints.
     """
     find, before = partial(find_header, weights=True), len(problems)
-    unknown = Unknown()
+    unknown = _Unknown()
     try:
-        grid, unknown = without_marks(read_grid(source, "weights", problems, may_be_empty=True, find=find))
+        grid, unknown = _without_marks(read_grid(source, "weights", problems, may_be_empty=True, find=find))
         grid = _one_weight_a_row(grid, conventions)
     except InputError as error:
         problems.extend(error.problems)
@@ -108,7 +112,7 @@ def read_weights(
     made = Weights(planes, total, table.unit("mass"), tuple(rows))
     if not unknown or len(problems) > before:
         return made
-    total, relative = relative_weights(table, unknown, run, runs or (), total)
+    total, relative = _relative_weights(table, unknown, run, runs or (), total)
     return replace(made, weights=total, unit=Unit(TRIAL_WEIGHTS, "multiple"), relative=relative)
 
 
@@ -172,3 +176,54 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
     if plane in conventions.removed and "action" not in table:
         raise NotANumber(f"a column action with add or remove: material is taken away from plane {plane!r}")
     return holes[hole]
+
+
+def _without_marks(grid: Grid) -> tuple[Grid, _Unknown]:
+    """A weights table with numbers in place of `?`, and where these stood."""
+    columns = [h for h in read_headings(grid.header, weights=True) if h.stem in WEIGHT]
+    rows, unknown = list[tuple[int, tuple[Cell, ...]]](), _Unknown()
+    for number, cells in grid.rows:
+        new = list(cells)
+        for heading in columns:
+            if show(cells[heading.index]) == "?":
+                unknown.add((number, heading.sensor, heading.stem))
+                new[heading.index] = "1" if heading.stem == "mass" else "0"
+        rows.append((number, tuple(new)))
+    return replace(grid, rows=tuple(rows)), unknown
+
+
+def _relative_weights(
+    table: Table, unknown: _Unknown, run_of: Sequence[str], runs: Sequence[str], total: ComplexArray
+) -> tuple[ComplexArray, Relative]:
+    """Weights (R, P) as multiples of the trial weight of their plane; problems where these are none.
+
+    `run_of` are the runs of the rows of the table, `runs` those of the weights.
+    """
+    plane_of, unit, sizes = table.texts("plane"), table.unit("mass"), dict[str, float]()
+    turned, multiples = any(stem == "angle" for *_, stem in unknown), total.copy()
+
+    def marked(row: int, stem: str) -> bool:
+        return not unknown.isdisjoint((table.rows[row], name, stem) for name in ("", plane_of[row]))
+
+    for p, plane in enumerate(dict.fromkeys(plane_of)):
+        rows = [row for row, name in enumerate(plane_of) if name == plane]
+        stems = [stem for stem in WEIGHT if any(marked(row, stem) for row in rows)]
+        alike: dict[tuple[complex, ...], str] = {}
+        for row in rows if stems else ():
+            for stem in stems:
+                if not marked(row, stem):
+                    table.complain(row, stem, f"? too: other weights of plane {plane!r} have it")
+            weights = total[runs.index(run_of[row])].copy()
+            weights[p] *= "angle" not in stems
+            first = alike.setdefault(tuple(weights.tolist()), run_of[row])
+            if first != run_of[row]:
+                words = (
+                    f"one run of an unknown weight in plane {plane!r}, which stood in {first!r}: two are not "
+                    "determined; the same one read again is a repeat of that run"
+                )
+                table.problems.add(words, table.grid.source, table.rows[row], stems[-1], "?")
+        size = next(filter(None, total[:, p].tolist()), 1.0)
+        sizes[plane] = np.nan if "mass" in stems else abs(size) * unit.scale
+        turn = size / abs(size) if turned and "angle" not in stems else 1.0
+        multiples[:, p] /= turn * (unit.to_si(1.0) if "mass" in stems else abs(size))
+    return multiples, Relative(turned, sizes, unit.name)

@@ -411,7 +411,7 @@ def whitening(experiments: Experiments, outputs: tuple[str, ...], amplitudes: Co
 def evaluated_once(both: Callable[[FloatArray], tuple[AnyArray, ...]]) -> tuple[Function, Function]:
     """Residuals and Jacobian, which are evaluated in one call, as two functions that remember the last."""
 
-    @lru_cache(maxsize=1)
+    @lru_cache(1)
     def at(numbers: bytes) -> tuple[AnyArray, ...]:
         return both(np.frombuffer(numbers))
 

@@ -237,8 +237,7 @@ def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
 
     R is symmetric in these units: the same whatever eigenvectors a library returns of equal variances.
     """
-    size = np.sqrt(np.maximum(variance, 0.0))
-    scale = np.where(size > 0, size, 1.0)
+    scale = np.sqrt(np.where(variance > 0, variance, 1.0))
     values, vectors = np.linalg.eigh(covariance / (scale[..., :, None] * scale[..., None, :]))
     root = (vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     return np.asarray(scale[..., :, None] * root)

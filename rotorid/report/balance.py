@@ -99,10 +99,6 @@ def balance_report(
         method=f"{result.method_in_words} {result.conditioning.sentence()}",
         seen=conventions_explained.seen_from(labels),
         conventions=conventions_explained.words(labels, places, key),
-        phase_figure=inline_svg(
-            conventions_explained.phase_figure(labels),
-            f"A reading over time with a phase of 60° ({labels.phase})",
-        ),
         residual_figure=inline_svg(
             residual_figure(result, mounted, check, left), "Vibration before and after"
         ),
@@ -135,17 +131,14 @@ def to_do(
         done = (_done(len(table.columns[0].values)),) if boxes else ()
         return html(replace(table, columns=(*table.columns, *done)))
 
-    free = replace(_weights(document, result, job), name="In place of these weights at any angle")
     left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
     part = "mounting" if left is None else "left_to_do"
     pieces = not plain and document[part]["holes"]
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
-        "free": html(free) if boxes and left is None and not plain else "",
         "trim": "" if left is None else shown(_trim(document, result.labels)),
         "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
-        "stays": _if_run_stays(result) if plain else "",
     }
 
 
@@ -226,22 +219,6 @@ def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Table:
     """What goes into each hole."""
     work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
     return Table("", tuple(work))
-
-
-def _if_run_stays(c: Correction) -> Markup | str:
-    """What to do instead where the weights of the last run stay mounted."""
-    if not c.mounted.weights.any():
-        return ""
-    run, planes, _ = c.mounted
-    away = ["take away" if plane in c.remove else "add" for plane in planes]
-    masses, places = c.labels.weight(c.to_add)[0], c.places(planes, c.to_add)
-    columns = (
-        Column("plane", planes),
-        Column("do", away),
-        Column(c.labels.weight_in, masses, _FOUR),
-        Column("angle", np.where(masses > 0, places, np.nan), degrees),
-    )
-    return html(Table(f"Instead, only if the weights of run “{run}” stay mounted", columns))
 
 
 def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison | None) -> Markup:

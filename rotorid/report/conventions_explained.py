@@ -1,21 +1,17 @@
-"""Conventions of a job explained on its sheet: words, and what a phase is in a figure."""
+"""Conventions of a job in words, for its sheet."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotorid.files import units
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from balancing import Labels
 
-_SAMPLE = 60.0
-"""Phase, degrees, that the figure shows."""
 _ASSUMED = " Assumed: neither the job nor the command line says so."
 _PHASES = {
     "lag": "lag: the angle by which the rotor turns from the pulse to the next positive peak of the sensor.",
@@ -73,28 +69,3 @@ def words(labels: Labels, places: Mapping[str, float], key_phasor: float | None)
         "Vibration": f"in {labels.vibration_in or 'the unit of the runs'}{kind}, the part at 1×.",
         "Weights": f"in {labels.weight_in}, {at}.",
     }
-
-
-def phase_figure(labels: Labels) -> Figure:
-    """Draw a reading over time with the pulses of the key phasor, and what its phase is."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(3.4, 2.1), layout="constrained")
-    ax = figure.add_subplot()
-    text: dict[str, Any] = {"fontsize": 9.0, "ha": "center"}
-    ax.axis("off")
-    turn, peak = np.linspace(-100.0, 560.0, 600), _SAMPLE if labels.phase == "lag" else -_SAMPLE
-    ax.plot(turn, np.cos(np.radians(turn - peak)), color="black", lw=1.5)
-    ax.plot([-100, 575], [0, 0], color="0.5", lw=0.7)
-    for at in (0.0, 360.0):
-        ax.plot([at, at], [-1.35, 1.5], color="0.5", lw=0.7, ls=":")
-        ax.plot([at - 12, at - 6, at, at + 6, at + 12], [-1.75, -1.75, -1.35, -1.75, -1.75], "k-")
-        ax.text(at, -1.8, "pulse", va="top", **text)
-    first, last = sorted((360.0, 360.0 + peak))  # the arrow points as time runs
-    ax.plot([360 + peak] * 2, [1.0, 1.5], color="0.5", lw=0.7, ls=":")
-    ax.annotate("", (last, 1.38), (first, 1.38), arrowprops={"arrowstyle": "-|>", "lw": 1.2})
-    ax.text((first + last) / 2, 1.5, f"phase {_SAMPLE:g}° ({labels.phase})", va="bottom", **text)
-    ax.text(0, 1.12, "reading of\na sensor", va="bottom", **text)
-    ax.text(620, 0, "time", va="center", **text)
-    ax.set(xlim=(-110, 660), ylim=(-2.15, 1.95))
-    return figure

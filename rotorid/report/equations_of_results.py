@@ -102,8 +102,10 @@ def _unknown(symbolic: Mapping[Monomial, Polynomial]) -> Expression:
     return factor_terms(expression({times(m, k): x for m, part in symbolic.items() for k, x in part.items()}))
 
 
-def correction_equations(result: Correction) -> Equations:
+@equations_of.register
+def _(correction: Correction) -> Equations:
     """The stretched W D = −Y of all speeds and sensors, [S] (29)–(33), (40), in the units of the job."""
+    result = (correction.unknowns and correction.parts) or correction
     labels, planes, factors = result.labels, result.planes, np.ones(result.before.size)
     W = result.influence.W.reshape(-1, len(planes))
     notes = [

@@ -20,8 +20,8 @@ _T = TypeVar("_T", bound="DataclassInstance")
 
 
 def option_name(field: str) -> str:
-    """As the command line writes it: "--first-hole"."""
-    return f"--{field.replace('_', '-')}"
+    """As the command line writes it: "--first-hole", and "--type" of `machine_type`."""
+    return f"--{field.removeprefix('machine_').replace('_', '-')}"
 
 
 def checked(given: object, kind: type[_T]) -> _T:

@@ -67,7 +67,7 @@ class Outcome(Answered):
     warnings, notes
         Clauses without "Warning: " and "Note: ", the worst first.
     solved
-        What was solved, in symbols and in numbers; None: nothing that could be shown.
+        What `equations_of` shows in symbols and in numbers; None: nothing that could be shown.
     provenance
         Program version, input files with their hashes, date, and every option that differs from its default;
         of a command it follows from what that has read.
@@ -90,7 +90,7 @@ class Outcome(Answered):
     lines: int = LINES
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    solved: Callable[[], Equations] | None = None
+    solved: object = None
 
     @property
     def answer(self) -> Answer:
@@ -155,7 +155,9 @@ class Outcome(Answered):
         """What was solved, in symbols and in numbers; ValueError where nothing can be shown."""
         if self.solved is None:
             raise ValueError("--show equations: there is nothing here that was solved")
-        return self.solved()
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(self.solved)
 
     def sheet(self) -> bytes:
         """To print or to send, one HTML file."""

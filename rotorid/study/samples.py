@@ -7,6 +7,7 @@ that breaks; what is missing is drawn by the next.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
@@ -18,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.logs import progress
-from rotorid.base.worker_processes import single_threads
 from rotorid.files.disk import write_files
 from rotorid.fleet.jobs import arrow, parquet, read_parquet
 
@@ -84,7 +84,7 @@ def draw_all(
         missing, size = [k for k in range(samples) if k not in rows], max(CHUNK, samples // PARTS)
         chunks = [missing[k : k + size] for k in range(0, len(missing), size)]
         try:
-            with single_threads():
+            with _single_threads():
                 for drawn in pool.map(partial(draw, sample, seed), chunks):
                     rows |= {row["sample"]: row for row in drawn}
                     progress.info("%d of %d samples", len(rows), samples)
@@ -127,3 +127,15 @@ def _read(file: Path, schema: pa.Schema) -> dict[int, Row]:
             "differs): name another file"
         )
     return {row["sample"]: row for row in table.to_pylist()}
+
+
+@contextmanager
+def _single_threads() -> Iterator[None]:
+    """One thread of linear algebra in processes that start now: more change digits, and are slower."""
+    before = dict(os.environ)
+    os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)

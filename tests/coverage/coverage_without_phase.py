@@ -16,14 +16,14 @@ import numpy as np
 from balancing import ReadingErrors, Trials, balance_without_phase
 
 LINES = (
-    ("two trial weights, 10 %, stated", 3, 1, 1, 0.1, True),
-    ("four runs, 10 %, stated", 4, 1, 1, 0.1, True),
-    ("four runs, 2 %, stated", 4, 1, 1, 0.02, True),
-    ("four runs of three sensors, 10 %, stated", 4, 1, 3, 0.1, True),
-    ("seven runs, 10 %, stated", 7, 1, 1, 0.1, True),
+    ("two trial weights, 10 %", 3, 1, 1, 0.1, True),
+    ("four runs, 10 %", 4, 1, 1, 0.1, True),
+    ("four runs, 2 %", 4, 1, 1, 0.02, True),
+    ("four runs of three sensors, 10 %", 4, 1, 3, 0.1, True),
+    ("seven runs, 10 %", 7, 1, 1, 0.1, True),
     ("seven runs, 10 %, estimated", 7, 1, 1, 0.1, False),
-    ("seven runs, 2 %, stated", 7, 1, 1, 0.02, True),
-    ("two planes, seven runs, 2 %, stated", 7, 2, 3, 0.02, True),
+    ("seven runs, 2 %", 7, 1, 1, 0.02, True),
+    ("two planes, seven runs, 2 %", 7, 2, 3, 0.02, True),
 )
 """Runs, planes, sensors, scatter, and whether it is stated."""
 

@@ -10,6 +10,7 @@ DATA = Path(__file__).parents[2] / "sample_data"
 SETTINGS = """
 runs = "runs.csv"
 weights = "weights.csv"
+slow_roll = "slow.csv"
 phase = "lag"
 angles = "counter-clockwise"
 rotation = "clockwise"
@@ -19,9 +20,6 @@ angle_deg = 40
 [errors]
 amplitude_percent = 1
 phase_deg = 1
-[slow_roll."probe 1"]
-amplitude = 0.3
-phase_deg = 35
 [planes.left]
 radius_mm = 120
 holes = 12
@@ -59,6 +57,8 @@ def sheet_of(path, **options):
 def hard(folder, drop=""):
     for name in ("runs.csv", "weights.csv"):
         (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    slow = "speed_rpm,sensor,amplitude_um_pp,phase_deg\n150,probe 1,0.3,35\n"
+    (folder / "slow.csv").write_text(slow)
     (folder / "hard.toml").write_text(SETTINGS.replace(drop, "") if drop else SETTINGS)
     return folder / "hard.toml"
 

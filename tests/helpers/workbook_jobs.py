@@ -61,10 +61,6 @@ PARTS = {
         "[planes.1]\nradius_mm = 120\ntrial_radius_in = 3.3\nmax_unbalance_g_mm = 700\n"
         "[planes.2]\nradius_m = 0.1\n"
     ),
-    "slow-roll vectors": (
-        "[slow_roll.A]\namplitude = 0.35\nphase_deg = 40\n"
-        "[slow_roll.B]\namplitude_mil = 0.004\nphase_deg = -5\n"
-    ),
     "slow-roll file": 'slow_roll = "slow.csv"\n[errors]\namplitude_percent = 2\n',
     "check run": 'check = "check.csv"\n',
     "check run with nothing mounted": 'check = "check.csv"\ncheck_weights = "check_weights.csv"\n',

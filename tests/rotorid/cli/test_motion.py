@@ -63,8 +63,8 @@ def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):
         ROTOR,
         "--run-up",
         "3000:1000rpm",
-        "--acceleration",
-        "4000rpm/s",
+        "--time",
+        "0.5s",
         "--unbalance",
         unbalance,
     )

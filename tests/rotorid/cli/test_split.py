@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rotorid.commands.option_quantities import mass, vectors
-from rotorid.commands.split import SplitOptions, split
 
 
 @pytest.fixture
@@ -49,9 +48,6 @@ def test_drilling_takes_away_opposite(run, tmp_path):
     assert document["mass_kg"] == pytest.approx(area * (depth + cone / 3), rel=1e-9)
     moment = area * (depth * (0.1 - depth / 2) + cone / 3 * (0.1 - depth - cone / 4))
     assert moment == pytest.approx(0.003 * 0.1, rel=1e-9)
-    (row,) = split("3g@120", SplitOptions(drill="8mm", radius="100mm")).to_frame().to_dict("records")
-    grams, depth_mm = 1e3 * document["mass_kg"], 1e3 * depth
-    assert row == pytest.approx({"angle_deg": 300, "mass_g": grams, "radius_mm": 100, "depth_mm": depth_mm})
 
 
 def test_vectors_are_read_exactly():

@@ -63,10 +63,10 @@ def test_steps_of_arrays(job):
 
 
 @each_of("amplitude, degrees", [(2.16, -122), (10.8, 58), (7.2, -32)])
-def test_slow_roll_turns_the_steps(job, amplitude, degrees):
+def test_slow_roll_turns_the_steps(job, folder, amplitude, degrees):
     """Amplitude and phase are rounded along and across the measured reading, whatever is left of it."""
-    vector = f"[slow_roll.A]\namplitude = {amplitude}\nphase_deg = {degrees}\n"
-    plain, left = (job(lines).trials for lines in ("", vector))
+    write_csv(folder / "slow.csv", [RUNS[0], ["slow", 150, "A", amplitude, degrees]])
+    plain, left = (job(lines).trials for lines in ("", 'slow_roll = "slow.csv"\n'))
     sizes = [abs(trials.readings[0, 0, 0, 0]) for trials in (plain, left)]
     (a, p), (b, q) = (trials.steps[:, 0, 0, 0, 0] for trials in (plain, left))
     assert b**2 + (q * sizes[1]) ** 2 == pytest.approx(a**2 + (p * sizes[0]) ** 2, rel=1e-9)

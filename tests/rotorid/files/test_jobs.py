@@ -70,7 +70,7 @@ def test_arguments_replace_what_the_job_says(job, folder):
     for wrong in ([], files[:1], files * 2):
         with pytest.raises(ValueError, match="give a job"):
             job_from_files(wrong)
-    with pytest.raises(TypeError, match="not run_error_percent"):
+    with pytest.raises(TypeError, match="run_error_percent"):
         job(LINES, run_error_percent=2)
 
 

@@ -7,13 +7,6 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, complaints, replaced, the_only, write_csv
 
-VECTORS = """[slow_roll.A]
-amplitude = 2.0
-phase_deg = 35
-[slow_roll.B]
-amplitude = 1.5
-phase_deg = -80
-"""
 SLOW = [RUNS[0], ["slow", 150, "B", 1.5, -80], ["slow", 150, "A", 2.0, 35]]
 
 
@@ -36,20 +29,19 @@ def slow(job, folder):
     return read
 
 
-def test_vectors_are_subtracted_from_every_run(job):
-    plain, read = job().trials, job(VECTORS)
+def test_vectors_are_subtracted_from_every_run(job, slow):
+    plain, read = job().trials, slow()
     np.testing.assert_allclose(read.trials.readings, plain.readings - S, rtol=1e-12)
     np.testing.assert_allclose(read.slow_roll, S, rtol=1e-12)
     assert read.trials.warnings == plain.warnings == ()
-    lag = job('phase = "lag"\n' + VECTORS)
+    lag = slow(lines='phase = "lag"\n')
     np.testing.assert_allclose(lag.slow_roll, np.conj(S), rtol=1e-12)
 
 
-def test_a_slow_run_is_a_runs_table_of_one_run(job, slow, folder):
+def test_a_slow_run_is_a_runs_table_of_one_run(slow, folder):
     read = slow()
     np.testing.assert_allclose(read.slow_roll, S, rtol=1e-12)
     assert folder / "slow.csv" in read.files
-    np.testing.assert_allclose(read.trials.readings, job(VECTORS).trials.readings, rtol=1e-12)
     other = slow(replaced(SLOW, 1, "amplitude_um_pp", "amplitude_um"))
     np.testing.assert_allclose(other.slow_roll, 2 * S, rtol=1e-12)
     np.testing.assert_array_equal(slow([line[1:] for line in SLOW]).slow_roll, slow().slow_roll)
@@ -72,43 +64,20 @@ def test_vectors_at_every_speed_of_the_job(job, slow, folder):
     the_only(complaints(slow, [SLOW[0], *by_speed[:4]]), "slow.csv", None, "speed", None, words)
 
 
-def test_a_sensor_without_a_vector(job):
-    only_b = "[slow_roll.B]" + VECTORS.split("[slow_roll.B]")[1]
-    read = job(only_b)
+def test_a_sensor_without_a_vector(slow):
+    read = slow(SLOW[:2])
     np.testing.assert_allclose(read.slow_roll, [0, S[1]], rtol=1e-12)
     (words,) = read.trials.warnings
     assert words.startswith("there is no slow-roll vector for 'A'")
-    assert job("[slow_roll.A]\namplitude = 0\nphase_deg = 0\n" + only_b).trials.warnings == ()
+    assert slow([*SLOW[:2], ["slow", 150, "A", 0, 0]]).trials.warnings == ()
 
 
-def test_a_vector_larger_than_readings(job):
-    (words,) = job(VECTORS.replace("amplitude = 2.0", "amplitude = 4.5")).trials.warnings
-    assert words.startswith(
-        "the slow-roll vector of sensor 'A', 4.5 µm pp, is larger than its reading in run 'trial 2' "
-        "at 1000 rpm, 4 µm pp: check its unit"
-    )
-
-
-def test_errors_are_those_of_the_measured_amplitude(job):
+def test_errors_are_those_of_the_measured_amplitude(slow):
     """2 % of what was measured: what the vectors had in it stands in the floor of the difference."""
-    read = job("[errors]\namplitude_percent = 2\nphase_deg = 1\nfloor = 0.1\n" + VECTORS)
+    read = slow(lines="[errors]\namplitude_percent = 2\nphase_deg = 1\nfloor = 0.1\n")
     expected = np.hypot(0.05e-6, 0.02 * 1e-6)
     assert (read.trials.errors.amplitude, read.trials.errors.phase) == (0.02, np.radians(1))
     assert read.trials.errors.floor == pytest.approx(expected, rel=1e-12)
-    (words,) = read.trials.warnings
-    assert words.endswith("of the slow-roll vectors, up to 2 µm pp, they add 0.04 µm pp to the floor")
-
-
-@each_of(
-    ("old", "new", "key", "value", "words"),
-    [
-        ("[slow_roll.A]", "[slow_roll.a]", "slow_roll.a", None, "not 'a' (did you mean 'A'?); its sensors"),
-        ("= 2.0", "= 2\namplitude_um = 1", "slow_roll.A.amplitude_um", "1", "one key of them"),
-        (VECTORS, "slow_roll = 3\n", "slow_roll", "3", "a table, [slow_roll]: vectors, [slow_roll.SENSOR]"),
-    ],
-)
-def test_bad_vectors(job, old, new, key, value, words):
-    the_only(complaints(job, VECTORS.replace(old, new)), "job.toml", None, key, value, words)
 
 
 @each_of(

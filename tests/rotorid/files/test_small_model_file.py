@@ -5,7 +5,7 @@ import pytest
 
 import fem
 from fem import CubicSpring, InternalDamping, JournalBearing, MuszynskaSeal, SqueezeFilm, Stop
-from rotorid.files import InputError, TableWarning
+from rotorid.files import InputError
 from rotorid.files.small_model import read_small_model, small_model_files
 from rotorid.reduction import SmallModel
 from tests.helpers.cases import each_of
@@ -134,14 +134,3 @@ def test_bad_files_are_refused_with_file_and_key(tmp_path, old, new, message):
     with pytest.raises(InputError, match=message) as raised:
         read_small_model(path)
     assert str(path) in str(raised.value)
-
-
-def test_a_shaft_that_resists_a_shift_is_asked_about(tmp_path):
-    """Supports that stand twice, and a matrix of few digits, are motions on other supports."""
-    held = PLAIN.replace("[[1e6, -2e6", "[[1.1e7, -2e6")
-    with pytest.warns(TableWarning, match=r"key shaft_stiffness_N_per_m: .* a shift with 1e\+07 N/m"):
-        read_small_model(written(tmp_path, held))
-    few = PLAIN.replace("4e6", "3.99999e6")
-    with pytest.warns(TableWarning, match=r"with all digits: it resists a shift with -10 N/m"):
-        read_small_model(written(tmp_path, few))
-    assert read_small_model(written(tmp_path, held.split("[[bearing]]")[0])).motion().K[0, 0] == 1.1e7
