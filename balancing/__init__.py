@@ -22,11 +22,6 @@ from balancing.correction import Correction
 from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.groups import Groups, Unknowns, held, in_planes, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
-from balancing.index import (
-    machine_influence,
-    rotor_and_arbor,
-    with_arbor,
-)
 from balancing.influence import (
     Influence,
     Remarks,
@@ -37,12 +32,11 @@ from balancing.influence import (
 )
 from balancing.iso21940 import GRADES, Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
-from balancing.modes import mode_made_worse
 from balancing.mount import Mounted, mount
 from balancing.noise import Gaussian
 from balancing.pieces import Discrete, solve_discrete
 from balancing.regions import Region, real_parts, region_edge
-from balancing.relative import relative_to
+from balancing.special_runs import machine_influence, relative_to, rotor_and_arbor, with_arbor
 from balancing.trial_weight import (
     Lag,
     TrialWeight,
@@ -52,18 +46,22 @@ from balancing.trial_weight import (
 )
 from balancing.trials import TRIAL_WEIGHTS, Limits, Placement, ReadingErrors, Relative, RunScatter, Trials
 from balancing.trim import LeftToDo, after_check_run
-from balancing.unbalance import METHODS as UNBALANCE_METHODS
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
-from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction, verdict_of_readings
-from balancing.what_if import WhatIf, what_if
+from balancing.verdict import (
+    Verdict,
+    Zones,
+    verdict_of_check,
+    verdict_of_prediction,
+    verdict_of_readings,
+    zones_of,
+)
+from balancing.what_if import WhatIf, mode_made_worse, what_if
 from balancing.without_phase import AmplitudeSolution, WithoutPhase, balance_without_phase
-from balancing.zones import Zones, zones_of
 
 __all__ = [
     "GRADES",
     "METHODS",
     "TRIAL_WEIGHTS",
-    "UNBALANCE_METHODS",
     "AmplitudeSolution",
     "CheckComparison",
     "Conditioning",

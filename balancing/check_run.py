@@ -174,7 +174,6 @@ class CheckComparison(Answered):
                 "readings": records(readings),
                 "chi_square": self.chi_square,
                 "degrees_of_freedom": self.n,
-                "error_degrees_of_freedom": None,
                 "probability": self.probability,
                 "explained": self.explained,
                 "verdict": self.verdict,
@@ -184,8 +183,6 @@ class CheckComparison(Answered):
                 "rms_before": rms(sizes["before"]),
                 "rms_predicted": rms(sizes["predicted"]),
                 "rms_achieved": rms(sizes["achieved"]),
-                "improvement_predicted": _factor(self.before, self.predicted),
-                "improvement_achieved": _factor(self.before, self.achieved),
                 "warnings": self.warnings,
             }
         )
@@ -240,12 +237,6 @@ class CheckComparison(Answered):
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         table = text(shown, left=2 + (len(self.runs) > 1))
         return f"Vibration{unit}, predicted and achieved\n{table}"
-
-
-def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
-    """Ratio of root mean squares; None where nothing but rounding is left."""
-    old, new = rms(before), rms(after)
-    return None if new <= 1e-12 * old else old / new
 
 
 def compare_check(

@@ -38,7 +38,6 @@ from balancing.influence import (
     match_speeds,
 )
 from balancing.noise import Gaussian
-from rotorid.base.arrays import FloatArray
 from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm_text
 
@@ -96,13 +95,14 @@ def model_influence(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        For nodes, speeds or radii that cannot be, and as `fem.influence`.
+        For nodes and speeds that cannot be, and as `fem.influence`.
     """
     from fem import influence
 
     model = influence(rotor, list(planes.values()), list(sensors.values()), speeds)
+    levers = np.ones(len(planes)) if radii is None else np.array([radii[plane] for plane in planes])
     W = np.asarray(model.W) * np.exp(1j * np.radians(key_phasor))
-    W = W * ((1j * model.speeds) ** DERIVATIVES[quantity])[:, None, None] * _radii(planes, radii)
+    W = W * ((1j * model.speeds) ** DERIVATIVES[quantity])[:, None, None] * levers
     default = Labels(weight_unit="kg_m" if radii is None else "kg")
     coefficients = Influence(
         speeds=model.speeds,
@@ -147,18 +147,6 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
     independent[..., at, at] = np.repeat(std**2, 2, axis=-1)
     common = np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1)
     return replace(influence, errors=Gaussian(independent, common, *influence.errors[1:4]))
-
-
-def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:
-    if radii is None:
-        return np.ones(len(planes))
-    out = np.array([radii.get(name, np.nan) for name in planes])
-    if set(radii) != set(planes) or not (np.isfinite(out) & (out > 0)).all():
-        raise ValueError(
-            f"give the radius of every plane ({', '.join(planes)}) and of no other one, a finite number > 0 m"
-            f"; got {dict(radii)}"
-        )
-    return out
 
 
 def combine(measured: Influence, computed: Influence) -> Influence:

@@ -28,8 +28,6 @@ CLEAR = 5.0
 """Effect of a good trial weight in units of its errors."""
 LEVEL, SINGLE_LEVEL = 0.95, 0.99
 """Of the tests whether there is an effect: in all readings together, and in one of them."""
-ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)
-"""A good trial weight changes a reading by 30 % of its amplitude or by 30°."""
 REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 
@@ -201,13 +199,11 @@ def check_stack(
     """
     K, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
     w = np.ones(len(K)) if row_weights is None else np.asarray(row_weights, dtype=np.float64)
-    if K.ndim != 2 or 0 in K.shape:
+    if K.ndim != 2 or 0 in K.shape or y.shape != K.shape[:1]:
         raise ValueError(
-            f"the influence coefficients must have shape (readings, planes), not empty; got {K.shape}"
+            f"coefficients (readings, planes) and vibration (readings,) are needed; got {K.shape}, {y.shape}"
         )
-    if y.shape != K.shape[:1]:
-        raise ValueError(f"the vibration must have shape {K.shape[:1]}; got {y.shape}")
-    if not (np.isfinite(K).all() and np.isfinite(y).all()):
+    if not np.isfinite(K.sum() + y.sum()):
         raise ValueError("influence coefficients and vibration must be finite; found NaN or infinity")
     if w.shape != y.shape or not (w.min() >= 0 and 0 < w.max() < np.inf):
         raise ValueError(f"the row weights must be {len(K)} finite numbers ≥ 0, not all zero")

@@ -216,10 +216,6 @@ class Labels:
         """+1 where the rotor drawn from the stated end turns counter-clockwise (or nothing is stated)."""
         return -1 if self.rotation == "clockwise" else 1
 
-    def drawn(self, angle: ArrayLike) -> FloatArray:
-        """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
-        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=np.float64))
-
     def otherwise(self, names: Collection[str]) -> Labels:
         """The labels with "phase", "angles" or both turned round."""
         turned: dict[str, Any] = {

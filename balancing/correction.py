@@ -101,15 +101,6 @@ class MountDecision:
             "instead": list(self.instead),
             "rms_before": self.before * scale,
             "rms_expected": self.expected * scale,
-            "fewer_planes": [
-                {
-                    "planes": list(c.planes),
-                    "rms_after": c.rms * scale,
-                    "rms_expected": c.expected * scale,
-                    "largest_weight": float(np.abs(c.weights).max() * labels.weight_scale),
-                }
-                for c in self.choices
-            ],
             **({"worse_elsewhere": list(self.elsewhere)} if self.elsewhere else {}),
         }
 
@@ -383,16 +374,8 @@ class Correction(Prediction, Answered):
 
     def _parts_text(self, parts: Correction) -> str:
         """Weights of groups, or of the static part and the couple."""
-        size, angle = self.labels.weight(parts.weights)
-        widths = parts._widths() if parts.region_known else [[""] * len(size)] * 2
-        each = "; ".join(
-            " ".join(f"{name} {figures(mass)} {self.labels.weight_in} {more} at {degrees(at)} {turn}".split())
-            for name, mass, more, at, turn in zip(
-                parts.planes, size, widths[0], angle, widths[1], strict=True
-            )
-        )
         how = "" if self.unknowns else f" (the sum; half the difference, opposite in {self.planes[1]!r})"
-        return fill(f"In parts: {each}{how}.", WIDTH)
+        return fill(f"In parts, {self.labels.weight_in}: {parts.in_words()}{how}.", WIDTH)
 
     def _vibration_text(self) -> str:
         columns = list(self.vibration_columns(INVISIBLE))

@@ -25,7 +25,7 @@ import numpy as np
 
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
-from balancing.tables import reading_names, rms
+from balancing.tables import rms
 from balancing.what_if import worse_elsewhere
 from rotorid.base.text import capital, figures, listing
 from rotorid.regression import solution
@@ -199,7 +199,7 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         chosen = [case.today.planes.index(plane) for plane in case.names]
         today = case.today.part(range(len(case.today.speeds)), None, chosen)
         elsewhere = worse_elsewhere(today, D, result.speeds)
-        warnings = (*made.warnings, *(() if elsewhere else _rising(result, case.today, limits)))
+        warnings = (*made.warnings, *(() if elsewhere else _over_limit(result, case.today, limits)))
         return replace(made, warnings=warnings, notes=coarse(case.today), elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
@@ -337,20 +337,15 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
     )
 
 
-def _rising(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
-    """The reading that rises most above all today, or above its limit at a speed that was left out."""
+def _over_limit(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
+    """The reading that passes its limit by most at speeds that were left out."""
     planes = [today.planes.index(plane) for plane in result.planes]
-    old, new = np.abs(today.baseline), np.abs(today.baseline + today.W[..., planes] @ result.weights)
-    left_out = ~np.isin(today.speeds, result.speeds)[:, None]
-    most = np.maximum(old, np.abs(result.before).max())
-    if limits is not None:
-        most = np.where(left_out, np.minimum(most, limits.residual), most)
-    bad = new > most * _MORE
-    if not bad.any():
+    new = np.abs(today.baseline + today.W[..., planes] @ result.weights)
+    most = np.inf if limits is None else limits.residual * _MORE
+    over = np.where(np.isin(today.speeds, result.speeds)[:, None], 0.0, new - most)
+    s, c = divmod(int(np.argmax(over)), len(today.sensors))
+    if over[s, c] <= 0:
         return ()
-    s, c = divmod(int(np.argmax(np.where(bad, new - old, -np.inf))), len(today.sensors))
-    name = reading_names(today.labels, today.sensors, today.speeds)[s * len(today.sensors) + c]
-    scale, unit = today.labels.vibration_scale, today.labels.vibration_in
-    to = f"{new[s, c] * scale:.3g} {unit}".rstrip()
-    to = f"rise from {old[s, c] * scale:.3g} to {to}" if new[s, c] > old[s, c] else f"pass its limit: {to}"
-    return (f"the vibration of {name} is predicted to {to}",)
+    name, size = f"sensor {today.sensors[c]!r}", today.labels.amplitude_words(new[s, c])
+    at = today.labels.speed_words(today.speeds[s])
+    return (f"the vibration of {name} at {at} is predicted to pass its limit: {size}",)

@@ -240,14 +240,6 @@ class RunErrors:
         precision = self.probability / total
         return np.asarray(np.sqrt(precision @ self.sizes**2 / precision.sum()))
 
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the whole size."""
-        total = np.sqrt(np.sum(self.sizes**2, axis=1))
-        order = np.argsort(total)
-        low, high = np.interp((0.025, 0.975), np.cumsum(self.probability[order]), total[order])
-        return float(low), float(high)
-
 
 NO_RUN_ERRORS = RunErrors(np.zeros((1, 4)), np.ones(1), "none")
 

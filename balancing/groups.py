@@ -22,7 +22,7 @@ import numpy as np
 from numpy.linalg import norm
 
 from balancing.influence import Influence
-from balancing.trials import Arc, Limits, Trials
+from balancing.trials import Limits, Trials
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing, percent
@@ -74,20 +74,25 @@ class Unknowns(NamedTuple):
         ValueError
             For a limited plane that is in several of them.
         """
-        most, arcs = np.full(len(self.names), np.inf), [tuple[Arc, ...]()] * len(self.names)
         each = zip(self.planes, self.shares, limits.max_weight, limits.forbidden, strict=True)
         for plane, row, largest, forbidden in each:
-            inside = np.flatnonzero(row)
-            if len(inside) > 1 and (np.isfinite(largest) or forbidden):
-                several = listing((repr(self.names[u]) for u in inside), "and")
+            if np.count_nonzero(row) > 1 and (np.isfinite(largest) or forbidden):
+                several = listing((repr(self.names[u]) for u in np.flatnonzero(row)), "and")
                 raise ValueError(
                     f"plane {plane!r} is in {several}, so that its limits of weight and angles cannot be "
                     "kept: take these away, or leave one out"
                 )
-            for u in inside:
-                most[u] = min(most[u], largest / abs(row[u]))
-                arcs[u] = (*arcs[u], *((start - np.angle(row[u]), width) for start, width in forbidden))
-        return Limits(most, limits.residual, tuple(arcs))
+        inside = self.shares != 0
+        most = np.where(inside, limits.max_weight[:, None] / np.abs(np.where(inside, self.shares, 1)), np.inf)
+        arcs = [
+            tuple(
+                (start - np.angle(share), width)
+                for share, forbidden in zip(column, limits.forbidden, strict=True)
+                for start, width in (forbidden if share else ())
+            )
+            for column in self.shares.T
+        ]
+        return Limits(most.min(axis=0), limits.residual, tuple(arcs))
 
     def of_runs(self, trials: Trials, allowed: float = PIECES) -> Trials:
         """Runs with weights as those of the unknowns.

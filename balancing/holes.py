@@ -159,7 +159,9 @@ def from_list(
     named = tuple(names) or tuple(str(k + 1) for k in range(count))
     number = np.ones(len(sizes)) if stock is None else np.asarray(stock, dtype=np.float64)
     fits = 0 < count == len(named) == len(set(named)) and there.shape == phi.shape
-    same = [named[k] for k in _same_place(phi)] if fits else []
+    apart = np.abs(np.exp(1j * phi[:, None]) - np.exp(1j * phi)) + 3 * np.tri(count)
+    same = [named[k] for k in np.argwhere(apart < SAME_ANGLE)[:1].ravel()] if fits else []
+    whole = (np.array([*number, per_hole]) % 1 == 0).all()
     rules = (
         (fits, f"{count} holes: there must be some, each with a name of its own and what is mounted there"),
         (
@@ -168,25 +170,20 @@ def from_list(
         ),
         (not (np.abs(phi - np.pi) > 3 * np.pi * KEPT).any(), "angles of holes must be from −360° to 720°"),
         (not same, f"holes {' and '.join(same)} stand at the same angle: list each once"),
-        ((sizes > 0).all(), "pieces must weigh more than 0"),
         (
-            (there >= 0).all() and step >= 0 and max_weight >= 0,
-            "what is mounted, the smallest step and the largest weight must not be negative",
+            min((*there, step, max_weight, *number)) >= 0 and (sizes > 0).all() and per_hole >= 1 and whole,
+            "pieces must weigh more than 0, their numbers be whole, one or more in a hole; what is mounted, "
+            "the smallest step and the largest weight must not be negative",
         ),
         (
-            len(set(sizes)) == len(sizes),
-            "a piece is listed twice: list each size once and give how many there are as stock",
+            len(set(sizes)) == len(sizes) and number.shape == sizes.shape,
+            f"a piece is listed twice, or the stock is not one number for each of the {len(sizes)} pieces",
         ),
-        (per_hole >= 1 and per_hole % 1 == 0, "the number of pieces in one hole must be a whole number ≥ 1"),
         (not (len(sizes) and step), "give either pieces or a smallest step of free amounts, not both"),
         (
-            number.shape == sizes.shape and (number >= 0).all() and not (number % 1).any(),
-            f"the stock must be whole numbers ≥ 0, one for each of the {len(sizes)} pieces",
-        ),
-        (not (there > 0).all(), "nothing can be mounted: something is mounted in every hole already"),
-        (
-            max_weight > 0 and (number.any() or not len(sizes)),
-            "nothing can be mounted: the stock is empty, or the largest weight of the plane is 0",
+            max_weight > 0 and not (there > 0).all() and (number.any() or not len(sizes)),
+            "nothing can be mounted: something is mounted in every hole already, the stock is empty, or the "
+            "largest weight of the plane is 0",
         ),
     )
     for right, words in rules:
@@ -194,13 +191,6 @@ def from_list(
             raise ValueError(words)
     left = None if stock is None else number.astype(np.int64)
     return Holes(phi, sizes, int(per_hole), float(step), there, left, named, float(max_weight))
-
-
-def _same_place(angles: FloatArray) -> list[int]:
-    """The first two holes that stand at the same angle."""
-    apart = np.abs(np.mod(angles[:, None] - angles + np.pi, 2 * np.pi) - np.pi)
-    at, other = np.nonzero(np.triu(apart < SAME_ANGLE, 1))
-    return [int(at[0]), int(other[0])] if len(at) else []
 
 
 def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike | None = None) -> Mounting:

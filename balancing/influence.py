@@ -139,32 +139,30 @@ class Influence:
         """Unit of a coefficient, such as "um_pp/g"."""
         return f"{self.labels.vibration_unit or '1'}/{self.labels.weight_unit or '1'}"
 
-    def draws(self, count: int = 400, seed: int = 0) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+    def draws(self, count: int = 400) -> Iterator[tuple[ComplexArray, ComplexArray]]:
         """The coefficients drawn again, block by block; nothing where errors are not known.
 
         Parameters
         ----------
         count
-            Number of draws.
-        seed
-            The same draws for the same seed.
+            Number of draws, the same ones whenever asked for.
 
         Yields
         ------
         Y₀ (B, S, C) and W (B, S, C, P).
         """
         if self.known_errors:
-            for error in drawn(self.errors.noise, self.errors.draw(count, seed), seed):
+            for error in drawn(self.errors.noise, self.errors.draw(count, 0), 0):
                 yield self.baseline + error[..., 0], self.W + error[..., 1:]
 
-    def noise_draws(self, noise: Noise, count: int = 400, seed: int = 0) -> Iterator[ComplexArray]:
-        """Errors (B, S, C, n) of a noise with the sizes of `draws` of the same seed, block by block."""
-        return drawn(noise, self.errors.draw(count, seed), seed + 1)
+    def noise_draws(self, noise: Noise, count: int = 400) -> Iterator[ComplexArray]:
+        """Errors (B, S, C, n) of a noise with the sizes of `draws`, block by block."""
+        return drawn(noise, self.errors.draw(count, 0), 1)
 
     def further(
-        self, readings: ComplexArray, weights: ComplexArray, count: int = 400, seed: int = 0
+        self, readings: ComplexArray, weights: ComplexArray, count: int = 400
     ) -> Iterator[ComplexArray]:
-        """Errors of one more run, drawn with sizes as in `draws` of the same seed.
+        """Errors of one more run, drawn with sizes as in `draws`.
 
         Parameters
         ----------
@@ -180,7 +178,7 @@ class Influence:
         placement = Placement() if self.trials is None else self.trials.placement
         names = ("run",), self.speeds, self.sensors, self.planes
         run = Trials(*names, readings[None], weights[None], placement=placement)
-        return (error[..., 0] for error in self.noise_draws(self._of_runs(run, np.eye(1)), count, seed))
+        return (error[..., 0] for error in self.noise_draws(self._of_runs(run, np.eye(1)), count))
 
     def difference_noise(self, check: Trials) -> Noise:
         """How readings of runs err against Y₀ + W T: `blocks` (2, S, C, 2R, 2R), `columns` (M, S, C, R).

@@ -221,17 +221,12 @@ def tolerance(
     positions = given[np.isfinite(given)]
     placed, two = len(positions) == len(named) > 0, len(positions) == 2
     ends = np.array(positions if bearings is None and two else bearings or (), dtype=np.float64)
-    stated = [z for z in (*named.values(), *(bearings or ()), centre) if z is not None]
     for right, words in (
         (0 < mass < math.inf, f"the mass of the rotor must be a finite number above 0, not {mass:g}"),
         (0 < speed < math.inf, f"the service speed must be a finite number above 0, not {speed:g}"),
         (
             len(named) < 3,
             f"the tolerance of a rigid rotor is shared by one or two planes, not {len(named)}: choose two",
-        ),
-        (
-            np.isfinite(stated).all(),
-            "positions of planes, bearings and centre of mass must be finite numbers",
         ),
         (placed or not len(positions), "give the position of both planes, or of none"),
         (len(set(bearings or "ab")) == 2, "both bearings are at the same place: give two positions"),
@@ -244,12 +239,12 @@ def tolerance(
             "with the positions of the bearings, give those of the planes, too",
         ),
         (
-            centre is not None or not len(ends),
-            "the share of each plane needs the position of the centre of mass: give that, too",
-        ),
-        (
             centre is None or len(ends),
             "the position of the centre of mass says nothing without those of bearings or two planes",
+        ),
+        (
+            centre is not None or not len(ends),
+            "the share of each plane needs the position of the centre of mass: give that, too",
         ),
     ):
         if not right:

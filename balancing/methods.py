@@ -347,17 +347,7 @@ class _Errors(NamedTuple):
         return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
-        """Weights at which Q is smallest, sought from some start: by Gauss and Newton, or with a library."""
-        D, Q = start, np.inf
-        for _ in range(50):
-            state = self.at(D)
-            step = solution(state.rows, state.r)
-            Q, before = float(state.r @ state.r), Q
-            if before * (1 + 1e-12) < Q:
-                break
-            if np.sum((state.rows @ step) ** 2) <= 1e-16 * (1 + Q):
-                return D
-            D = D - unstretch(step)
+        """Weights at which Q is smallest, sought from some start."""
         from scipy.optimize import least_squares
 
         @lru_cache(1)

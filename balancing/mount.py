@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from balancing.correction import Correction
 from balancing.decision import HARDLY_BELOW
 from balancing.groups import PIECES
-from balancing.holes import Holes, equal_together
+from balancing.holes import Holes, content, equal_together
 from balancing.influence import Influence, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
 from balancing.regions import LEVEL
@@ -42,7 +42,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records, text
-from rotorid.base.text import capital, figures, listing
+from rotorid.base.text import capital, figures
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,7 +101,6 @@ class Mounted(Answered):
                 "holes": records(_columns(self)),
                 "residuals": records(residuals),
                 **self._left(self.discrete, self.after),
-                "fewer": [self._left(one, one.residual) for one in self.discrete.fewer],
             }
         )
 
@@ -154,18 +153,15 @@ class Mounted(Answered):
 
     def _first_holes(self) -> str:
         """Where numbers of holes begin and which way they rise, plane by plane where they differ."""
-        c, planes = self.correction, dict[str, list[str]]()
+        c, words = self.correction, dict[str, str]()
         for plane, holes in zip(c.planes, self.holes, strict=True):
             if holes is not None:
                 at = c.places([plane] * len(holes.names), np.exp(1j * holes.angles)).tolist()[:2]
-                words = (f"{name} at {angle:.4g}°" for name, angle in zip(holes.names, at, strict=False))
-                planes.setdefault(", ".join(words), []).append(plane)
-        several = len(planes) > 1
-        each = (
-            f"holes{several * ' of '}{several * listing(names, 'and')} {words}"
-            for words, names in planes.items()
-        )
-        return "; ".join(each)
+                each = (f"{name} at {angle:.4g}°" for name, angle in zip(holes.names, at, strict=False))
+                words[plane] = ", ".join(each)
+        if len({*words.values()}) == 1:
+            return f"holes {min(words.values())}"
+        return "; ".join(f"holes of {plane} {each}" for plane, each in words.items())
 
     def in_holes(self) -> str:
         """What is in which hole of each plane, in a line."""
@@ -309,11 +305,10 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         if holes is None or mounting is None:
             places.append((plane, _ANY, weight, ""))
             continue
-        vectors, scale = mounting.amounts * np.exp(1j * holes.angles), labels.weight_scale
-        for h in np.flatnonzero(mounting.amounts > 0):
-            pieces = zip(mounting.counts[h], holes.pieces * scale, strict=True)
-            words = [f"{n} × {figures(piece)}" if n > 1 else figures(piece) for n, piece in pieces if n]
-            places.append((plane, holes.names[h], vectors[h], " + ".join(words)))
+        vectors = mounting.amounts * np.exp(1j * holes.angles)
+        for h in np.flatnonzero(mounting.amounts > 0).tolist():
+            words = "" if holes.free_amounts else content(holes, mounting, h, labels.weight_scale)
+            places.append((plane, holes.names[h], vectors[h], words))
     planes = [place[0] for place in places]
     size, angle = labels.weight([place[2] for place in places])
     gone = np.array([plane in c.remove for plane in planes])

@@ -26,20 +26,10 @@ import numpy as np
 
 from balancing.conventions import Labels
 from balancing.holes import Holes, Mounting, content, equal_together
-from balancing.pieces import FEW, HEAVIER, NOTHING, SPARE, PlaneVectors
+from balancing.pieces import solve_discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
 
-__all__ = [
-    "Removal",
-    "Split",
-    "TwoPlanes",
-    "TwoPositions",
-    "combine",
-    "drill",
-    "split",
-    "two_positions",
-]
 STEEL = 7850.0
 """kg/m³."""
 _TIP = float(np.tan(np.radians(59.0)))
@@ -92,7 +82,8 @@ class Split:
             contents.append((f"{what} {labels.weight_in}", f"{self.holes.names[h]} ({angle:.6g}°)"))
         return equal_together(contents)
 
-    def _entries(self, labels: Labels) -> dict[str, Any]:
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types."""
         rows = []
         for h in np.flatnonzero(self.mounting.amounts):
             weight = labels.weight_entry(self.mounting.amounts[h] * np.exp(1j * self.holes.angles[h]))
@@ -103,12 +94,8 @@ class Split:
             "holes": rows,
             "mounted": labels.weight_entry(self.mounting.vector),
             "number_of_pieces": self.pieces,
+            "words": self.in_holes(labels),
         }
-
-    def to_dict(self, labels: Labels) -> dict[str, Any]:
-        """As JSON types."""
-        fewer = [one._entries(labels) for one in self.fewer]
-        return {**self._entries(labels), "words": self.in_holes(labels), "fewer_pieces": fewer}
 
     def sentence(self, labels: Labels) -> str:
         """What to mount, what it makes, and what is missing."""
@@ -130,9 +117,7 @@ class Split:
         return [*(f"  {line}" for line in self.in_holes(labels)), *more]
 
 
-def split(
-    target: complex, holes: Holes, *, most_pieces: int | None = None, good_enough: float = 0.0
-) -> Split:
+def split(target: complex, holes: Holes, *, good_enough: float = 0.0) -> Split:
     """Mount what makes the vector nearest to a target, or the fewest pieces that come near enough.
 
     Parameters
@@ -141,49 +126,37 @@ def split(
         Wanted in addition to what is taken, kg or kg·m.
     holes
         What can be mounted.
-    most_pieces
-        At most so many pieces altogether; None: as many as help. Has no meaning for free amounts.
     good_enough
-        Relative error that needs no more pieces, nor does 1.2 times the least error: the nearest of the
-        fewest pieces that keep to it, of at most 1.5 times the least weight that makes the target, or two
-        pieces; 0: the nearest of all. Has no meaning for free amounts.
+        Relative error that needs no more pieces (else 1.2 times the least error), of at most 1.5 times the
+        least weight that makes the target, or two pieces; 0: the nearest, of at most four pieces more than
+        the least number that weighs enough. Has no meaning for free amounts.
 
     Raises
     ------
     ValueError
-        For a target that is not finite, a number of pieces below 1, a negative error, or where nothing
-        admissible exists, not even mounting nothing.
+        For a target that is not finite, and where nothing admissible exists, not even mounting nothing.
 
     Examples
     --------
     >>> from balancing.holes import equal_holes, from_list
-    >>> found = split(0.035j, from_list(equal_holes(12), [0.01, 0.02]), most_pieces=2)
+    >>> found = split(0.035j, from_list(equal_holes(12), [0.01, 0.02]), good_enough=0.2)
     >>> found.in_holes(Labels(weight_unit="g", weight_scale=1e3))
     ['20 g in holes 3 (60°), 5 (120°)']
     """
-    if not (np.isfinite(target) and good_enough >= 0 and (most_pieces is None or most_pieces >= 1)):
-        raise ValueError(
-            "the weight to be split must be finite, the number of pieces 1 or more, the error not negative"
-        )
-    target, few = complex(target), good_enough > 0 and not holes.free_amounts
-    heavier, most = HEAVIER if few else np.inf, np.inf if most_pieces is None else most_pieces
-    plane = PlaneVectors(holes, target, heavier=heavier, most=most)
-    if plane.any_weight:
-        return Split(target, holes, plane.place(target))
-    nearest = plane.near(target, 1)
-    if not len(nearest.d):
-        raise ValueError(NOTHING)
-    best = Split(target, holes, plane.mount(nearest.put[0]))
-    enough = max(FEW * abs(best.error), good_enough * abs(target)) if few else 0.0
-    fewer: list[Split] = []
-    for n in range(0 if holes.free_amounts else best.pieces):
-        for put in plane.near(target, 1, n).put:
-            one = Split(target, holes, plane.mount(put))
-            if abs(one.error) <= enough:
-                return replace(one, fewer=tuple(fewer))
-            if 0 < n <= SPARE and all(abs(one.error) < abs(other.error) for other in fewer):
-                fewer.append(one)
-    return replace(best, fewer=tuple(fewer))
+    target = complex(target)
+
+    def enough(made: ComplexArray) -> bool:
+        return bool(abs(made[0] - target) <= good_enough * abs(target))
+
+    asked = enough if good_enough and not holes.free_amounts else None
+    found = solve_discrete([[1.0]], [-target], [holes], asked, wanted=[target])
+    placed, *fewer = (
+        Split(target, holes, mounted)
+        for one in (found, *found.fewer)
+        for mounted in one.mountings
+        if mounted is not None
+    )
+    return replace(placed, fewer=tuple(one for one in fewer if one.pieces))
 
 
 @dataclass(frozen=True, eq=False)

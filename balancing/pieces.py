@@ -85,9 +85,8 @@ class PlaneVectors:
     max_weight
         Largest |mounted + d|, beside that of the holes.
     heavier
-        More than two pieces weigh at most so many times the least sum that makes what is wanted.
-    most
-        Pieces altogether, at most; None: four more than that sum needs.
+        More than two pieces weigh at most so many times the least sum that makes what is wanted; there are at
+        most four more than that sum needs.
 
     Raises
     ------
@@ -102,7 +101,6 @@ class PlaneVectors:
         arcs: Sequence[tuple[float, float]] = (),
         max_weight: float = np.inf,
         heavier: float = np.inf,
-        most: float | None = None,
     ) -> None:
         self.holes, self.wanted, self.max_weight = holes, wanted, min(holes.max_weight, max_weight)
         self.usable, self.heaviest = holes.outside(arcs), np.inf
@@ -122,7 +120,7 @@ class PlaneVectors:
             self.most = int(
                 min(
                     holes.per_hole * len(where),
-                    np.ceil(least / largest - SAME) + SPARE if most is None else most,
+                    np.ceil(least / largest - SAME) + SPARE,
                     np.inf if np.isinf(heavier) else max(2.0, self.heaviest // self.sizes.min()),
                     np.inf if holes.stock is None else float(holes.stock.sum()),
                 )

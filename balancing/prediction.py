@@ -89,6 +89,15 @@ class Outlook:
         turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
         return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
 
+    def work_words(self, planes: Sequence[str], weights: ComplexArray) -> list[str]:
+        """What to add to each plane, or to take away from it, where it is something."""
+        each = zip(planes, weights, self.places(planes, weights), strict=True)
+        return [
+            f"{plane} {'less ' * (plane in self.remove)}{self.labels.weight_words(abs(w))} at {degrees(at)}"
+            for plane, w, at in each
+            if w
+        ]
+
     @property
     def within(self) -> FloatArray:
         """Radius (S, C) of the 95 % region of each reading in a check run, in the job's unit."""
@@ -96,23 +105,19 @@ class Outlook:
             return np.full(self.before.shape, np.nan)
         return reach(self.after_covariance) * self.labels.vibration_scale
 
-    def vibration_columns(
-        self, rounding: float = INVISIBLE, after: ComplexArray | None = None
-    ) -> tuple[Column, ...]:
+    def vibration_columns(self, rounding: float = INVISIBLE) -> tuple[Column, ...]:
         """Speed, sensor, vibration before and after, one row a reading.
 
         Parameters
         ----------
         rounding
             Amplitudes after, up to this share of the largest one before, are nothing.
-        after
-            In place of the prediction, (S, C).
         """
         nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
         return (
             *reading_columns(self.labels, self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),
-            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
+            *vector_columns(self.labels, "after", self.after, nothing),
         )
 
     def work_rows(self, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:

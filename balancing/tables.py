@@ -136,11 +136,9 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
         parts[labels.amplitude_words(e.floor)] = e.floor
     stated = ", ".join(words for words, size in parts.items() if size) or "not known"
     out = f"One standard deviation of a reading: {stated} ({reading.source})"
-    what = ("of each sensor alone", "common to the run", "of what the weights do", "as further unbalance")
-    sizes = zip(run.typical, what, strict=True)
-    between = ", ".join(f"{100 * size:.2g} % {of}" for size, of in sizes if size > 5e-4)
+    whole = float(np.linalg.norm(run.typical))
+    between = f"{100 * whole:.2g} %" if whole > 5e-4 else ""
     if run.origin == "stated":  # as it was, whatever share of it is common
-        whole = float(np.linalg.norm(run.typical))
         relative, floor = whole * np.sqrt(1 - run.evenly), whole * np.sqrt(run.evenly) * run.level
         each = (f"{100 * relative:.2g} %", relative), (labels.amplitude_words(floor), floor)
         between = ", ".join(words for words, size in each if size)
@@ -151,8 +149,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
     """Errors of a reading and between runs in numbers; amplitudes in the job's unit."""
     e, scale = reading.errors, labels.vibration_scale
-    alone, common, effect, further = run.typical
-    whole, level = float(np.linalg.norm(run.typical)), run.level * scale
+    whole = float(np.linalg.norm(run.typical))
     return {
         "source": reading.source,
         "amplitude_percent": None if e is None else 100 * e.amplitude,
@@ -161,11 +158,7 @@ def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str
         "degrees_of_freedom": reading.dof,
         "between_runs": {
             "source": run.origin,
-            "percent": 100 * float(np.hypot(alone, common)),
-            "percent_of_effect": 100 * effect,
-            "floor": further * level,
-            "rms": whole * level,
-            "common_share": 1 - (alone / whole) ** 2 if whole else 0.0,
-            "interval95": [end * level for end in run.interval] if run.origin == "estimated" else None,
+            "percent": 100 * whole,
+            "rms": whole * run.level * scale,
         },
     }

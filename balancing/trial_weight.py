@@ -20,7 +20,7 @@ The vibration lags the unbalance that causes it by ψ (0 far below the critical 
 
     angle = φ + α − κ + ψ + 180°.
 
-For one mode ψ = atan2(2 ζ η, 1 − η²), η = speed / critical speed. A velocity leads its displacement by 90°,
+A velocity leads its displacement by 90°,
 an acceleration by 180°: these are taken off φ first.
 """
 
@@ -32,13 +32,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.conditioning import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.conventions import Labels
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, frame, records, text
+from rotorid.base.tables import Column, frame, records
 from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm
 
@@ -166,19 +165,14 @@ class TrialWeight(Answered):
         if self.force is not None:
             lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N"
             lines[0] += "" if share is None else f", {share:.3g} % of the load"
-        table: tuple[str, ...] = ()
         if self.influence is not None and self.expected is not None:
             where = self.influence.speeds, self.influence.sensors
             largest = largest_readings(labels, *where, self.influence.baseline, self.expected)
             lines.append(f"  largest with it{largest}")
-            head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
-            table = (f"{head}\n{text(self._columns(), left=2)}",)
         return Answer(
             f"Trial weight in plane {self.plane}: {size:.4g} {labels.weight_in}{at}, {angle}.",
             "\n".join(lines),
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
-            tables=table,
-            more="every reading",
             to_mount=True,
         )
 
@@ -207,12 +201,9 @@ def trial_from_force(  # noqa: PLR0913
     load: float,
     *,
     fraction: float = 0.1,
-    limit: float = math.inf,
     phase: float | None = None,
     lag: Lag | None = None,
     sensor_angle: float = 0.0,
-    key_phasor: float = 0.0,
-    quantity: Quantity = "displacement",
     labels: Labels | None = None,
 ) -> TrialWeight:
     """First trial weight without any coefficients: its force is a fraction of the load, m r ω² = f · load.
@@ -225,19 +216,17 @@ def trial_from_force(  # noqa: PLR0913
         rad/s, m, and N, that the plane carries: its share of the rotor's weight, or that of its bearing.
     fraction
         f.
-    limit
-        Largest weight of the plane, kg.
     phase, lag
         Of the initial reading, rad, positive = lead, and its expected lag; without both no angle is proposed.
-    sensor_angle, key_phasor, quantity
-        As of `opposing_angle`.
+    sensor_angle
+        Of the sensor from the key phasor, rad with the rotation.
     labels
         Units and conventions to print in.
 
     Raises
     ------
     ValueError
-        For impossible numbers, and a weight larger than the plane's limit.
+        For impossible numbers, and an angle without phase or lag.
 
     Examples
     --------
@@ -249,9 +238,6 @@ def trial_from_force(  # noqa: PLR0913
     for what, value in given.items():
         positive(what, value)
     amount = fraction * load / (radius * speed**2)
-    made = labels or Labels()
-    most = 100 * fraction * limit / amount
-    _check_limit(plane, amount, limit, made, f"take at most {most:.3g} % of the load")
     words = f"{100 * fraction:.3g} % of the load of {load:.4g} N"
     angle = reach = None
     if (phase is None) != (lag is None):
@@ -259,14 +245,12 @@ def trial_from_force(  # noqa: PLR0913
             "an angle needs both the phase of the initial reading and the lag: give the other one, too"
         )
     if phase is not None and lag is not None:
-        angle = opposing_angle(
-            phase, lag.expected, sensor_angle=sensor_angle, key_phasor=key_phasor, quantity=quantity
-        )
+        angle = opposing_angle(phase, lag.expected, sensor_angle=sensor_angle)
         reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
     warnings = _force_warning(fraction)
     return TrialWeight(
-        plane, amount, angle, reach, words, radius, speed, load, labels=made, warnings=warnings
+        plane, amount, angle, reach, words, radius, speed, load, labels=labels or Labels(), warnings=warnings
     )
 
 
@@ -275,7 +259,6 @@ def trial_from_coefficients(
     plane: str,
     *,
     share: float = 0.4,
-    amount: float | None = None,
     limit: float = math.inf,
     radius: float | None = None,
     trial_radius: float | None = None,
@@ -292,23 +275,20 @@ def trial_from_coefficients(
     share
         Of the largest reading, by which the weight changes the reading on which it acts most: the largest one
         itself, or another, which would change by more than that if the largest one decided.
-    amount
-        Weight to use in place of that, kg or kg·m.
     limit
-        Largest weight of the plane: a larger `amount` is refused; what follows from `share` is cut, with a
-        warning.
+        Largest weight of the plane: what follows from `share` is cut, with a warning.
     radius
         m, of the coefficients' masses; None: unknown, or weights are unbalances.
     trial_radius
-        m, where the trial weight will be mounted: `amount` and the result are masses there. None: `radius`.
+        m, where the trial weight will be mounted: the result is a mass there. None: `radius`.
     load
         N, that the plane carries, to compare the force with.
 
     Raises
     ------
     ValueError
-        For a plane that is not known or acts on no reading, readings that are lacking or zero, and an amount
-        larger than the limit.
+        For a plane that is not known or acts on no reading, and readings that are lacking or
+        zero.
     """
     if plane not in influence.planes:
         raise ValueError(
@@ -327,31 +307,19 @@ def trial_from_coefficients(
     if not w.any():
         raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
     warnings: list[str] = []
-    basis = "amount as stated"
-    if amount is None:
-        positive("share of the largest reading", share)
-        s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
-        amount = share * size / float(abs(w[s, c])) * scale
-        reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
-        basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
-        if amount > limit * scale:
-            amount, basis = limit * scale, "the largest weight of the plane"
-            warnings.append(
-                f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
-                f"weight of plane {plane!r}: that is proposed"
-            )
-    _check_limit(plane, amount, limit * scale, labels, "choose a smaller one")
-    positive("trial weight", amount)
+    positive("share of the largest reading", share)
+    s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
+    amount = share * size / float(abs(w[s, c])) * scale
+    reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
+    basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
+    if amount > limit * scale:
+        amount, basis = limit * scale, "the largest weight of the plane"
+        warnings.append(
+            f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
+            f"weight of plane {plane!r}: that is proposed"
+        )
     angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
     expected = Y + w * (amount / scale * np.exp(1j * angle))
-    seen = np.abs(Y) > 1e-9 * size
-    ratio = expected[seen] / Y[seen]
-    change, turn = float(np.abs(np.abs(ratio) - 1).max()), float(np.abs(np.angle(ratio)).max())
-    if change < ENGINEERS_AMPLITUDE and turn < ENGINEERS_PHASE:
-        warnings.append(
-            f"the trial weight in plane {plane!r} changes no reading by 30 % or 30° (at most "
-            f"{100 * change:.2g} % and {math.degrees(turn):.2g}°): a larger one would be more certain"
-        )
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
@@ -381,24 +349,12 @@ def _force_warning(fraction: float) -> tuple[str, ...]:
     return (high,) if fraction > RISKY else ()
 
 
-def _check_limit(plane: str, amount: float, limit: float, labels: Labels, remedy: str) -> None:
-    if not limit > 0:
-        raise ValueError(f"the largest weight of the plane must be above 0, not {limit:g}")
-    if amount > limit * (1 + 1e-12):
-        raise ValueError(
-            f"the trial weight of {labels.weight_words(amount)} is larger than the largest weight of plane "
-            f"{plane!r}, {labels.weight_words(limit)}: {remedy}"
-        )
-
-
 def expected_lag(
     where: str | None = None,
     *,
     degrees: float | None = None,
-    ratio: float | None = None,
-    damping: float = 0.05,
 ) -> Lag:
-    """How far the vibration lags, from the first of these that is given.
+    """How far the vibration lags, from either of these.
 
     Parameters
     ----------
@@ -406,31 +362,20 @@ def expected_lag(
         "below", "at" or "above" the critical speed.
     degrees
         The lag.
-    ratio, damping
-        Speed / critical speed, of one mode with this damping ratio.
 
     Raises
     ------
     ValueError
-        If none is given, and for impossible numbers.
+        If neither is given, and for what is no lag.
     """
     if where is not None:
         if where not in _LAGS:
             raise ValueError(f"the speed is below, at or above the critical speed, not {where!r}")
         lag, reach = map(math.radians, _LAGS[where])
         return Lag(lag, reach, f"{where} the critical speed")
-    if degrees is not None:
-        if not 0 <= degrees <= 360:
-            raise ValueError(f"a lag is from 0 to 360 degrees, not {degrees:g}")
-        return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
-    if ratio is None:
-        raise ValueError("give one of: below, at or above the critical speed; a lag; the critical speed")
-    positive("ratio of the speed to the critical speed", ratio)
-    positive("damping ratio", damping)
-    lag = math.atan2(2 * damping * ratio, 1 - ratio**2)
-    middle = (0.25 if ratio < 1 else 0.75) * math.pi
-    words = f"one mode at {ratio:.3g} times the critical speed, damping {damping:g}"
-    return Lag(lag, abs(lag - middle) + math.pi / 4, words)
+    if degrees is None or not 0 <= degrees <= 360:
+        raise ValueError("give below, at or above the critical speed, or a lag from 0 to 360 degrees")
+    return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
 
 
 def opposing_angle(

@@ -76,7 +76,7 @@ class Placement(NamedTuple):
 
 _EXACT = Placement()
 TURNED = "the rotor on its arbor"
-"""The plane that stands for a rotor turned on its arbor (`balancing.index`): no weight is misplaced there."""
+"""The plane that stands for a rotor turned on its arbor (`special_runs`): no weight is misplaced there."""
 
 TRIAL_WEIGHTS = "times the trial weight"
 """The unit of weights that are relative."""
@@ -230,7 +230,7 @@ class Trials:
 
     @property
     def turned(self) -> Trials:
-        """The runs with one plane more, the first, that stands for the index: see `balancing.index`."""
+        """The runs with one plane more, the first, that stands for the index: see `special_runs`."""
         if self.index is None:
             return self
         turn = np.exp(1j * self.index)
@@ -286,11 +286,10 @@ class Limits:
             keep(self, **{name: array})
         arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
         start, width = arcs.T
-        if len(self.forbidden) != len(self.max_weight):
-            raise ValueError("there must be arcs, or none, for every plane")
-        if not (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all():
+        kept = (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all()
+        if not kept or len(self.forbidden) != len(self.max_weight):
             raise ValueError(
-                f"there are arcs from no angle, or wider than 2π or than none: {arcs.tolist()} rad"
+                f"every plane needs arcs of 0 to 2π from a finite angle, or none; got {arcs.tolist()}"
             )
 
     @classmethod

@@ -171,7 +171,7 @@ def after_check_run(
     elif settled and _within_its_error(c):
         word = "done"
         why = f"a trim would be within its own error ({change})"
-        why += f", and may be worth it: {_in_words(c, planes, trim)}" if worth else ""
+        why += f", and may be worth it: {', '.join(c.work_words(planes, trim))}" if worth else ""
     elif settled and not worth:
         word = "done"
     elif blocked or (worth and c.decision.word == "do not mount" and pieces is None):
@@ -191,16 +191,6 @@ def after_check_run(
         made.after[pick],
         c.within[pick],
         pieces if word == "trim" else None,
-    )
-
-
-def _in_words(c: Correction, planes: tuple[str, ...], trim: ComplexArray) -> str:
-    """What would be added to each plane, or taken away from it."""
-    each = zip(planes, trim, c.places(planes, trim), strict=True)
-    return ", ".join(
-        f"{plane} {'less ' * (plane in c.remove)}{c.labels.weight_words(abs(w))} at {at:.0f}°"
-        for plane, w, at in each
-        if w
     )
 
 

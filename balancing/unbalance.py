@@ -2,12 +2,8 @@
 
 Source: [S] 1.9.1, (28)–(33), extended to more stations than readings. With the singular values
 W = Σ u_i s_i v_iᴴ (rows divided by the errors of the readings where these are known) the estimate is
-U = Σ f_i v_i (u_iᴴ Y) / s_i:
-
-- f_i = 1 for s_i > 0: least squares where the readings determine every station, else the smallest unbalance
-  (|U| least) that causes these readings;
-- f_i = s_i² / (s_i² + λ²) ("ridge"): least |Y − W U|² + λ² |U|². λ is given, or such that the readings are
-  met as well as their errors allow (discrepancy principle: Σ |r_i|²/σ_i² = 2 N).
+U = Σ v_i (u_iᴴ Y) / s_i over s_i > 0: least squares where the readings determine every station, else the
+smallest unbalance (|U| least) that causes these readings.
 
 U = G Y is linear in the readings: an error e of Y moves it by G e, and U = R U_true without errors, with the
 resolution matrix R = G W. Row q of R tells of which stations' unbalance the estimate of station q is made:
@@ -31,7 +27,6 @@ from balancing.tables import weight_columns
 from balancing.trials import Trials, check_names
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.choices import Method, find
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import capital, figures, listing
@@ -40,18 +35,8 @@ from rotorid.regression import RCOND
 if TYPE_CHECKING:
     import pandas as pd
 
-METHODS: tuple[Method[None], ...] = (
-    Method(
-        "minimum-norm",
-        "least squares where the readings suffice, else the smallest unbalance that explains them",
-        None,
-    ),
-    Method("ridge", "small unbalances where the readings tell little", None),
-)
 DETERMINED = 0.05
 """Largest distance of a station's row of the resolution matrix from that of the unit matrix."""
-_STRENGTHS = np.geomspace(1e-10, 1e6, 4000)
-"""Of a ridge, relative to the largest singular value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +52,7 @@ class Unbalance(Answered):
     residual
         Y − W U, shape (N,).
     method
-        "least-squares", "minimum-norm" or "ridge".
+        "least-squares" or "minimum-norm".
     rank
         Number of independent combinations of the stations that are determined.
     resolution
@@ -79,8 +64,6 @@ class Unbalance(Answered):
         Σ |residual|²/σ² with σ of a reading in one direction; None where errors are unknown.
     condition_number
         Largest by smallest singular value of what is determined.
-    ridge
-        λ relative to the largest singular value; None without.
     labels
         Units and conventions to print in.
     warnings
@@ -96,7 +79,6 @@ class Unbalance(Answered):
     covariance: FloatArray
     chi_square: float | None
     condition_number: float
-    ridge: float | None
     labels: Labels
     warnings: tuple[str, ...] = ()
 
@@ -142,7 +124,6 @@ class Unbalance(Answered):
                 "method": self.method,
                 "rank": self.rank,
                 "condition_number": self.condition_number,
-                "ridge": self.ridge,
                 "chi_square": self.chi_square,
                 "words": self.words(),
                 "conventions": self.labels.conventions(),
@@ -186,10 +167,8 @@ def estimate_unbalance(
     W: ArrayLike,
     Y: ArrayLike,
     *,
-    method: str = "minimum-norm",
     names: Sequence[str] | None = None,
     errors: ArrayLike | None = None,
-    ridge: float | None = None,
     labels: Labels | None = None,
 ) -> Unbalance:
     """Estimate the unbalance at Q stations from N readings (sensors × speeds) of one run.
@@ -200,22 +179,18 @@ def estimate_unbalance(
         Influence coefficients, shape (N, Q), such as `model_influence(…).W.reshape(-1, Q)`.
     Y
         Complex readings, shape (N,).
-    method
-        One of `METHODS`.
     names
         Of the stations; default 1 … Q.
     errors
         Drawn errors of the readings, complex, shape (draws, N); rows then count by their variance. Default:
         unknown.
-    ridge
-        λ relative to the largest singular value, for "ridge"; default: by the errors.
     labels
         Units and conventions to print in; default SI.
 
     Raises
     ------
     ValueError
-        For shapes that do not fit, NaN, options of another method, and a ridge without λ or errors.
+        For shapes that do not fit, and NaN.
     UndeterminedError
         Where no station has an effect.
     """
@@ -225,15 +200,8 @@ def estimate_unbalance(
     N, Q = A.shape
     drawn = np.zeros((0, N)) if errors is None else np.asarray(errors, dtype=complex)
     stations = check_names(names or [str(q) for q in range(1, Q + 1)], "stations")
-    find(METHODS, method, "method")
     if not np.isfinite(A.sum() + y.sum() + drawn.sum()) or drawn.shape[1:] != (N,) or len(stations) != Q:
         raise ValueError(f"readings and {N} errors of each draw must be finite, with {Q} names of stations")
-    if (ridge is not None and not (method == "ridge" and 0 < ridge < np.inf)) or (
-        method == "ridge" and ridge is None and not drawn.any()
-    ):
-        raise ValueError(
-            '"ridge" needs a strength, ridge > 0, or errors of the readings; no other method has one'
-        )
     if not A.any():
         raise UndeterminedError("no station has an effect on any reading: check the coefficients")
     variance = np.mean(np.abs(drawn) ** 2, axis=0) / 2 if drawn.any() else np.ones(N)
@@ -242,28 +210,24 @@ def estimate_unbalance(
     left, s, right = np.linalg.svd(A / sigma[:, None], full_matrices=False)
     rank = int(np.count_nonzero(s > RCOND * s[0]))
     left, s, right = left[:, :rank], s[:rank], right[:rank]
-    strength = ridge
-    if method == "ridge" and ridge is None:
-        strength = _by_discrepancy(s / s[0], left, y / sigma)
-    G = (right.conj().T * (s / (s**2 + ((strength or 0.0) * s[0]) ** 2))) @ left.conj().T / sigma
+    G = (right.conj().T / s) @ left.conj().T / sigma
     U = G @ y
     result = Unbalance(
         stations=stations,
         unbalance=U,
         residual=y - A @ U,
-        method="least-squares" if method == "minimum-norm" and rank == Q else method,
+        method="least-squares" if rank == Q else "minimum-norm",
         rank=rank,
         resolution=G @ A,
         covariance=np.full((2 * Q, 2 * Q), np.nan),
         chi_square=None,
         condition_number=float(s[0] / s[-1]),
-        ridge=strength,
         labels=labels or Labels(weight_unit="kg_m"),
     )
-    if method == "minimum-norm" and s[0] > HOPELESS * s[-1]:
+    if s[0] > HOPELESS * s[-1]:
         words = (
             f"small errors of the readings become large unbalances (condition number {s[0] / s[-1]:.2g}): "
-            'use the method "ridge", or fewer stations'
+            "use fewer stations"
         )
         result = replace(result, warnings=(words,))
     return _with_errors(result, G, A, drawn / sigma, sigma) if len(drawn) else result
@@ -277,10 +241,6 @@ def _with_errors(
     chi_square = float(np.sum(np.abs(result.residual / sigma) ** 2))
     others = np.sum(np.abs(drawn - moved @ A.T / sigma) ** 2, axis=1)
     contradicted = result.rank < len(A) and chi_square > np.quantile(others, 0.99)
-    if result.method == "ridge":  # chosen such that they do not, where there is one
-        contradicted = (result.ridge or 0.0) < 1.01 * _STRENGTHS[0]
-        if (result.ridge or 0.0) > 0.99 * _STRENGTHS[-1]:
-            warnings.append("the readings lie within their errors: they show no unbalance at all")
     if contradicted:
         ratio = np.sqrt(chi_square / float(np.mean(others)))
         warnings.append(
@@ -294,9 +254,6 @@ def _with_errors(
 def unbalance_of_run(
     influence: Influence,
     baseline: Trials | ArrayLike | None = None,
-    *,
-    method: str = "minimum-norm",
-    ridge: float | None = None,
 ) -> Unbalance:
     """Estimate the unbalance at the planes of the coefficients from a baseline run, with its errors.
 
@@ -307,8 +264,6 @@ def unbalance_of_run(
     baseline
         As in `correct`: runs (what is mounted in them is taken into account), complex amplitudes (S, C) of
         the bare rotor, or nothing where the coefficients have a baseline.
-    method, ridge
-        As in `estimate_unbalance`.
 
     Raises
     ------
@@ -322,20 +277,10 @@ def unbalance_of_run(
     result = estimate_unbalance(
         today.W.reshape(-1, len(today.planes)),
         today.baseline.ravel(),
-        method=method,
         names=today.planes,
         errors=np.concatenate([(y - today.baseline).reshape(len(y), -1) for y, _ in today.draws()])
         if today.known_errors
         else None,
-        ridge=ridge,
         labels=replace(today.labels, **unit),  # type: ignore[arg-type]
     )
     return replace(result, warnings=today.remarks.warnings + result.warnings)
-
-
-def _by_discrepancy(s: FloatArray, left: ComplexArray, y: ComplexArray) -> float:
-    """λ, relative to the largest s, at which Σ |r|² = 2 N (the residual grows with λ)."""
-    along = np.abs(left.conj().T @ y) ** 2
-    rest = np.sum(np.abs(y) ** 2) - along.sum()
-    lost = 1 / (1 + (s / _STRENGTHS[:, None]) ** 2)
-    return float(np.exp(np.interp(2 * len(y), rest + lost**2 @ along, np.log(_STRENGTHS))))

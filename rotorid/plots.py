@@ -56,7 +56,6 @@ def _balancing() -> Pictures:
 
     return {
         balancing.Correction: lambda result, ax: plots.correction_figure(result),
-        balancing.Verdict: plots.draw_verdict,
         balancing.Tolerance: plots.draw_tolerance,
         balancing.Unbalance: plots.draw_unbalance,
         balancing.TrialWeight: plots.draw_trial_weight,

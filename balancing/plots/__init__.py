@@ -1,6 +1,6 @@
 """Pictures of balancing: a table of contents. Nothing is shown or saved here."""
 
-from balancing.plots.along_shaft import draw_tolerance, draw_unbalance, draw_verdict
+from balancing.plots.along_shaft import draw_tolerance, draw_unbalance
 from balancing.plots.correction import correction_figure, residual_figure
 from balancing.plots.discs import draw_disc, draw_plane, weight_figure
 from balancing.plots.polar import draw_trial_weight, solutions_figure, trial_figure
@@ -12,7 +12,6 @@ __all__ = [
     "draw_tolerance",
     "draw_trial_weight",
     "draw_unbalance",
-    "draw_verdict",
     "residual_figure",
     "solutions_figure",
     "trial_figure",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from balancing.plots.discs import ROW, disc_axes, draw_plane
 from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
 from balancing.regions import reach
 from balancing.tables import INVISIBLE
-from rotorid.base.plot_style import QUIET, STYLES, TEXT, legend_below, new_figure, plain
+from rotorid.base.plot_style import STYLES, TEXT, legend_below, new_figure, plain
 from rotorid.base.text import cut
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ _HOLLOW: dict[str, Any] = {"marker": "o", "color": "0.45", "ms": 4.5, "mfc": "wh
 _STAR: dict[str, Any] = {"marker": "*", "color": "black", "ms": 9, "mec": "white", "mew": 0.5}
 _PREDICTED = "predicted, with 95 % of a check run"
 _REGIONS = "95 % regions, or smaller than the marks"
+_LARGEST = "dashed circles: largest weights"
+_ARCS = "thick arcs: nothing can be mounted"
 
 
 def correction_figure(
@@ -41,7 +43,6 @@ def correction_figure(
     mounted: Mounted | None = None,
     check: CheckComparison | None = None,
     left: LeftToDo | None = None,
-    below: Callable[[Axes], object] | None = None,
 ) -> Figure:
     """A new figure: the weights, and all amplitudes before and after.
 
@@ -50,32 +51,25 @@ def correction_figure(
     c, mounted
         The correction, and pieces that make it: then discs with their holes.
     check, left
-        A check run (of several the last), and what is left to do: what is mounted and the trim are drawn.
-    below
-        Draws something else than the amplitudes.
+        A check run (of several the last), and what is left to do: the trim is drawn, or what is mounted.
     """
     pieces = mounted if left is None else left.pieces
     high = 3.9 if pieces is None else ROW * -(-len(c.planes) // 2) + 0.5
     figure = new_figure(high + 4.9)
     grid = figure.add_gridspec(2, height_ratios=[high, 4.9])
     upper, lower = (figure.add_subfigure(grid[k]) for k in range(2))
-    panels = [False, True][: 1 + (left is not None and left.word == "trim")] if pieces is None else []
-    polar = [
-        weights(c, upper.add_subplot(1, len(panels), k + 1, projection="polar"), left, trim=trim)
-        for k, trim in enumerate(panels)
-    ]
-    if pieces is not None:
+    polar = []
+    if pieces is None:
+        polar.append(weights(c, upper.add_subplot(projection="polar"), left))
+    else:
         for ax, plane in zip(disc_axes(upper, len(c.planes), c.labels), c.planes, strict=True):
             draw_plane(ax, pieces.correction, plane, pieces)
-    if below is None:
-        amplitudes(c, axes := lower.subplots(2, sharex=True), check, mounted, left)
-    else:
-        below(axes := lower.add_subplot())
+    amplitudes(c, axes := lower.subplots(2, sharex=True), check, mounted, left)
     words = (left or mounted or c).answer.judgement.splitlines()[0]
     words = textwrap.fill(words, _LETTERS, max_lines=2, placeholder=" …")
     figure.suptitle(words, fontsize="medium", fontweight="bold", parse_math=False)
     title = turning(c.labels) if polar else None  # discs say it
-    legend_below(figure, [*polar, *np.atleast_1d(axes)], title=title)
+    legend_below(figure, [*polar, *axes], title=title)
     return figure
 
 
@@ -92,23 +86,21 @@ def residual_figure(
     return figure
 
 
-def weights(
-    c: Correction, ax: Axes | None = None, left: LeftToDo | None = None, *, trim: bool = False
-) -> Axes:
+def weights(c: Correction, ax: Axes | None = None, left: LeftToDo | None = None) -> Axes:
     """Polar picture of the correction weights with 95 % regions, largest weights and forbidden arcs.
 
-    After a check run of what is mounted with its limits, or of the trim with its regions.
+    After a check run of the trim, or of what is mounted.
     """
     title, word, planes, vectors = "Weights on the bare rotor", "", c.planes, c.weights
+    trim = left is not None and left.word == "trim"
     if left is not None:
         c, planes, vectors = left.correction, left.planes, left.trim if trim else left.there
         title, word = (
             ("Trim: to add now", "add ") if trim else (f"Mounted in {cut(left.run, 16)!r}", "mounted ")
         )
-    labels, shown, limits = c.labels, c.labels.weight, None if trim else c.limits
+    labels, shown = c.labels, c.labels.weight
     polar = polar_axes(ax, labels.angles_on_paper, f"{title}, {labels.weight_in}")
     largest = np.abs(vectors).max()
-    styles: dict[str, tuple[str, float]] = {}
     for p, (plane, place) in enumerate(zip(planes, c.places(planes, vectors), strict=True)):
         name = f"{cut(plane, 24)}: {word}{labels.weight_at(vectors[p])}"
         name += f", or remove at {place:.1f}°" if plane in c.remove else ""
@@ -117,22 +109,16 @@ def weights(
         if c.region_known and plane in c.planes and (trim or left is None):
             edge = c.region([c.planes.index(plane)]).edge(181) - (0 if left is None else left.there[p])
             lines.append((edge, STYLES[p % 4], 1.2, _REGIONS))
-        if limits is not None and plane in c.planes:
+        if c.limits is not None and plane in c.planes and not trim:
             k = c.planes.index(plane)
-            arcs = [(limits.max_weight[k], 0.0, 2 * np.pi, "--", 0.9, "dashed circles: largest weights")]
-            arcs += [
-                (largest, *arc, "-", 5, "thick arcs: nothing can be mounted") for arc in limits.forbidden[k]
-            ]
-            lines += [
-                (size * np.exp(1j * np.linspace(start, start + width, 181)), *look)
-                for size, start, width, *look in arcs
-                if np.isfinite(size)
-            ]
+            around = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+            if np.isfinite(c.limits.max_weight[k]):
+                lines.append((c.limits.max_weight[k] * around, "--", 0.9, _LARGEST))
+            for start, width in c.limits.forbidden[k]:
+                lines.append((largest * np.exp(1j * np.linspace(start, start + width, 181)), "-", 5, _ARCS))
         for line, style, thick, words in lines:
-            draw_line(polar, shown, line, style, lw=thick, color=of_plane(p)["color"], alpha=0.6)
-            styles[words] = style, thick
-    for words, (style, thick) in styles.items():
-        polar.plot([], [], style, lw=thick, color=QUIET, label=words)
+            look = {"lw": thick, "color": of_plane(p)["color"], "alpha": 0.6}
+            draw_line(polar, shown, line, style, label=words, **look)
     # a region far larger than the weights would hide them: it may leave the picture
     from_zero(polar, shown, vectors, 4 * largest * labels.weight_scale or 1.0)
     return polar

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Wedge
 
 from balancing.conventions import Labels
 from balancing.holes import Holes, Mounting, content
-from balancing.plots.polar import arrows, on_paper, turn_sign
+from balancing.plots.polar import on_paper, turn_sign
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.plot_style import TEXT, new_figure
 from rotorid.base.text import cut
@@ -27,12 +27,10 @@ if TYPE_CHECKING:
     from balancing.correction import Correction
     from balancing.mount import Mounted
 
-_HOLES, _NUMBERS, _TEXTS, _ARROW, _SIDE, _EDGE = 0.84, 0.63, 1.08, 0.46, 1.95, 1.42
-"""Radii of holes, their numbers, what stands around the disc and the longest arrow; half of the picture."""
+_HOLES, _NUMBERS, _TEXTS, _SIDE, _EDGE = 0.84, 0.63, 1.08, 1.95, 1.42
+"""Radii of holes, their numbers, what stands around the disc; half of the picture."""
 _LINE, _NUMBERED = 0.22, 16
 """Height of a line of text below; holes that all have their numbers."""
-_BROAD = {"width": 0.018, "headwidth": 2.2, "headlength": 2.2, "headaxislength": 2.2}
-"""An arrow that is seen behind another one."""
 ROW = 3.6
 """Inches, of a row of discs."""
 
@@ -50,7 +48,7 @@ def draw_disc(  # noqa: PLR0913
     forbidden: Sequence[tuple[float, float]] = (),
     zero: complex = 1.0,
 ) -> Axes:
-    """Draw one plane: rotation, mark, numbered holes, weights (area by mass), and what they are to make.
+    """Draw one plane: rotation, mark, numbered holes, weights (area by mass); in words what they are to make.
 
     Parameters
     ----------
@@ -67,7 +65,7 @@ def draw_disc(  # noqa: PLR0913
     remove
         Whether material is taken away: at the equivalent weight's angle + 180°.
     weight
-        Wanted weight (equivalent added), kg or kg·m: the open arrow.
+        Wanted weight (equivalent added), kg or kg·m.
     loose
         Further weights at any angles, in one place each.
     forbidden
@@ -94,7 +92,11 @@ def draw_disc(  # noqa: PLR0913
     mark = 0.95 * zero
     ax.plot(mark.real, mark.imag, marker=(3, 0, turned + 90.0), color="black", ms=8)
     for start, width in forbidden:
-        ends = np.degrees(np.sort(labels.drawn([start, start + width]))) + 180.0 * remove + turned
+        ends = (
+            np.degrees(np.sort(labels.drawn_sign * np.array([start, start + width])))
+            + 180.0 * remove
+            + turned
+        )
         ax.add_patch(Wedge((0, 0), 1.0, *ends, width=0.32, fc="white", hatch="xxxx"))
     if holes is not None:
         _draw_holes(ax, holes, sign * zero * on_paper(labels, np.exp(1j * holes.angles)), scale)
@@ -102,19 +104,12 @@ def draw_disc(  # noqa: PLR0913
     for place in at:
         _circle(ax, _HOLES * place / abs(place), scale * np.sqrt(abs(place)), **look)
     _write_around(ax, at, texts, labels, zero)
-    vectors = {"wanted (white)": weight, "made (black)": sum(weights)}
+    vectors = {"wanted": weight, "made": sum(weights)}
     if np.isclose(weight, sum(weights), rtol=1e-9, atol=0.0):
-        del vectors["made (black)"]  # one arrow says it all
-    shown = {name: vector for name, vector in vectors.items() if vector}
-    lines = [f"{name}: {labels.weight_at(vector)}" for name, vector in shown.items()]
-    size = _ARROW / (np.abs([*vectors.values()]).max() or 1.0)
-    for name, vector in shown.items():  # where both point the same way the white one is seen around the other
-        tip, look = size * zero * on_paper(labels, [vector]), _BROAD if "white" in name else {}
-        arrows(ax, 0.0, tip, [name[-6:-1]], **look)
-    lines = [f"like adding, {line}" if remove else line for line in lines]
+        del vectors["made"]
+    like = "like adding, " if remove else ""
+    lines = [f"{like}{name}: {labels.weight_at(vector)}" for name, vector in vectors.items() if vector]
     lines = [f"{turn_sign(labels)} rotation", *lines]
-    lines += ["hatched arcs: nothing goes there"] if forbidden else []
-    lines += ["hatched circles: taken already"] if taken.any() else []
     bottom = -_EDGE - _LINE * len(lines)
     ax.set_ylim(bottom, _EDGE)
     ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)

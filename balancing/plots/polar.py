@@ -66,16 +66,8 @@ def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = 
     """Radii from 0 (to `most` at most), their numbers farthest from the vectors."""
     angles = np.sort(shown(np.atleast_1d(vectors))[1])
     gaps = np.diff([*angles, angles[0] + 360.0])
-    middle = float(angles[k := int(gaps.argmax())] + gaps[k] / 2)
-    polar.set_rlabel_position(45.0 * (middle // 45.0) + 22.5 if gaps[k] > 90.0 else middle)  # none at 90°
+    polar.set_rlabel_position(float(angles[gaps.argmax()] + gaps.max() / 2))
     polar.set_rlim(0, min(1.05 * polar.get_rmax(), most), auto=True)
-
-
-def arrows(ax: Axes, at: ArrayLike, tips: ComplexArray, colors: ArrayLike, **shape: float) -> None:
-    """Arrows with black edges from places of the horizontal axis, in the scale of the vertical one."""
-    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.009} | shape
-    x = np.broadcast_to(at, tips.shape)
-    ax.quiver(x, 0 * x, tips.real, tips.imag, color=colors, edgecolor="black", linewidth=0.8, **look)
 
 
 def turning(labels: Labels) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -205,7 +204,7 @@ def corrected(
         keys=lambda: result.to_dict() | outcome.beside(),
         file=lambda: table_of((mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
-        pictures={"": lambda: _picture(outcome, tolerance)},
+        pictures={"": lambda: _picture(outcome)},
         solved=result,
         lines=LINES + 6 * bool(mounted or (left and left.pieces)),
         influence=influence,
@@ -279,14 +278,11 @@ def _behind(answer: Answer) -> Answer:
     return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
 
 
-def _picture(made: Balance, tolerance: Tolerance | None) -> Figure:
-    """The correction or what is mounted, the check run and the trim; below, what a tolerance says."""
-    from balancing.plots import correction_figure, draw_verdict
+def _picture(made: Balance) -> Figure:
+    """The correction or what is mounted, the check run and the trim."""
+    from balancing.plots import correction_figure
 
-    below, verdict = None, made.verdict
-    if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
-        below = partial(draw_verdict, verdict, t=tolerance)
-    return correction_figure(made.result, made.mounted, made.check, made.left, below)
+    return correction_figure(made.result, made.mounted, made.check, made.left)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:

@@ -28,24 +28,22 @@ def problem(seed):
         max_weight=float(rng.uniform(0.008, 0.02)) if seed % 4 == 0 else np.inf,
     )
     target = complex(rng.normal(), rng.normal()) * 0.01
-    return target, holes, int(rng.integers(1, 5)) if seed % 5 == 0 else None
+    return target, holes
 
 
 @each_of("seed", range(40))
 def test_equal_to_trying_everything(seed):
-    target, holes, most = problem(seed)
+    target, holes = problem(seed)
     vectors, number, _ = everything(holes)
     every = [
-        (round(float(abs(vector - target)), 11), int(n))
-        for vector, n in zip(vectors, number, strict=True)
-        if most is None or n <= most
+        (round(float(abs(vector - target)), 11), int(n)) for vector, n in zip(vectors, number, strict=True)
     ]
-    found = split(target, holes, most_pieces=most)
+    found = split(target, holes)
     assert (round(abs(found.error), 11), found.pieces) == min(every)
     assert found.mounting.vector - target == pytest.approx(found.error, abs=1e-15)
     assert (found.mounting.counts.sum(axis=1) <= holes.per_hole).all()
     assert not found.mounting.amounts[~holes.free].any()
-    few = split(target, holes, most_pieces=most, good_enough=0.2)
+    few = split(target, holes, good_enough=0.2)
     errors = [abs(one.error) for one in (*few.fewer, few)]
     assert errors == sorted(errors, reverse=True)
     if few.pieces:
@@ -55,9 +53,8 @@ def test_equal_to_trying_everything(seed):
 def test_the_published_split_on_holes():
     # the example of hsbalance, proven by branch and bound
     target = 0.2437 * np.exp(0.937j)
-    for n, error, pieces in ((20, 0.005829541398759976, 6), (36, 0.0002441627517601361, 13)):
-        found = split(target, from_list(equal_holes(n), [0.09]))
-        assert (found.relative_error, found.pieces) == (pytest.approx(error, rel=1e-6), pieces)
+    found = split(target, from_list(equal_holes(20), [0.09]))
+    assert (found.relative_error, found.pieces) == (pytest.approx(0.005829541398759976, rel=1e-6), 6)
 
 
 def test_fewer_pieces_stand_below_what_is_proposed():
@@ -144,7 +141,6 @@ def test_a_hole_takes_away_what_the_integral_over_its_depth_says(diameter, depth
         (lambda: drill(1e-4, 0.0, 0.008), "positive"),
         (lambda: drill(1.0, 0.1, 0.008), "larger drill"),
         (lambda: drill(2e-6, 0.1, 0.008), "smaller drill"),
-        (lambda: split(1.0, from_list([0.0, 1.0], [0.01]), most_pieces=0), "1 or more"),
         (
             lambda: split(1.0, from_list([0.0, 1.0], np.arange(1, 12) * 0.01, per_hole=9)),
             "too many combinations",

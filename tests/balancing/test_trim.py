@@ -45,7 +45,7 @@ def test_a_trim_within_its_error_that_may_be_worth_it_is_told():
     added = left.correction.to_add * 1e3
     for name, weight in zip("AB", added, strict=True):
         at = np.degrees(np.angle(weight)) % 360
-        assert f"{name} {abs(weight):.4g} g at {at:.0f}°" in left.why
+        assert f"{name} {abs(weight):.4g} g at {at:.1f}°" in left.why
 
 
 @pytest.mark.parametrize("seed", range(4))

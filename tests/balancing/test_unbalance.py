@@ -72,33 +72,10 @@ def test_which_station_is_determined():
     assert reach.max() == pytest.approx(1e6 * (1 + 2.4477 * 0.1), rel=0.05)
 
 
-def smooth(rotor, scale=1e-3):
-    x = rotor.positions / rotor.positions[-1]
-    return scale * (np.exp(0.5j) + 2j * np.sin(3 * x) - 1.5 * x)
-
-
-def test_ridge_is_nearer_to_a_smooth_unbalance_than_the_smallest_one(rotor):
-    speeds = [80.0, 125.0, 145.0, 400.0, 540.0, 700.0]
-    W = coefficients(rotor, EVERY, speeds)
-    U = smooth(rotor)
-    rng = np.random.default_rng(7)
-    sigma = 0.02 * np.median(np.abs(W @ U))
-    Y = W @ U + sigma * complex_normal(rng, len(W))
-    covariance = np.tile(sigma**2 * np.eye(2), (len(W), 1, 1))
-    found = estimate_unbalance(W, Y, method="ridge", errors=drawn(covariance))
-    plain = estimate_unbalance(W, Y)
-    assert np.linalg.norm(found.unbalance - U) < 0.01 * np.linalg.norm(plain.unbalance - U)
-    assert any("use the method" in words for words in plain.warnings)
-    assert found.warnings == ()
-    assert found.chi_square == pytest.approx(2 * len(W), rel=0.01)
-    assert found.own_share.max() < 1
-
-
-@pytest.mark.parametrize("method", ["minimum-norm", "ridge"])
-def test_readings_that_no_unbalance_here_explains(method):
+def test_readings_that_no_unbalance_here_explains():
     W, Y = np.array([[1.0], [1.0], [1.0]]), np.array([1.0, 2.0, 3.0])
     covariance = np.tile(0.01 * np.eye(2), (3, 1, 1))
-    found = estimate_unbalance(W, Y, method=method, errors=drawn(covariance))
+    found = estimate_unbalance(W, Y, errors=drawn(covariance))
     [words] = found.warnings
     assert words.endswith("unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons")
     assert estimate_unbalance(W, 2 * W[:, 0], errors=drawn(covariance)).warnings == ()
@@ -125,8 +102,6 @@ BAD = [
     ({"W": [[1.0, np.nan]]}, ValueError, "must be finite"),
     ({"Y": [1.0, 2.0]}, ValueError, r"coefficients \(N, Q\) and readings \(N,\)"),
     ({"W": [[0.0, 0.0]]}, UndeterminedError, "no station has an effect on any reading"),
-    ({"method": "ridge", "ridge": 0.0}, ValueError, "ridge > 0"),
-    ({"method": "ridge", "errors": np.zeros((9, 1))}, ValueError, "or errors of the readings"),
 ]
 
 

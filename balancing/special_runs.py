@@ -1,5 +1,6 @@
-"""Runs with the rotor turned on its arbor (index balancing): what the rotor does, and what its arbor does.
+"""Runs of a rotor turned on its arbor (index balancing), and with trial weights that nobody knows.
 
+**Index.**
 The phase mark is the arbor's. At index θ the rotor stands turned by θ, with the rotation, and so do the
 weights d on it:
 
@@ -10,6 +11,11 @@ trial runs fits these, with its errors. No run need stand at index 0. Two positi
 closed form R = (y(0) − y(180))/2, A = (y(0) + y(180))/2. Weights on the rotor cannot mend its arbor: they are
 to make |R + W d| small. A is all that turns with the arbor: its unbalance, the rotor's mass on a seat that
 runs out, run-out of what the sensors see.
+
+**Relative to a trial weight.**
+Runs fit y = Y₀ + W T with T = 1 for such a weight, whatever it is. W is its effect then, and the correction D
+the factor by which to change it: |D| times as heavy, arg D further with the rotation. Its errors are those of
+the factor. A mass that is known makes a mass of |D|; where all angles are known, T has them, and D too.
 """
 
 from __future__ import annotations
@@ -24,11 +30,12 @@ from balancing.correct import correct
 from balancing.correction import Correction
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
-from balancing.tables import reading_columns, vector_columns
-from balancing.trials import Trials
-from rotorid.base.arrays import ComplexArray
+from balancing.tables import degrees
+from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, records
+from rotorid.base.tables import Column, records, text
+from rotorid.base.text import figures
 
 _SAME = 1e-6
 
@@ -171,17 +178,9 @@ class ArborCorrection(Correction):
         return f"{super()._weights_text()}\n{head}\n{arbor}"
 
     def to_dict(self) -> dict[str, Any]:
-        """That of the correction with rotor_unbalance, arbor_unbalance and on_arbor_at_index_0."""
-        columns: tuple[Column, ...] = reading_columns(self.labels, self.speeds, self.sensors)
-        for name, readings in (("before", self.before), ("after", self.after)):
-            columns += vector_columns(self.labels, name, readings + self.rotor_and_arbor[1].before)
+        """That of the correction with rotor_unbalance and arbor_unbalance."""
         rotor, arbor = (records(part._weight_columns()[:6]) for part in self.unbalances)
-        further = {
-            "rotor_unbalance": rotor,
-            "arbor_unbalance": arbor,
-            "on_arbor_at_index_0": records(columns),
-        }
-        return super().to_dict() | plain(further)
+        return super().to_dict() | plain({"rotor_unbalance": rotor, "arbor_unbalance": arbor})
 
 
 def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
@@ -197,9 +196,115 @@ def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
     Returns
     -------
     ArborCorrection
-        Whose JSON has rotor_unbalance, arbor_unbalance and on_arbor_at_index_0.
+        Whose JSON has rotor_unbalance and arbor_unbalance.
     """
     at = result.planes, result.speeds
     corrections = tuple(correct(part, None, *at, refuse=False) for part in both)
     fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
     return ArborCorrection(**fields, rotor_and_arbor=corrections)
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeCorrection(Correction):
+    """A correction whose weights are multiples of the trial weight of their plane.
+
+    Attributes
+    ----------
+    relative
+        What is known of these trial weights.
+    """
+
+    relative: Relative = Relative(True, {}, "")  # noqa: RUF009
+
+    @property
+    def masses(self) -> FloatArray:
+        """Masses of the weights in the unit of the trial weights, (P,); NaN: not known."""
+        return np.abs(self.weights) * [self.relative.sizes[plane] for plane in self.planes]
+
+    @property
+    def turns(self) -> FloatArray:
+        """How far to move the trial weights, degrees as the job counts them, -180 … 180, (P,)."""
+        return np.asarray((self.places(self.planes, self.weights) + 180) % 360 - 180)
+
+    def _place(self, turn: float, sign: int) -> str:
+        if not self.relative.angle:
+            return degrees(turn)
+        turn *= sign
+        return f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation"
+
+    def _what(self) -> str:
+        if len(self.planes) > 1:
+            return "Change the trial weights as the table says"
+        place = self._place(float(self.turns[0]), self.labels.angle_sign)
+        times = figures(float(np.abs(self.weights[0])), 3)
+        if self.relative.angle and not self.remove:
+            return f"Move the trial weight by {place} and take {times} times as much"
+        start = f"{place} from its place" if self.relative.angle else f"at {place}"
+        return f"{'Remove' if self.remove else 'Mount'} {times} {TRIAL_WEIGHTS}, {start}"
+
+    @property
+    def parts(self) -> None:
+        """Weights that are multiples of different trial weights have no static part."""
+
+    def _weights_text(self) -> str:
+        labels, columns = self.labels, [Column("plane", self.planes)]
+        columns.append(Column("times", np.abs(self.weights), lambda times: figures(times, 3)))
+        if not np.isnan(self.masses).all():
+            columns.append(Column(self.relative.unit.replace("_", "·"), self.masses, figures))
+        columns.append(Column("place", [self._place(turn, labels.angle_sign) for turn in self.turns]))
+        if self.region_known:
+            sizes, angles = self.half_widths()
+            turns = [
+                "not determined" if np.isnan(a) else f"± {figures(float(np.degrees(a)), 2)}°" for a in angles
+            ]
+            columns += [Column("95 %", sizes, lambda w: f"± {figures(w, 2)}"), Column("", turns)]
+        for other in self.others:
+            sign = labels.angle_sign * (1 if other.rows[0]["angles"] == labels.angle_words else -1)
+            turned = [self._place((place + 180) % 360 - 180, sign) for place in other.places]
+            columns.append(Column(f"if {other.words}", turned))
+        start = "places count from it" if self.relative.angle else labels.turning_in_words()
+        taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
+        caption = f"Times the trial weight, instead of it; {start}; phases as {labels.phase}{taken}."
+        return f"{text(columns)}\n{caption}"
+
+    def _weight_columns(self) -> tuple[Column, ...]:
+        columns = {column.heading: column for column in super()._weight_columns()}
+        nothing = np.full(len(self.planes), np.nan)
+        new = {
+            "times_trial": np.abs(self.weights),
+            "times_trial_std": np.array(columns["mass_std"].values),
+            "turn_deg": self.turns if self.relative.angle else nothing,
+            "mass": self.masses,
+            "mass_std": self.masses * columns["mass_std"].values / np.abs(self.weights),
+            "unit": [self.relative.unit] * len(self.planes),
+        }
+        if self.relative.angle:
+            new |= {"angle_deg": nothing, "remove_at_deg": nothing}
+        columns |= {name: Column(name, values) for name, values in new.items()}
+        last = [columns.pop(name) for name in ("covariance", "action", "remove_at_deg")]
+        return (*columns.values(), *last)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what only a known trial weight would tell is None."""
+        unknown = {"mounted_in_last_run": None, "add_to_mounted": None}
+        relative = ["mass", "angle"] if self.relative.angle else ["mass"]
+        return super().to_dict() | unknown | {"relative_to_trial_weight": relative}
+
+
+def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
+    """A correction of runs whose weights are multiples of trial weights, told as such.
+
+    Parameters
+    ----------
+    result
+        The correction.
+    relative
+        `Trials.relative` of the runs.
+
+    Returns
+    -------
+    RelativeCorrection
+        Whose JSON has times_trial and turn_deg of every plane.
+    """
+    fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
+    return RelativeCorrection(**fields, relative=relative)
