@@ -224,10 +224,11 @@ def test_files_in_the_order_of_their_numbers(tmp_path):
     assert read_trials(tmp_path, None, phase="lag").runs == ("step1", "step2", "step10")
 
 
-def test_a_column_of_weights_among_the_readings_is_passed_over(tmp_path):
+def test_a_column_of_weights_among_the_readings_is_passed_over_and_said(tmp_path):
     runs = rows("Run,rpm,DE mm/s,DE deg,NDE mm/s,NDE deg,Trial weight (g)", f"{SIX},10 g at 90° in P1")
     trials = trials_of(tmp_path, runs)
     assert_same(trials, trials_of(tmp_path))
+    assert len([word for word in trials.warnings if "'Trial weight (g)' is passed over" in word]) == 1
 
 
 def test_exchanged_columns_are_asked_about_and_the_answer_is_a_key(tmp_path, cli):
