@@ -412,13 +412,11 @@ def _readings(
 
 def _on_conventions(conventions: Conventions, labels: Labels, name: str) -> list[str]:
     """What readings take from stored coefficients that state their conventions."""
-    usual, notes = Labels(), []
-    adopted = [key for key in conventions.unstated if getattr(labels, key) != getattr(usual, key)]
-    if words := " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted):
-        notes.append(
-            f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
-        )
-    return notes
+    usual = vars(Labels())
+    adopted = [key for key in conventions.unstated if getattr(labels, key) != usual[key]]
+    words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+    note = f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
+    return [note] if adopted else []
 
 
 def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = None) -> Conventions:

@@ -153,11 +153,8 @@ def balanced(*asked: Any) -> dict[str, Any]:  # noqa: ANN401
         return float(row["angle_deg"] if drilled is None else drilled)
 
     parts = [] if "left_to_do" in document else document["parts"]
-    columns = (
-        Column("part", [row["part"] for row in parts]),
-        Column(labels.weight_in, [row["mass"] for row in parts], figures),
-        Column("at °", [row["angle_deg"] for row in parts], figures),
-    )
+    shapes = (("part", "part", str), (labels.weight_in, "mass", figures), ("at °", "angle_deg", figures))
+    columns = tuple(Column(title, [row[key] for row in parts], words) for title, key, words in shapes)
     refer = f"For {document['corrections_refer_to']}. " * ("left_to_do" not in document)
     return {
         **shown,
