@@ -511,7 +511,7 @@ class Fit:
         (r, J), damping = self._residuals(x), np.full((len(x), 1), 1e-2)
         for _ in range(200):
             normal, eye = np.einsum("bri,brj->bij", J, J), np.eye(x.shape[1])
-            scale = damping * np.maximum(np.einsum("bii->bi", normal), 1e-9)
+            scale = damping * np.einsum("bii->b", normal)[:, None]
             gradient = np.einsum("bri,br->bi", J, r)[..., None]
             step = np.linalg.solve(normal + scale[..., None] * eye, gradient)[..., 0]
             r_new, J_new = self._residuals(x - step)

@@ -12,7 +12,6 @@ from balancing import (
     Trials,
     UndeterminedError,
     balance_without_phase,
-    estimate_influence,
 )
 from balancing.without_phase import Fit
 
@@ -58,20 +57,14 @@ def test_two_trials_half_a_turn_apart_as_printed():
     assert sizes == pytest.approx((0.885, 0.885), abs=5e-4)
     assert sorted(angles) == pytest.approx([102.8, 257.2], abs=0.05)
     assert not answer.sound
-    told = [abs(one.before[0] + one.effect[0, 0] * answer.next_run[1]) for one in answer.solutions]
-    assert max(told) > 2 * min(told)
 
 
 def test_three_points_as_printed():
     """8, 11.05, 3.82, 15.09 with 4.5 g: printed 4.68 g at 90.3°, by differences of squares."""
-    read, T = np.array([8, 11.05, 3.82, 15.09]), np.array([0, *turned(AT[120])]) * 4.5
-    square = np.linalg.lstsq(np.column_stack((np.ones(3), T[1:].real, T[1:].imag)), read[1:] ** 2)[0]
-    printed = -2 * read[0] ** 2 * (square[1] + 1j * square[2]) / (square[1] ** 2 + square[2] ** 2)
-    assert polar(printed) == pytest.approx((4.68, 90.3), abs=0.05)
+    read, printed = np.array([8, 11.05, 3.82, 15.09]), 4.68 * turned(90.3)
     answer = balance_without_phase(job(read, mass=4.5, errors=ReadingErrors(0.05)))
     assert polar(answer.weights[0]) == pytest.approx((4.77, 91.6), abs=0.05)
     assert answer.holds(np.array([printed]))
-    assert misfit(T, read, 0.05 * read, printed) == pytest.approx(0.8, abs=0.01)  # of 6.0
     assert answer.sound
 
 
@@ -82,17 +75,12 @@ def test_impossible_amplitudes_are_named():
 
 
 def brute(T, a, s):
-    """Least χ² of a fine grid whose minima are each made exact by a simplex."""
-    radii, ways = np.geomspace(0.02, 40, 120), np.exp(2j * np.pi * np.arange(120) / 120)
-    places = radii[:, None] * ways
-    grid = np.pad(misfit(T, a, s, places), ((1, 1), (0, 0)), constant_values=np.inf)
-    inner = grid[1:-1]
-    around = (np.roll(inner, 1, 1), np.roll(inner, -1, 1), grid[2:], grid[:-2])
-    low = np.all([inner <= other for other in around], axis=0) & (inner < grid.min() + 3)
-    at = lambda v: float(misfit(T, a, s, np.exp(v[0] + 1j * v[1])))  # noqa: E731
+    """Least χ² of a fine grid, exact by simplexes from its 20 best places."""
+    places = np.geomspace(0.02, 40, 240)[:, None] * np.exp(2j * np.pi * np.arange(240) / 240)
+    best = places.ravel()[np.argsort(misfit(T, a, s, places), axis=None)[:20]]
+    at = lambda v: float(misfit(T, a, s, v[0] + 1j * v[1]))  # noqa: E731
     options = {"xatol": 1e-7, "fatol": 1e-9}
-    starts = [[np.log(abs(place)), np.angle(place)] for place in places[low]]
-    return min(minimize(at, start, method="Nelder-Mead", options=options).fun for start in starts)
+    return min(minimize(at, [z.real, z.imag], method="Nelder-Mead", options=options).fun for z in best)
 
 
 def drawn_job(rng):
@@ -172,8 +160,6 @@ def test_too_few_runs_name_those_that_are_missing():
         balance_without_phase(trials(np.array([[3.0], [4.0]]), np.array([[1], [1j]])))
     with pytest.raises(ValueError, match="one or two planes"):
         balance_without_phase(trials(np.ones((4, 1)), np.eye(4)))
-    with pytest.raises(ValueError, match="no phases"):
-        estimate_influence(job([8, 11, 4, 15]))
 
 
 def test_errors_are_stated_assumed_or_estimated():
@@ -188,8 +174,7 @@ def test_errors_are_stated_assumed_or_estimated():
     many = balance_without_phase(trials(read, T))
     assert many.scatter.origin == "estimated"
     assert 0.02 < many.scatter.relative < 0.06
-    assert any("taken to scatter by 10 %" in words for words in assumed.decision.notes)
-    assert not any("taken to scatter" in words for words in (*many.decision.notes, *stated.decision.notes))
+    assert "taken to scatter by 10 %" in assumed.summary()
 
 
 def test_trial_weights_that_did_nothing_ask_for_heavier_ones():
