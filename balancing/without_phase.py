@@ -2,8 +2,8 @@
 
 Solutions are those of `amplitudes`. Errors: as stated (amplitude, floor, from run to run); else 10 % of each
 amplitude, and from four readings more than unknowns on what the fit leaves. The digits always count.
-Solutions are those within 99 %, by F or χ² of the 2 P numbers. The best one is mounted where the 95 % interval
-of the vibration that it leaves ends below 0.9 of the present, whichever of the solutions is true.
+Solutions are those within 99 %, by F or χ² of the 2 P numbers. The best one is mounted where the 95 %
+interval of the vibration that it leaves ends below 0.9 of the present, whichever of the solutions is true.
 """
 
 from __future__ import annotations
