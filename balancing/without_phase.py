@@ -432,7 +432,7 @@ def _decide(
     expected, cause, instead = before * max(one.left for one in solutions), "", ""
     arcs = () if limits is None else zip(trials.planes, weights, limits.forbidden, strict=True)
     forbidden = [
-        f"{labels.weight_at(weight)} in plane {plane!r}"
+        repr(plane)
         for plane, weight, each in arcs
         if any(1e-9 < (np.angle(weight) - start) % (2 * np.pi) < width - 1e-9 for start, width in each)
     ]
@@ -441,7 +441,7 @@ def _decide(
         word, cause = "measure again", _contradiction(trials, scatter)
         instead = "Measure these runs again, or mend the table."
     elif forbidden:
-        cause = f"the job forbids {listing(forbidden, 'and')}"
+        cause = f"they stand where the job forbids weights, in plane {listing(forbidden, 'and')}"
     elif expected < HARDLY_BELOW * before:
         word = "mount"
     elif weak:

@@ -197,4 +197,4 @@ def test_a_solution_where_nothing_may_be_mounted_is_not_mounted():
         limits = Limits(np.array([np.inf]), np.full((1, 1), np.inf), (arcs,))
         answer = balance_without_phase(runs, limits=limits)
         assert answer.sound == allowed
-        assert ("the job forbids" in answer.sentence()) != allowed
+        assert ("where the job forbids" in answer.sentence()) != allowed
