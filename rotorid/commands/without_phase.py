@@ -11,7 +11,6 @@ from rotorid.report.outcome import Outcome, Written, outcome_of, provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import WithoutPhase
     from rotorid.commands.balance_solution import BalanceOptions
     from rotorid.files import Job
 
@@ -25,7 +24,7 @@ _REFUSED = {
     "limit": "--limit",
     "ridge": "--ridge",
     "split": "--split (rotorid split puts a weight into holes)",
-    "refine": "--refine (add the check run to the runs)",
+    "refine": "--refine",
     "weights": "--weights",
     "grade": "--grade",
     "rotor_mass": "--rotor-mass",
@@ -39,33 +38,40 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
     Raises
     ------
     ValueError
-        For options that need phases, all in one message; UndeterminedError.
+        For options and parts of the job that need phases, all in one message; UndeterminedError.
     """
+    import numpy as np
+
     from balancing import balance_without_phase
 
-    if given := [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]:
+    given = [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]
+    limited = job.limits is not None and np.isfinite(job.limits.residual).any()
+    of_job = {
+        "holes (rotorid split puts a weight into them)": job.holes,
+        "limits of sensors": limited,
+        "zones": job.zones,
+        "the check run (add it to the runs, with its weights)": job.check is not None,
+    }
+    if given := [*given, *(words for words, there in of_job.items() if there)]:
         raise ValueError(f"the runs have no phases: leave {listing(given, 'and')} away")
     planes = job.trials.planes
-    limits = job.limits_of(planes)
+    remove = [plane for plane in planes if job.planes[plane].remove]
     result = balance_without_phase(
-        job.trials,
-        check=job.check,
-        max_weight=None if limits is None else limits.max_weight,
-        row_weights=job.row_weights,
-        remove=[plane for plane in planes if job.planes[plane].remove],
+        job.trials, limits=job.limits_of(planes), row_weights=job.row_weights, remove=remove
     )
 
     def coefficients(_: Path) -> Written:
         raise ValueError("amplitudes give no influence coefficients: write a table, .csv or .xlsx")
 
-    made = provenance(job.files, options)
-    files = {".json": coefficients, "influence.csv": coefficients}
-    pictures = {"": lambda: _picture(result)}
-    return outcome_of(result, made, files=files, pictures=pictures, title="Balancing without phases")
+    def picture() -> Figure:
+        from balancing.plots import solutions_figure
 
+        return solutions_figure(result)
 
-def _picture(result: WithoutPhase) -> Figure:
-    """Polar picture of the solutions with their regions and the weights of the runs."""
-    from balancing.plots import solutions_figure
-
-    return solutions_figure(result)
+    return outcome_of(
+        result,
+        provenance(job.files, options),
+        files={".json": coefficients, "influence.csv": coefficients},
+        pictures={"": picture},
+        title="Balancing without phases",
+    )
