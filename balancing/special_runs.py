@@ -173,7 +173,7 @@ class ArborCorrection(Correction):
         return f"{super()._left()}, beside the arbor's part"
 
     def _weights_text(self) -> str:
-        arbor = Correction._weights_text(self.unbalances[1]).rpartition("\n")[0]
+        arbor = Correction._weights_text(self.unbalances[1]).partition("\n")[2].rpartition("\n")[0]
         head = "Unbalance of the arbor, and all run-out that turns with it, which no index tells from it:"
         return f"{super()._weights_text()}\n{head}\n{arbor}"
 

