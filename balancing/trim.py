@@ -8,7 +8,7 @@ mounted.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,8 +20,11 @@ from balancing.trials import Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, records, text
+from rotorid.base.tables import Column, frame, records, text
 from rotorid.base.text import capital, figures
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 WORTH = 0.9
 """Of the vibration in the check run: what a trim has to stay below."""
@@ -85,6 +88,11 @@ class LeftToDo(Answered):
                 "readings": records(readings) if self.word == "trim" else [],
             }
         )
+
+    def to_frame(self) -> pd.DataFrame:
+        """The trim, its pieces or a row a plane; nothing to add is 0."""
+        weights = self.correction.work_columns(self.planes, self.trim)
+        return frame(weights) if self.pieces is None else self.pieces.to_frame()
 
     @property
     def answer(self) -> Answer:

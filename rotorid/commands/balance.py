@@ -202,7 +202,7 @@ def corrected(
         result=result,
         provenance=made,
         keys=lambda: result.to_dict() | outcome.beside(),
-        file=lambda: table_of((mounted or result).to_frame()),
+        file=lambda: table_of((left or mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _picture(outcome)},
         solved=result,
@@ -238,8 +238,8 @@ def _pieces(job: Job, result: Correction, solved: Solved, options: BalanceOption
     """Pieces in holes: those that a check run had, or that are to be mounted; None: not asked for."""
     from balancing import mount
 
-    if options.split and job.check_pieces is not None and not options.refine:
-        return job.check_pieces
+    if job.check is not None and not options.refine:  # the trim has its pieces
+        return job.check_pieces if options.split else None
     if options.split and (job.holes or job.check_pieces is None):
         influence, runs = solved.coefficients
         return mount(result, influence, runs, job.holes, on_top=options.refine)

@@ -127,7 +127,8 @@ class Heading:
         Its place, and its name in the file.
     stem
         Of the column of a runs or weights table; `vector` for amplitude and phase in one cell, the order of
-        another harmonic (`2X`), `note` of what stays as it is; empty: unknown.
+        another harmonic (`2X`), `mounted` for weights in a runs table, `note` of what stays as it is; empty:
+        unknown.
     unit
         As it is written.
     sensor
@@ -245,7 +246,7 @@ def _as_one(upper: Sequence[str], lower: Sequence[str], *, weights: bool) -> lis
             continue
         group = ""
         sure = sure or (fits and bool(head.name))
-        if not text or head.stem == "note":
+        if not text or head.stem in ("note", "mounted"):
             names.append(head.name)
         elif not head.name:
             names.append(heading.name)
@@ -290,8 +291,8 @@ def _by_words(heading: Heading, words: set[str], outside: str, inside: str, *, w
     """What the words of a heading say that it is, or else its unit; as it is where neither says it."""
     roles, pair = _ROLES[weights], {*WEIGHT} if weights else {*READING, "vector"}
     stems = [stem for stem, of in roles.items() if words & of]
-    if "mounted" in stems:  # weights belong into a weights table
-        return replace(heading, stem="note")
+    if "mounted" in stems:
+        return replace(heading, stem="mounted")
     if {*READING} <= {*stems}:
         stems.insert(0, "vector")
     by_unit, clear = _by_unit(outside, inside, weights=weights)

@@ -77,7 +77,7 @@ def test_pieces_that_were_mounted_as_proposed_are_done(cli, options):
     said = first(ran)
     assert ("--refine" in options) or "As predicted: " in said
     assert said.startswith("Done")
-    assert "by --split: P1: 4.000 in hole 1; 8.000 in hole 6 · P2: 4.000 in hole 3" in said
+    assert "by --split: P1: 4 in hole 1; 8 in hole 6 · P2: 4 in hole 3" in said
     assert "Mount" not in ran.out
 
 
@@ -139,7 +139,7 @@ def test_a_trim_is_of_pieces_where_the_mounted_ones_are_in_holes(cli, tmp_path):
     for options in ([], ["--split"]):
         found = cli("balance", tmp_path / "job.toml", *options).out
         assert found.startswith("Trim; ")
-        assert "L: 1.000 in holes 5, 12" in found.partition("Trim with pieces, in g:\n")[2]
+        assert "L: 1 in holes 5, 12" in found.partition("Trim with pieces, in g:\n")[2]
     weights = tmp_path / "check_weights.csv"
     weights.write_text(weights.read_text().replace("L,5,240", "L,5,244"))
     for options in ([], ["--split"]):

@@ -57,7 +57,7 @@ def test_a_checked_job_draws_what_is_mounted_the_trim_and_what_it_leaves(checked
     found, figure = checked
     check_hygiene(figure)
     left, scale = found.left, found.result.labels.weight_scale
-    for polar, weights in zip(figure.axes, (left.there, left.trim), strict=False):
+    for polar, weights in zip(figure.axes, (left.trim,), strict=False):
         ends = [line.get_xydata()[-1] for line in polar.lines if line.get_linewidth() == 2]
         assert [size * np.exp(1j * angle) for angle, size in ends] == pytest.approx(weights * scale)
     shown = {
@@ -65,7 +65,7 @@ def test_a_checked_job_draws_what_is_mounted_the_trim_and_what_it_leaves(checked
         "achieved": found.check.achieved[-1],
         "predicted with the trim, with 95 %": left.after,
     }
-    for ax in figure.axes[2:]:
+    for ax in figure.axes[1:]:
         marks = [named(ax, label) for label in shown]
         for line, vectors in zip(marks, shown.values(), strict=True):
             assert line.get_ydata() == pytest.approx(np.abs(vectors).ravel() * 2e6)
