@@ -5,10 +5,10 @@ reading, |D₀ₚ + Tₚ y| ≤ Mₚ for a weight; in min–max wᵢ |r₀ᵢ + 
 a weight must stand is two half planes. T makes what is minimised a length: |y| for `nearest`, and for min–max
 the columns of all scaled rows orthogonal; so the solver's tolerances mean the same in any unit. The program
 starts from the few discs that D₀ is farthest out of (for min–max the largest amplitudes that least squares
-leaves) and adds those that its solution violates, hence the dual value of the last program is a lower bound
-for all. Weights are within every limit exactly: limits are made tighter by 3e-9 of themselves, more where
-many digits cancel, and what that costs is in the gap. Where a plane may stand in several sectors, branch and
-bound chooses among them.
+leaves, with rows reweighted by these a few times: C. L. Lawson, 1961) and adds those that its solution
+violates, hence the dual value of the last program is a lower bound for all. Weights are within every limit
+exactly: limits are made tighter by 3e-9 of themselves, more where many digits cancel, and what that costs is
+in the gap. Where a plane may stand in several sectors, branch and bound chooses among them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ import numpy as np
 from balancing.trials import Arc, Limits
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.regression import solution, stretch, unstretch
+from rotorid.regression import RCOND, stretch, unstretch
+from rotorid.regression.estimate import unit_columns
 
 Sectors = tuple[Arc, ...] | None
 """Convex arcs (width ≤ π) where a weight may stand; None: anywhere."""
@@ -38,6 +39,8 @@ PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
 FIRST, MORE = 3, 3
 """Discs a plane that a program starts from, and that are added to it."""
+STEPS = 4
+"""Of reweighting before min–max."""
 TURN, TINY = 2 * np.pi, 1e-300
 
 
@@ -92,6 +95,13 @@ class _Goal(NamedTuple):
     shares: FloatArray
     objective: Callable[[ComplexArray], float]
     bound: Callable[[float], float]
+
+
+def solution_and_rank(A: ComplexArray, y: ComplexArray) -> tuple[ComplexArray, int]:
+    """Least squares of A x = y, (P,), and the rank of A with columns of length 1, by one decomposition."""
+    unit, size = unit_columns(A)
+    x, _, rank, _ = np.linalg.lstsq(unit, y, RCOND)
+    return np.asarray(x / size, dtype=complex), int(rank)
 
 
 def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
@@ -231,7 +241,7 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
     def objective(weights: ComplexArray) -> float:
         return float((shares * np.abs(Y + W @ weights)).max())
 
-    start = _shortened(np.asarray(solution(rows, -shares * Y)), bounds.max_weight)
+    start = _shortened(_levelled(rows, shares * Y), bounds.max_weight)
     if objective(start) >= objective(none):
         start = none
     unit = objective(start)
@@ -247,6 +257,18 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
     values, vectors = np.linalg.eigh(scaled.conj().T @ scaled)
     transform = stretch(vectors * np.sqrt(len(scaled) / np.maximum(values, 1e-12 * values[-1])))
     return _best(bounds, _Goal(start, transform, shares / unit, objective, lambda t: unit * t), tolerance)
+
+
+def _levelled(rows: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Unknowns x that leave nearly the least maximum of |right + rows x|."""
+    Q, R = np.linalg.qr(rows)
+    x, counts = -(Q.conj().T @ right), np.ones(len(rows))
+    for _ in range(STEPS):
+        counts = counts * np.abs(right + Q @ x) ** 2
+        counts = counts / counts.max(initial=TINY) + 1e-8
+        weighed = counts * Q.conj().T
+        x = np.linalg.solve(weighed @ Q, -(weighed @ right))
+    return solution_and_rank(R, x)[0]
 
 
 def _best(bounds: Bounds, goal: _Goal, tolerance: float) -> Optimum:

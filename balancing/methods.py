@@ -44,14 +44,14 @@ from balancing.cones import (
     explain,
     nearest,
     smallest_maximum,
+    solution_and_rank,
     within,
 )
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
-from rotorid.regression import RCOND, covariance_root, solution, stretch, unstretch
-from rotorid.regression.estimate import unit_columns
+from rotorid.regression import covariance_root, solution, stretch, unstretch
 
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
@@ -256,9 +256,10 @@ def solve(  # noqa: PLR0913
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
-    if np.linalg.matrix_rank(unit_columns(A)[0], RCOND) < A.shape[1]:
+    weights, rank = solution_and_rank(A, -job.w * job.Y)
+    if rank < A.shape[1]:
         check_planes(A[job.w > 0], job.planes)
-    return np.asarray(solution(A, -job.w * job.Y))
+    return weights
 
 
 def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
