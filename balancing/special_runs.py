@@ -91,11 +91,11 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         ) from None
     fitted = fit_runs(runs)
     if stored is None:
-        own = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
+        rotor_alone = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
         check_effects(
             replace(runs, planes=runs.planes[1:], weights=runs.weights[:, 1:]),
-            own.W,
-            own.channels(known=True),
+            rotor_alone.W,
+            rotor_alone.channels(known=True),
             fitted.remarks.contradictions,
         )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)

@@ -103,12 +103,12 @@ class WhatIf(Outlook, Answered):
         labels, remarks = self.labels, self.influence.remarks
         scale, unit = labels.vibration_scale, labels.vibration_in
         old = rms(self.before) * scale
-        left, known = f"{three_figures(old)} → {small(rms(self.after) * scale, old)}", " (errors unknown)"
+        left, bound = f"{three_figures(old)} → {small(rms(self.after) * scale, old)}", " (errors unknown)"
         if self.errors_known:
             left += f" ± {figures(self.rms_within * scale, 2)}"
-            known = f", below {three_figures(self.check_rms * scale)} in 95 of 100 check runs"
+            bound = f", below {three_figures(self.check_rms * scale)} in 95 of 100 check runs"
         each = self.work_words(self.planes, self.weights)
-        first = f"{capital(self.word)}: with these weights rms {left} {unit}".rstrip() + f"{known}."
+        first = f"{capital(self.word)}: with these weights rms {left} {unit}".rstrip() + f"{bound}."
         on = f"On the bare rotor: {'; '.join(each) or 'nothing'}; {labels.turning_in_words()}."
         shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
         table = f"{shown}:\n{text(self.columns(), left=2)}"

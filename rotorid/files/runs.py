@@ -189,7 +189,7 @@ def read_runs(
     table = None if grid is None else readings_table(grid, problems, columns)
     if table is None:
         return None, None
-    known = "phase" in table
+    has_phases = "phase" in table
     run, sensor, speed = table.texts("run"), table.texts("sensor"), table.numbers("speed")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start, band = len(problems), conventions.speed_tolerance_percent
@@ -211,7 +211,7 @@ def read_runs(
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
     labels = conventions.labels
     turn = _index(table, runs, labels) if "index" in table and len(problems) == start else None
-    if not len(problems) and known:
+    if not len(problems) and has_phases:
         _ask_about_exchange(table, conventions)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
@@ -241,7 +241,7 @@ def read_runs(
         for name in table.grid.header
         if name.startswith(MOUNTED)
     ]
-    stated = np.moveaxis(covariances(table, vectors), 0, -1) if known and "phase_std" in table else None
+    stated = np.moveaxis(covariances(table, vectors), 0, -1) if has_phases and "phase_std" in table else None
     nothing, noted = np.zeros(len(table)), [blank] if blank else []
     return runs, Trials(
         runs,
@@ -252,10 +252,10 @@ def read_runs(
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
         warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
-        steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if known else nothing])),
+        steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if has_phases else nothing])),
         covariance=None if stated is None else placed(stated),
         index=turn,
-        amplitudes_only=not known,
+        amplitudes_only=not has_phases,
     )
 
 

@@ -74,7 +74,7 @@ def test_a_couple_from_one_trial_run():
     one, both = correct(V), correct(known, planes=["couple"], groups=PAIRS)
     np.testing.assert_allclose(both.weights, one.weights * [1, -1], rtol=1e-9)
     np.testing.assert_allclose(both.after, one.after, rtol=1e-9)
-    np.testing.assert_allclose(both.parts.mass_std, one.mass_std, rtol=0.1)
+    np.testing.assert_allclose(both.parts.mass_std, one.mass_std, rtol=1e-6)
     put = mount(both, known, None, {p: from_list(equal_holes(9), [0.1, 0.3], per_hole=4) for p in "AB"})
     assert 0 < np.linalg.norm(put.weights - both.weights) <= 0.2 * np.linalg.norm(both.weights)
     check = Trials(("c",), V.speeds, V.sensors, of.planes, V.baseline[None], put.weights[None])

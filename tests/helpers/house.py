@@ -22,7 +22,7 @@ CEILINGS = (  # places, units, issue whose end puts it in force; only an issue t
     ("rotorid/identify", 41_500, "25a"),
     ("rotorid/reduction rotorid/motion", 33_500, "25b"),
     ("rotorid/calibration rotorid/waveforms", 12_500, "25c"),
-    ("rotorid/cli rotorid/commands rotorid/report", 49_000, "29"),
+    ("rotorid/cli rotorid/commands rotorid/report", 49_000, "26"),
     ("rotorid/files", 48_700, "29"),
     ("rotorid/worksheet", 12_800, "29"),
     ("rotorid/fleet rotorid/study", 7_000, "28b"),
@@ -33,7 +33,7 @@ CEILINGS = (  # places, units, issue whose end puts it in force; only an issue t
     ("tests", 260_000, "28"),
     ("benchmarks examples docs", 37_500, "22b"),
 )
-RESOLVED = {"22", "22a", "22b", "23", "25a", "25b", "25c", "28", "28b"}
+RESOLVED = {"22", "22a", "22b", "23", "25a", "25b", "25c", "26", "28", "28b"}
 """Issues whose ceilings hold: the one that resolves another adds it here; 28b is what 28 has not reached."""
 
 LAYOUT = (
