@@ -36,6 +36,8 @@ Errors = Callable[[np.random.Generator], tuple[float, float]]
 
 SOURCES = ("stated", "stated, spare runs", "repeats, spare runs", "spare runs", "readings stated, spare")
 """Where the errors come from; in the last the spare runs alone tell of errors between runs."""
+OTHERS = ("drift", "placement")
+"""Further kinds: of all runs in proportion to the time, and of what is mounted."""
 KINDS = ("independent", "half of each", "common at a speed", "common to a run", "further unbalance")
 PHASE = np.deg2rad(2.0) / 0.02
 """Phase error over amplitude error, as they are assumed."""
@@ -45,24 +47,30 @@ GROUPS = {"skew": {"A": 1.0, "C": -0.4j}, "B and C": {"B": 2.0, "C": 0.7 + 0.2j}
 
 
 class Job(NamedTuple):
-    """Runs, the truth (P,), how many real readings the runs have more than unknowns, true coefficients."""
+    """Runs, the truth (P,), how many real readings the runs have more than unknowns, true coefficients.
+
+    `bound`: least standard deviation of the weights that is possible, by Cramér and Rao.
+    """
 
     trials: Trials
     D: ComplexArray
     redundant: int
     W: ComplexArray
+    bound: float = np.nan
 
 
 class Outcome(NamedTuple):
     """Whether the region holds the truth, None for a job refused; its warnings or why it was refused.
 
     `relative`: standard deviation of the worst combination of planes over the root mean square weight.
+    `ratio`: stated standard deviation over the least one.
     """
 
     inside: bool | None
     words: tuple[str, ...]
     redundant: int
     relative: float = np.inf
+    ratio: float = np.nan
 
 
 def normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
@@ -70,16 +78,57 @@ def normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
     return np.asarray(rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
 
 
-def between_runs(rng: np.random.Generator, kind: str, Y: ComplexArray, effect: ComplexArray) -> ComplexArray:
-    """Errors of size 1 of the readings (R, S, C); `effect` (S, C, P) is what the correction does by plane."""
+def of_runs(kind: str, Y: ComplexArray, effect: ComplexArray) -> ComplexArray:
+    """What errors of size 1 of runs do to readings (R, S, C), each by itself: (n, R, S, C).
+
+    `effect` (S, C, P) is what the correction does by plane; the first run of "placement" has no weights.
+    """
     R, S, C = Y.shape
+    runs, speeds, sensors = np.eye(R), np.eye(S), np.eye(C)
     if kind == "further unbalance":  # of each plane
-        return np.asarray(np.einsum("scp,rp->rsc", effect, normal(rng, R, effect.shape[-1])))
-    common = {"common at a speed": (R, S, 1), "independent": (R, S, C)}.get(kind, (R, 1, 1))
-    factor = normal(rng, *common)
+        return np.einsum("nr,scp->nprsc", runs, effect).reshape(-1, R, S, C)
+    if kind == "drift":  # in proportion to the time
+        return np.asarray(np.linspace(0, 1, R)[:, None, None] * Y)[None]
+    if kind == "placement":  # of what is mounted
+        return np.asarray(runs[:, :, None, None] * (Y - Y[0]))
+    whole = runs[:, :, None, None] * Y
+    each = np.einsum("nr,ms,lc,rsc->nmlrsc", runs, speeds, sensors, Y).reshape(-1, R, S, C)
     if kind == "half of each":
-        factor = (factor + normal(rng, R, S, C)) / np.sqrt(2)
-    return np.asarray(factor * Y)
+        return np.concatenate((whole, each)) / np.sqrt(2)
+    if kind == "common at a speed":
+        return np.einsum("nr,ms,rsc->nmrsc", runs, speeds, Y).reshape(-1, R, S, C)
+    return each if kind == "independent" else whole
+
+
+def between_runs(rng: np.random.Generator, kind: str, Y: ComplexArray, effect: ComplexArray) -> ComplexArray:
+    """Drawn errors of size 1 of the readings (R, S, C)."""
+    each = of_runs(kind, Y, effect)
+    return np.asarray(np.tensordot(normal(rng, len(each)), each, 1))
+
+
+def cramer_rao(
+    W: ComplexArray,
+    steps: ComplexArray,
+    errors: tuple[float, float],
+    of_all: ComplexArray,
+    shares: ComplexArray,
+) -> float:
+    """Least standard deviation of the weights, root of the trace, by the true errors.
+
+    `steps` is T − D (R, P); readings err along themselves and across, `of_all` (n, R, S, C) are errors of
+    runs; `shares` (P, G) are what unknown weights have in each plane.
+    """
+    (S, C, P), R = W.shape, len(steps)
+    real = lambda A: np.block([[A.real, -A.imag], [A.imag, A.real]])  # noqa: E731
+    Y = np.einsum("scp,rp->rsc", W, steps).ravel()
+    noise, runs = real(np.diag(Y)), real(of_all.reshape(len(of_all), -1).T)
+    noise = noise * np.repeat(errors, len(Y))
+    of_weights = np.tile(-W.reshape(S * C, P) @ shares, (R, 1))
+    J = np.hstack((of_weights, np.kron(steps, np.eye(S * C))))
+    information = real(J).T @ np.linalg.solve(noise @ noise.T + runs @ runs.T, real(J))
+    G = np.r_[: shares.shape[1], J.shape[1] : J.shape[1] + shares.shape[1]]
+    covariance = np.linalg.inv(information)[np.ix_(G, G)]
+    return float(np.sqrt(np.trace(real(shares) @ covariance @ real(shares).T)))
 
 
 def draw(
@@ -90,18 +139,21 @@ def draw(
     told: float = 1.0,
     trial: float = 0.3,
     shares: ComplexArray | None = None,
+    apart: float | None = None,
 ) -> Job:
     """An ordinary job with errors of a reading and between runs, `told` times as large as stated.
 
-    With `shares` the correction is one of groups, each of size 1.
+    With `shares` the correction is one of groups, each of size 1. Two planes or more may act alike but for
+    the part `apart`.
     """
     reading, run = errors
     tangential = reading * (PHASE if source == "assumed" else 1.0)
-    P = int(rng.integers(1, 5)) if shares is None else len(shares)
+    P = int(rng.integers(2 if apart else 1, 5)) if shares is None else len(shares)
     S, C = int(rng.integers(1, 6)), int(rng.integers(2, 9))
     C = max(C, P // S + 1)
     W = normal(rng, S, C, P)
     W *= np.exp(0.5 * rng.standard_normal((S, 1, 1)) + 0.3 * rng.standard_normal((1, C, 1)))
+    W = W[..., :1] + apart * W if apart else W
     D = normal(rng, P) if shares is None else shares @ normal(rng, shares.shape[1])
     spare = int(rng.integers(1, 5)) if "spare" in source else 0
     planes = [-1, *range(P), *rng.choice([-1, *range(P)], spare)]
@@ -112,10 +164,14 @@ def draw(
             weights[plane] = size * np.exp(2j * np.pi * rng.random())
     Y = np.einsum("scp,rp->rsc", W, T - D)
     effect = W * np.sqrt(np.mean(np.abs(D) ** 2))
+    n = 3 if "repeats" in source else 1
+    of_reading = reading / np.sqrt(n), tangential / np.sqrt(n)
+    of_all = run * of_runs(kind, Y, effect)
+    bound = cramer_rao(W, T - D, of_reading, of_all, np.eye(P) if shares is None else shares)
     Y = Y + run * between_runs(rng, kind, Y, effect)
     floor = np.sqrt(np.mean(np.sum(np.abs(effect) ** 2, axis=-1)))
     scatter = RunScatter(0.0, run / told * floor) if kind == KINDS[-1] else RunScatter(run / told)
-    a, b = rng.standard_normal((2, 3 if "repeats" in source else 1, *Y.shape))
+    a, b = rng.standard_normal((2, n, *Y.shape))
     stated, between = "stated" in source, source in ("stated", "stated, spare runs")
     trials = Trials(
         runs=tuple(f"run {r + 1}" for r in range(len(T))),
@@ -127,7 +183,7 @@ def draw(
         errors=ReadingErrors(reading / told, reading / told) if stated else None,
         run_errors=scatter if between else None,
     )
-    return Job(trials, D, 2 * (S * C * (spare + 1) - P), W)
+    return Job(trials, D, 2 * (S * C * (spare + 1) - P), W, bound)
 
 
 def outcome(job: Job, method: str | None = None, groups: Groups | None = None) -> Outcome:
@@ -139,7 +195,8 @@ def outcome(job: Job, method: str | None = None, groups: Groups | None = None) -
         return Outcome(None, (str(error),), job.redundant)
     size = np.sqrt(np.mean(np.abs(found.weights) ** 2))
     worst = float(np.sqrt(np.linalg.eigvalsh(found.covariance)[-1]) / size)
-    return Outcome(found.region().holds(job.D), found.warnings, job.redundant, worst)
+    ratio = float(np.sqrt(np.trace(found.covariance)) / job.bound)
+    return Outcome(found.region().holds(job.D), found.warnings, job.redundant, worst, ratio)
 
 
 def ordinary(rng: np.random.Generator) -> tuple[float, float]:
@@ -149,11 +206,18 @@ def ordinary(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def simulate(
-    jobs: int, source: str, kind: str, errors: Errors = ordinary, told: float = 1.0, seed: int = 1
+    jobs: int,
+    source: str,
+    kind: str,
+    errors: Errors = ordinary,
+    told: float = 1.0,
+    seed: int = 1,
+    apart: float | None = None,
 ) -> list[Outcome]:
     """So many jobs of a class."""
-    rng = np.random.default_rng([seed, SOURCES.index(source) if source in SOURCES else 9, KINDS.index(kind)])
-    return [outcome(draw(rng, source, kind, errors(rng), told)) for _ in range(jobs)]
+    places = SOURCES.index(source) if source in SOURCES else 9, (*KINDS, *OTHERS).index(kind)
+    rng = np.random.default_rng([seed, *places])
+    return [outcome(draw(rng, source, kind, errors(rng), told, apart=apart)) for _ in range(jobs)]
 
 
 def held_together(jobs: int, kind: str) -> list[Outcome]:
@@ -171,13 +235,15 @@ def every_kind(
 
 
 def line(name: str, found: Iterable[Outcome]) -> str:
-    """Coverage of the regions of jobs without and with a warning, and how many there are."""
+    """Coverage of the regions of jobs without and with a warning, how many there are, ± over the least."""
     found = list(found)
     answered = [one for one in found if one.inside is not None]
+    ratios = [one.ratio for one in answered if np.isfinite(one.ratio)]
+    ratio = f"{np.median(ratios):9.2f}" if ratios else ""
     silent, warned = [[one.inside for one in answered if bool(one.words) == said] for said in (False, True)]
     return (
         f"{name:<44}{percent(silent):>6} of {len(silent):5d}{percent(warned):>9} of {len(warned):4d}"
-        f"{len(found) - len(answered):9d}"
+        f"{len(found) - len(answered):9d}{ratio}"
     )
 
 
@@ -194,7 +260,7 @@ def percent(values: Sequence[Any]) -> str:
 
 def main(jobs: int = 2500) -> None:
     """Print the tables."""
-    head = f"{'':<44}{'silent':>15}{'warned':>17}{'refused':>9}"
+    head = f"{'':<44}{'silent':>15}{'warned':>17}{'refused':>9}{'±/C–R':>9}"
     print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
     each = -(-jobs // (len(SOURCES) * len(KINDS)))
     cells = {(source, kind): simulate(each, source, kind) for source in SOURCES for kind in KINDS}
@@ -229,6 +295,17 @@ def main(jobs: int = 2500) -> None:
 
     print(f"\ne. Weights of three planes that two groups hold together; errors stated\n{head}")
     print(line("all", [one for kind in KINDS for one in held_together(jobs // 5, kind)]))
+
+    print(f"\nf. Errors of other kinds, stated as of runs, and planes that act alike but for a tenth\n{head}")
+    for name, source, kind, apart in (
+        ("drift of all runs", SOURCES[0], "drift", None),
+        ("drift of all runs, spare runs", SOURCES[3], "drift", None),
+        ("weights misplaced", SOURCES[0], "placement", None),
+        ("weights misplaced, spare runs", SOURCES[3], "placement", None),
+        ("planes nearly alike", SOURCES[0], KINDS[1], 0.1),
+        ("planes nearly alike, spare runs", SOURCES[3], KINDS[1], 0.1),
+    ):
+        print(line(name, simulate(jobs * 2 // 5, source, kind, apart=apart)))
 
 
 def assumed(times: float) -> tuple[float, float]:

@@ -1,8 +1,8 @@
 """Are the intervals of an identification honest? Simulated repetitions of tests whose truth is known.
 
 Run `python tests/coverage/coverage_identify.py [repetitions]`. For each case, method and parameter it prints
-the share of 95 % intervals that contain the truth, the bias in standard deviations and the relative standard
-deviation.
+the share of 95 % intervals that contain the truth, the bias in standard deviations, the relative standard
+deviation, and the median width of the intervals over that by Cramér and Rao.
 """
 
 from __future__ import annotations
@@ -99,11 +99,12 @@ def readings(
 
 @dataclass(frozen=True)
 class Figures:
-    """Shares of intervals with the truth, bias in standard deviations, relative standard deviations."""
+    """Shares of intervals with the truth, bias in standard deviations, relative ones, widths."""
 
     coverage: FloatArray
     bias: FloatArray
     spread: FloatArray
+    width: FloatArray
 
 
 def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, seed: int = 1) -> Figures:
@@ -114,34 +115,39 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True, se
     """
     rng = np.random.default_rng(seed)
     truth = np.array(list(case.truth.values()))
-    values, inside = np.zeros((repetitions, len(truth))), np.zeros((repetitions, len(truth)))
+    values, reach = np.zeros((repetitions, len(truth))), np.zeros((repetitions, len(truth)))
     for i in range(repetitions):
         data = simulate(case, rng, stated=stated)
         if method == "output-error":
             found = identify(case.model, data, start=dict(case.truth))
-            values[i], reach = found.values, np.ptp(found.ci95, axis=1) / 2
+            values[i], reach[i] = found.values, np.ptp(found.ci95, axis=1) / 2
         else:
             fit = linear_fit(case.model, build_rows(case.model, data))
             values[i] = fit.recovery.values
             std = np.sqrt(np.diag(fit.recovery.gain @ fit.system.covariance @ fit.recovery.gain.T))
-            reach = std * (ndtri(0.975) if stated else stdtrit(fit.estimate.dof, 0.975))
-        inside[i] = np.abs(values[i] - truth) <= reach
-    std = values.std(axis=0)
-    return Figures(inside.mean(axis=0), (values.mean(axis=0) - truth) / std, std / np.abs(truth))
+            reach[i] = std * (ndtri(0.975) if stated else stdtrit(fit.estimate.dof, 0.975))
+    exact = readings(case.model, truth.tolist(), case.frequencies, case.inputs, stated=case.errors)
+    least = np.ptp(identify(case.model, exact, start=dict(case.truth)).ci95, axis=1) / 2
+    std, inside = values.std(axis=0), np.abs(values - truth) <= reach
+    bias = (values.mean(axis=0) - truth) / std
+    return Figures(inside.mean(axis=0), bias, std / np.abs(truth), np.median(reach, axis=0) / least)
 
 
 def main(repetitions: int = 2000) -> None:
     """Print the table."""
-    print(f"{repetitions} repetitions; coverage of 95 % intervals, bias / std, std / |value|")
+    print(f"{repetitions} repetitions; coverage of 95 % intervals, bias / std, std / |value|, ± / Cramér–Rao")
     for case in (task_5_1(), two_masses(), near_resonance()):
         print(f"\n{case.title}")
         for method in ("equation-error", "output-error"):
             for stated in (True, False):
                 found = repeat(case, method, repetitions, stated=stated)
                 words = f"{method}, errors {'stated' if stated else 'not stated'}"
-                for row in zip(case.truth, found.coverage, found.bias, found.spread, strict=True):
-                    name, share, bias, spread = row
-                    print(f"  {words:<34} {name:<3} {share:6.1%}  bias {bias:+6.3f}  std {spread:7.2%}")
+                columns = found.coverage, found.bias, found.spread, found.width
+                for name, share, bias, spread, width in zip(case.truth, *columns, strict=True):
+                    print(
+                        f"  {words:<34} {name:<3} {share:6.1%}  bias {bias:+6.3f}  std {spread:7.2%}"
+                        f"  ±/C–R {width:.2f}"
+                    )
                     words = ""
 
 

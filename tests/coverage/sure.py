@@ -16,10 +16,12 @@ PROGRAMS = {
     "balance": ("coverage_balance.py", 2500),
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
-    "identify": ("coverage_identify.py", 500),
+    "fits": ("coverage_fits.py", 1000),
+    "identify": ("coverage_identify.py", 1000),
     "special": ("coverage_special.py", 1000),
     "without phase": ("coverage_without_phase.py", 1000),
-    "runup": ("coverage_runup.py", 1, 200),
+    "runup": ("coverage_runup.py", 1, 250),
+    "vectors": ("coverage_vectors.py", 10),
     "what_if": ("coverage_what_if.py", 200),
 }
 """Program and arguments of each table: half an hour in all on two cores."""
