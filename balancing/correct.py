@@ -25,12 +25,12 @@ from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
+from balancing.what_if import DRAWS, check_run_spread
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.regression import stretch
 
 EMPTY = 1e-7
 """Effect of a weight, relative to the vibration, below which it is none."""
-DRAWS = 400
 
 
 def correct(  # noqa: PLR0913
@@ -133,13 +133,15 @@ def correct(  # noqa: PLR0913
     D = fitted.weights
     if kept is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
-    draws, after_covariance, check_rms = _drawn(part, fitted, D)
+    after_covariance, sizes = check_run_spread(part, D)
+    drawn = (fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws(DRAWS))
+    draws = np.concatenate([np.zeros((0, len(D)), dtype=complex), *drawn])
     result = Correction(
         influence=part,
         weights=D,
-        draws=draws,
+        draws=draws[np.isfinite(draws).all(axis=1)],
         after_covariance=after_covariance,
-        check_rms=check_rms,
+        check_rms=float(np.quantile(sizes, LEVEL)),
         mounted=today.mounted,
         conditioning=conditioning(W[counts], part.planes),
         fitted=fitted,
@@ -235,30 +237,6 @@ def _explained(part: Influence, D: ComplexArray) -> bool:
 
     drawn = np.concatenate([left(block) for block in part.noise_draws(noise, DRAWS)])
     return bool(left((part.baseline + part.W @ D)[None, ..., None])[0] <= np.quantile(drawn, LEVEL))
-
-
-def _drawn(part: Influence, fitted: Solution, D: ComplexArray) -> tuple[ComplexArray, FloatArray, float]:
-    """Weights of every draw (n, P), covariance (S, C, 2, 2) of a check run, and the rms that 95 % stay below.
-
-    Where errors are unknown there are no draws; the others are NaN.
-    """
-    S, C, P = part.W.shape
-    after = part.baseline + part.W @ D
-    weights, sizes = [], []
-    squares = np.zeros((S, C, 2, 2))
-    further = part.further(after, D, DRAWS)
-    for (Y, W), more in zip(part.draws(DRAWS), further, strict=False):
-        n = len(Y)
-        weights.append(fitted.resolve(W.reshape(n, S * C, P), Y.reshape(n, S * C)))
-        read = Y + W @ D + more
-        sizes.append(np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2))))
-        error = real_parts((read - after)[..., None])
-        squares += np.einsum("nsci,nscj->scij", error, error)
-    if not sizes:
-        return np.zeros((0, P), dtype=complex), np.full((S, C, 2, 2), np.nan), float("nan")
-    solved = np.concatenate(weights)
-    bound = float(np.quantile(np.concatenate(sizes), LEVEL))
-    return solved[np.isfinite(solved).all(axis=1)], squares / DRAWS, bound
 
 
 def _rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:

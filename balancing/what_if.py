@@ -171,20 +171,15 @@ def what_if(
         D[plane_indices(today, list(weights))] = list(weights.values())
     used = range(len(today.speeds)) if speeds is None else match_speeds(speeds, today.speeds)
     part = today.part(used)
-    off = check_readings(part, D)
-    after, before = part.baseline + part.W @ D, rms(part.baseline)
-    word: Word = "not judged"
-    width = bound = np.nan
-    if len(off):
-        sizes = np.sqrt(np.mean(np.abs(after + off) ** 2, axis=(1, 2)))
-        low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL))
-        word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
-        width = float(half_width(sizes - rms(after)))
+    (covariance, sizes), before = check_run_spread(part, D), rms(part.baseline)
+    low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL)).tolist()
+    width = float(half_width(sizes - rms(part.baseline + part.W @ D)))
+    word: Word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
     removed = tuple(plane for plane in today.planes if plane in remove)
-    parts, n = real_parts(off[..., None]), len(off)
-    V = np.einsum("nsci,nscj->scij", parts, parts) / n if n else np.full((*after.shape, 2, 2), np.nan)
     worse = worse_elsewhere(today, D, part.speeds)
-    return WhatIf(part, D, V, float(bound), width, word, worse, remove=removed)
+    return WhatIf(
+        part, D, covariance, bound, width, "not judged" if np.isnan(bound) else word, worse, remove=removed
+    )
 
 
 def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
@@ -193,6 +188,15 @@ def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
     each = zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False)
     off = [Y + W @ weights + more - after for (Y, W), more in each]
     return np.concatenate([np.zeros((0, *after.shape), dtype=complex), *off])
+
+
+def check_run_spread(influence: Influence, weights: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN where errors are unknown."""
+    off = check_readings(influence, weights)
+    off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
+    read, parts = influence.baseline + influence.W @ weights + off, real_parts(off[..., None])
+    covariance = np.einsum("nsci,nscj->scij", parts, parts) / len(off)
+    return covariance, np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2)))
 
 
 def worse_elsewhere(today: Influence, weights: ComplexArray, used: FloatArray) -> tuple[str, ...]:
