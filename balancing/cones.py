@@ -107,8 +107,7 @@ def solution_and_rank(A: ComplexArray, y: ComplexArray) -> tuple[ComplexArray, i
 def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
     """Limits of a job for its equations, none where there are none."""
     N, P = W.shape
-    if limits is None:
-        return Bounds(W, Y, np.full(N, np.inf), np.full(P, np.inf), (None,) * P)
+    limits = limits or Limits.none(1, N, P)
     if limits.residual.size != N or len(limits.max_weight) != P:
         raise ValueError(
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
@@ -174,9 +173,6 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
 
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
     """Whether weights are within every limit."""
-    anywhere = all(sectors is None for sectors in bounds.sectors)
-    if anywhere and min(bounds.max_weight.min(initial=np.inf), bounds.residual.min()) == np.inf:
-        return True
     return bool(
         (np.abs(weights) <= bounds.max_weight).all()
         and (np.abs(bounds.Y + bounds.W @ weights) <= bounds.residual).all()

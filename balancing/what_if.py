@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 DRAWS = 400
 BETTER = 0.9
 """Of the rms of the bare rotor: what 95 of 100 check runs must stay below."""
-FEW = 6
-"""Readings that are shown in one table."""
 RISES = 0.1
 """Of the largest reading: a smaller rise is not worth a word."""
 ROTORS = 2000
@@ -113,13 +111,12 @@ class WhatIf(Outlook, Answered):
         shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
         table = f"{shown}:\n{text(self.columns(), left=2)}"
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.after, self.within)
-        few = self.before.size <= FEW
         return Answer(
             "\n".join((first, *self.worse)),
-            f"{on}\n{table if few else f'Largest{largest}'}",
+            f"{on}\nLargest{largest}",
             remarks.warnings,
             remarks.notes,
-            () if few else (table,),
+            (table,),
             "every reading",
             to_mount=True,
         )
