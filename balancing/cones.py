@@ -21,8 +21,7 @@ import numpy as np
 from balancing.trials import Arc, Limits
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.regression import RCOND, stretch, unstretch
-from rotorid.regression.estimate import unit_columns
+from rotorid.regression import solution, stretch, unstretch
 
 Sectors = tuple[Arc, ...] | None
 """Convex arcs (width ≤ π) where a weight may stand; None: anywhere."""
@@ -95,13 +94,6 @@ class _Goal(NamedTuple):
     shares: FloatArray
     objective: Callable[[ComplexArray], float]
     bound: Callable[[float], float]
-
-
-def solution_and_rank(A: ComplexArray, y: ComplexArray) -> tuple[ComplexArray, int]:
-    """Least squares of A x = y, (P,), and the rank of A with columns of length 1, by one decomposition."""
-    unit, size = unit_columns(A)
-    x, _, rank, _ = np.linalg.lstsq(unit, y, RCOND)
-    return np.asarray(x / size, dtype=complex), int(rank)
 
 
 def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
@@ -264,7 +256,7 @@ def _levelled(rows: ComplexArray, right: ComplexArray) -> ComplexArray:
         counts = counts / counts.max(initial=TINY) + 1e-8
         weighed = counts * Q.conj().T
         x = np.linalg.solve(weighed @ Q, -(weighed @ right))
-    return solution_and_rank(R, x)[0]
+    return np.asarray(solution(R, x))
 
 
 def _best(bounds: Bounds, goal: _Goal, tolerance: float) -> Optimum:

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
+from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
 from balancing.cones import AT_LIMIT, Bounds, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
@@ -117,13 +117,13 @@ def correct(  # noqa: PLR0913
         result = _in_planes(result, grouped, today.part(used, None, chosen), kept)
         return replace(result, mounted=today.mounted, remove=tuple(p for p in grouped.planes if p in remove))
     part = today.part(used, None, chosen)
-    W, Y = part.W.reshape(-1, len(chosen)), part.baseline.ravel()
+    given = None if row_weights is None else np.broadcast_to(row_weights, today.W.shape[:2])[used].ravel()
+    W, Y, counting = check_stack(part.W.reshape(-1, len(chosen)), part.baseline.ravel(), given)
+    rows, counts = None if np.ptp(counting) == 0 else counting / counting.max(), counting > 0
     if not Y.any():
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
-    rows = _rows_of(row_weights, today.W.shape[:2], used)
-    counts = np.ones(len(Y), dtype=bool) if rows is None else rows > 0
     kept = None if limits is None else limits.pick(used, chosen)
     if kept is not None and not kept.any:
         kept = None
@@ -237,24 +237,3 @@ def _explained(part: Influence, D: ComplexArray) -> bool:
 
     drawn = np.concatenate([left(block) for block in part.noise_draws(noise, DRAWS)])
     return bool(left((part.baseline + part.W @ D)[None, ..., None])[0] <= np.quantile(drawn, LEVEL))
-
-
-def _rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
-    """Weights of the readings at the speeds used, relative to the largest; None where all are alike.
-
-    Raises
-    ------
-    ValueError
-        Another shape than (speeds, sensors), weights below 0, and where nothing is left.
-    """
-    if given is None:
-        return None
-    weights = np.asarray(given, dtype=np.float64)
-    if weights.shape != shape or not (weights >= 0).all():
-        raise ValueError(
-            f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
-        )
-    chosen = weights[used].ravel()
-    if not chosen.any():
-        raise ValueError("all readings have the weight 0: nothing is left to be minimised")
-    return None if (chosen == chosen[0]).all() else chosen / chosen.max()

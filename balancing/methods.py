@@ -45,7 +45,6 @@ from balancing.cones import (
     explain,
     nearest,
     smallest_maximum,
-    solution_and_rank,
     within,
 )
 from balancing.regions import real_parts
@@ -260,10 +259,9 @@ def solve(  # noqa: PLR0913
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
-    weights, rank = solution_and_rank(A, -job.w * job.Y)
-    if rank < A.shape[1]:
+    if A.size:
         check_planes(A[job.w > 0], job.planes)
-    return weights
+    return np.asarray(-solution(A, job.w * job.Y))
 
 
 def _fit_plain(job: Job) -> Solution:
