@@ -15,19 +15,19 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.check_run import whitened
 from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
-from balancing.cones import AT_LIMIT, Bounds, explain
+from balancing.cones import AT_LIMIT, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
 from balancing.groups import Groups, Unknowns, mapped, unknowns
-from balancing.influence import Influence, Whitening, match_speeds, plane_indices
+from balancing.influence import Influence, match_speeds, plane_indices
 from balancing.methods import NoErrorsError, Solution, solve
-from balancing.regions import LEVEL, real_parts
+from balancing.regions import LEVEL
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
 from balancing.what_if import DRAWS, check_run_spread
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.regression import stretch
 
 EMPTY = 1e-7
 """Effect of a weight, relative to the vibration, below which it is none."""
@@ -192,29 +192,29 @@ def fit_part(
     strength: float | None = None,
 ) -> tuple[Solution, str]:
     """Weights, and the method that they follow from; least squares where errors are assumed or hardly any."""
-    errors, N = part.known_errors, part.baseline.size
+    errors = part.known_errors
     asked = method or ("weighted" if errors and strength is None else "least-squares")
 
-    def conflict(bounds: Bounds) -> str:
-        labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
-        return explain(bounds, part.planes, readings, labels.amplitude_words, labels.weight_words)
-
-    def by(name: str) -> Solution:
-        P = len(part.planes)
-        return solve(
-            part.W.reshape(N, P),
-            part.baseline.ravel(),
-            name,
-            channels=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if errors else None,
-            columns=part.columns().reshape(-1, N, P + 1) if errors else None,
-            row_weights=rows,
-            limits=limits,
-            strength=strength,
-            names=part.planes,
-            conflict=conflict,
-            explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
-        )
-
+    labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
+    by = partial(
+        solve,
+        part.W.reshape(part.baseline.size, -1),
+        part.baseline.ravel(),
+        channels=part.channels() if errors else None,
+        columns=part.columns() if errors else None,
+        row_weights=rows,
+        limits=limits,
+        strength=strength,
+        names=part.planes,
+        conflict=partial(
+            explain,
+            planes=part.planes,
+            readings=readings,
+            amplitude=labels.amplitude_words,
+            weight=labels.weight_words,
+        ),
+        explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
+    )
     try:
         return by(asked), asked
     except (UndeterminedError, NoErrorsError) as error:
@@ -226,14 +226,9 @@ def fit_part(
 
 def _explained(part: Influence, D: ComplexArray) -> bool:
     """Whether what is left of Y₀ + W D, free of other weights, is within what 95 % of the draws leave."""
-    S, C, P = part.W.shape
     noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
-    whitening = Whitening(noise, part.errors.sizes)
-    basis = np.linalg.qr(whitening.white(stretch(part.W.reshape(S * C, 1, P)).reshape(S, C, 2, 2 * P)))[0]
-
-    def left(errors: ComplexArray) -> FloatArray:
-        white = whitening.white(np.moveaxis(real_parts(errors), 0, -1))
-        return np.asarray(np.sum(white**2, axis=0) - np.sum((basis.T @ white) ** 2, axis=0))
-
-    drawn = np.concatenate([left(block) for block in part.noise_draws(noise, DRAWS)])
-    return bool(left((part.baseline + part.W @ D)[None, ..., None])[0] <= np.quantile(drawn, LEVEL))
+    effects = (z * W[None] for W in np.moveaxis(part.W, -1, 0) for z in (1, 1j))
+    rest, *columns, drawn = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)
+    basis = np.linalg.qr(np.column_stack(columns))[0]
+    left, usual = (np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (rest, drawn))
+    return bool(left <= np.quantile(usual, LEVEL))

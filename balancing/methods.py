@@ -414,8 +414,6 @@ def _fit_weighted(job: Job) -> Solution:
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
     if not len(start):
         return _fit_plain(job)
-    from scipy.optimize import newton
-
     common = np.moveaxis(real_parts(job.columns[:, on]), 0, 2)
     errors = _Errors(job.W[on], job.Y[on], job.channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
     B, D, dof = stretch([[1.0, *start]]), start, 2 * int(on.sum() - len(start))
@@ -442,9 +440,12 @@ def _fit_weighted(job: Job) -> Solution:
     explained = job.explained or (lambda _: chance(chi, dof) >= 1 - UNEXPLAINED)
     if chi > dof > 0 and not explained(D):
         D = start
-        # 1/χ² is nearly linear in the share
-        miss, more = (lambda share: 1 / least(max(share, 0.0)) - 1 / dof), chi / dof - 1
-        share = max(newton(miss, 0.0, x1=more, tol=1e-12, rtol=1e-8, disp=False), 0.0)
+        before, share = 0.0, chi / dof - 1
+        for _ in range(50):  # by secants, since 1/χ² is nearly linear in the share
+            miss, last = (1 / least(at) - 1 / dof for at in (share, before))
+            before, share = share, max(share - miss * (share - before) / (miss - last), 0.0)
+            if abs(share - before) <= 1e-8 * share:
+                break
         D = wider(share).minimum(D)
     wide = wider(share)
     if not within(bounds, D):
