@@ -166,8 +166,8 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
     raise UndeterminedError(words)
 
 
-def check_planes(W: ComplexArray, planes: Sequence[str]) -> Conditioning:
-    """What the readings W (N, P) tell of the planes, if they tell them apart.
+def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
+    """Refuse planes that the readings W (N, P) do not tell apart.
 
     Raises
     ------
@@ -185,7 +185,6 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> Conditioning:
         raise UndeterminedError(f"plane {planes[int(p)]!r} has no effect on any reading: leave it out")
     if lost := apart.undetermined:
         raise UndeterminedError(alike_words(W, lost, planes) + REMEDY)
-    return apart
 
 
 def check_stack(

@@ -20,7 +20,7 @@ from balancing.conditioning import UndeterminedError, check_planes, check_stack,
 from balancing.cones import AT_LIMIT, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
-from balancing.groups import Groups, Unknowns, mapped, unknowns
+from balancing.groups import Groups, mapped, unknowns
 from balancing.influence import Influence, match_speeds, plane_indices
 from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL
@@ -113,9 +113,20 @@ def correct(  # noqa: PLR0913
             row_weights=row_weights,
             strength=strength,
         )
-        kept = None if result.limits is None or limits is None else limits.pick(used, chosen)
-        result = _in_planes(result, grouped, today.part(used, None, chosen), kept)
-        return replace(result, mounted=today.mounted, remove=tuple(p for p in grouped.planes if p in remove))
+        kept = None if limits is None else limits.pick(used, chosen)
+        D, most = grouped.shares @ result.weights, np.inf if kept is None else kept.max_weight
+        heavy = np.abs(D) >= (1 - AT_LIMIT) * most
+        return replace(
+            result,
+            influence=today.part(used, None, chosen),
+            weights=D,
+            draws=result.draws @ grouped.shares.T,
+            fitted=replace(result.fitted, weights=D, active_weights=heavy),
+            limits=None if result.limits is None else kept,
+            mounted=today.mounted,
+            remove=tuple(p for p in grouped.planes if p in remove),
+            unknowns=grouped,
+        )
     part = today.part(used, None, chosen)
     given = None if row_weights is None else np.broadcast_to(row_weights, today.W.shape[:2])[used].ravel()
     W, Y, counting = check_stack(part.W.reshape(-1, len(chosen)), part.baseline.ravel(), given)
@@ -154,15 +165,6 @@ def correct(  # noqa: PLR0913
     if not result.told_apart:
         unclear = unclear or _alike(case, counts, stated=False)
     return replace(result, decision=decide(result, case, unclear, limits))
-
-
-def _in_planes(result: Correction, of: Unknowns, part: Influence, limits: Limits | None) -> Correction:
-    """A correction of unknowns as one of the planes that they put weights into."""
-    D = of.shares @ result.weights
-    most = np.full(len(D), np.inf) if limits is None else limits.max_weight
-    fitted = replace(result.fitted, weights=D, active_weights=np.abs(D) >= (1 - AT_LIMIT) * most)
-    draws = result.draws @ of.shares.T
-    return replace(result, influence=part, weights=D, draws=draws, fitted=fitted, limits=limits, unknowns=of)
 
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:

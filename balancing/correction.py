@@ -406,5 +406,5 @@ class Correction(Prediction, Answered):
 def _angle_width(half: float) -> str:
     """Half width of an angle's interval, degrees, in words."""
     if np.isnan(half):
-        return "angle not determined"
+        return "(angle not determined)"
     return "held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°"

@@ -24,9 +24,8 @@ further error, alike for all, such that χ² equals its degrees of freedom.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
-from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,7 +119,7 @@ class Solution:
 
 
 class Job(NamedTuple):
-    """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes that may carry a weight.
+    """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes.
 
     `channels` and `columns` as of `solve`, (N, 2P + 2, 2P + 2) and (M, N, P + 1); `explained` asks whether
     errors alone may leave what weights leave; None: by χ².
@@ -225,42 +224,29 @@ def solve(  # noqa: PLR0913
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
     planes = names or [str(p + 1) for p in range(P)]
-    if len(planes) != P:
-        raise ValueError(f"{P} planes need as many names")
     bounds, n = bounds_of(K, y, limits), 2 * P + 2
     channels = np.zeros((N, n, n)) if channels is None else channels.reshape(N, n, n)
     columns = np.zeros((0, N, P + 1), complex) if columns is None else columns.reshape(-1, N, P + 1)
+    job = Job(method, K, y, w, bounds, planes, channels, columns, explained)
     if strength is not None:
         if method != "least-squares" or limits is not None or not 0 < strength < np.inf:
             raise ValueError(
                 f"a ridge has a strength above 0, such as 0.05 (got {strength!r}), and goes with least "
                 "squares without limits only"
             )
-        job = Job(method, K, y, w, bounds, planes, channels, columns)
         return job.fitted(_normal(K, y, w, strength), lambda W, _: np.nan * W[:, 0])
-    used = bounds.used
-    whole, theta = np.eye(P)[used], np.append(True, used)
-    real = np.repeat(theta, 2)
-    asked = None if explained is None else lambda D: explained(D @ whole)
-    names = list(compress(planes, used))
-    errors = channels[:, real][..., real], columns[..., theta]
+    if () in bounds.sectors:
+        raise ValueError(f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out")
     try:
-        fitted = function(Job(method, K[:, used], y, w, bounds.part(used), names, *errors, asked))
+        return function(job)
     except InfeasibleError:
         raise InfeasibleError(conflict(bounds)) from None
-    return replace(
-        fitted,
-        weights=fitted.weights @ whole,
-        active_weights=(bounds.max_weight == 0) | (fitted.active_weights @ whole > 0),
-        resolve=lambda W, Y: fitted.resolve(W[..., used], Y) @ whole,
-    )
 
 
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
-    if A.size:
-        check_planes(A[job.w > 0], job.planes)
+    check_planes(A[job.w > 0], job.planes)
     return np.asarray(-solution(A, job.w * job.Y))
 
 
@@ -268,7 +254,7 @@ def _fit_plain(job: Job) -> Solution:
     best, minmax = _closed_form(job), job.method == "minmax"
 
     def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
-        if minmax or not len(target):
+        if minmax:
             return smallest_maximum(bounds, job.w, tolerance)
         root = stretch(np.linalg.qr(job.w[:, None] * bounds.W)[1])
         left = float(np.linalg.norm(job.w * (bounds.Y + bounds.W @ target)))
@@ -412,8 +398,6 @@ class _Errors(NamedTuple):
 
 def _fit_weighted(job: Job) -> Solution:
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
-    if not len(start):
-        return _fit_plain(job)
     common = np.moveaxis(real_parts(job.columns[:, on]), 0, 2)
     errors = _Errors(job.W[on], job.Y[on], job.channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
     B, D, dof = stretch([[1.0, *start]]), start, 2 * int(on.sum() - len(start))

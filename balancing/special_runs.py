@@ -29,6 +29,7 @@ import numpy as np
 from balancing.conditioning import UndeterminedError, check_effects, check_runs
 from balancing.correct import correct
 from balancing.correction import Correction
+from balancing.groups import mapped
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
 from balancing.tables import three_figures
@@ -102,27 +103,22 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             fitted.remarks.contradictions,
         )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
-    P = len(planes)
-    on = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
+    P, labels = len(planes), (stored or fitted).labels
+    shares = np.eye(len(runs.planes), 1 + P)[:, 1:].astype(complex)
 
-    def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
+    def part(*first: float) -> Influence:
         """The coefficients with this combination of Y₀ and R as baseline."""
-        change = np.zeros((P + 1, fitted.W.shape[-1] + 1), dtype=complex)
-        change[0, :2] = combination
-        if stored is None:
-            change[1:, 2:] = np.eye(P)
-        noise = fitted.errors.noise.changed(change)
+        of = mapped(fitted, planes, shares, first)
+        noise, on = of.errors.noise, trials.weights[-1]
         if stored is not None:
-            noise = noise.plus(stored.errors.noise.changed(np.diag([0.0, *np.ones(P)]).astype(complex)))
-        mounted = Mounted(trials.runs[-1], planes, on)
-        errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
-        labels = (stored or fitted).labels
-        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, labels=labels)
+            noise, on = noise.plus(stored.errors.noise.changed(np.diag([0.0] + P * [1.0]))), np.zeros(P)
+        errors = of.errors._replace(noise=noise, mounted=Mounted(trials.runs[-1], planes, on), trials=trials)
+        return replace(of, W=W, errors=errors, labels=labels)
 
-    R = fitted.W[..., 0]
-    A = fitted.baseline - R
-    least = 0.0 if A.any() else 1e-12 * np.abs(R).max()  # a correction of nothing at all is refused
-    return RotorAndArbor(part((0, 1), R), part((1, -1), A + least))
+    rotor, arbor = part(0.0, 1.0), part(1.0, -1.0)
+    if not arbor.baseline.any():  # a correction of nothing at all is refused
+        arbor = replace(arbor, baseline=arbor.baseline + 1e-12 * np.abs(rotor.baseline).max())
+    return RotorAndArbor(rotor, arbor)
 
 
 def machine_influence(trials: Trials) -> Influence:

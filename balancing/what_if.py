@@ -267,9 +267,9 @@ def mode_made_worse(
     common = np.vdot(here, there)
     if abs(common) < AGREES * np.linalg.norm(here) * np.linalg.norm(there) or not outlook.weights.any():
         return ()
-    W = W * common / np.linalg.norm(here) ** 2
-    A, b, y = W[:-1].reshape(-1, count), W[-1], outlook.before.ravel()
-    added = planes[-1] @ outlook.weights * common / np.linalg.norm(here) ** 2
+    scale = common / np.linalg.norm(here) ** 2
+    A, b, y = scale * W[:-1].reshape(-1, count), scale * W[-1], outlook.before.ravel()
+    added = scale * planes[-1] @ outlook.weights
     rng = np.random.default_rng(0)
     u = rng.standard_normal((ROTORS, count, 2)) @ [1, 1j] * np.linalg.norm(y) / np.linalg.norm(A)
     u = u / np.sqrt(rng.chisquare(2, (ROTORS, 1)))
