@@ -156,8 +156,6 @@ def best_weights(x: FloatArray, weights: FloatArray, largest: FloatArray | float
 def _together(minima: Sequence[Minimum], weights: FloatArray) -> tuple[float, float]:
     """Misfit of minima of the first readings, and how far in errors one weight is from leaving nothing."""
     misfit, x = sum(one.chi_square for one in minima), np.array([one.parameters for one in minima])
-    if 2 * len(minima) < x.shape[1]:
-        return misfit, 0.0
     D = best_weights(x[None], weights[: len(x)])[0]
     draws = np.array([one.draws for one in minima])
     left = real_parts((x[:, 0] + effects(x) @ D)[:, None])

@@ -288,7 +288,7 @@ def compare_check(
         covariance = np.einsum("scrarb->rscab", V.reshape(S, C, R, 2, R, 2))
         d = real_parts(difference[..., None])
         distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
-        target, drawn = _white(part, noise, difference)
+        target, drawn = whitened(part, noise, difference)
         chi_square = float(np.sum(target**2))
         probability = (1 + np.count_nonzero(np.sum(drawn**2, axis=0) >= chi_square)) / (1 + DRAWS)
         explained = bool(probability >= 1 - LEVEL)
@@ -315,7 +315,7 @@ def compare_check(
     )
 
 
-def _white(part: Influence, noise: Noise, *differences: ComplexArray) -> list[FloatArray]:
+def whitened(part: Influence, noise: Noise, *differences: ComplexArray) -> list[FloatArray]:
     """Differences (R, S, C) and draws of their noise divided by its size: (n,) each, and (n, DRAWS)."""
     white = Whitening(noise, part.errors.sizes)
     each = [white.white(real_parts(np.moveaxis(one, 0, -1))[..., None])[:, 0] for one in differences]
@@ -337,7 +337,7 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
         change = np.zeros(P, dtype=complex)
         for _ in range(2):  # errors depend on what is mounted
             noise = part.difference_noise(replace(check, weights=check.weights + change))
-            target, *columns, drawn = _white(part, noise, difference, *effects)
+            target, *columns, drawn = whitened(part, noise, difference, *effects)
             A = np.column_stack(columns)
             change[planes] = unstretch(solution(A, target, rcond=1e-10))
         basis = np.linalg.qr(A)[0]

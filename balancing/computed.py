@@ -32,12 +32,14 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
 from balancing.conventions import Labels
+from balancing.groups import mapped
 from balancing.influence import (
     Influence,
     Remarks,
     match_speeds,
 )
 from balancing.noise import Gaussian
+from balancing.regions import mean_variances
 from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm_text
 
@@ -189,37 +191,28 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         raise ValueError(f"there are no computed coefficients of sensor {', '.join(map(repr, lacking))}")
     computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
-    sides = []
-    for side in (measured, computed):
-        change = np.zeros((len(planes) + 1, len(side.planes) + 1), dtype=complex)
-        change[[0, *(1 + planes.index(name) for name in side.planes)], range(len(side.planes) + 1)] = 1
-        noise = side.errors.noise.changed(change)
-        parts = np.einsum("scii->sci", noise.covariance(side.errors.sizes))[..., 2:]
-        variance = parts.reshape(*parts.shape[:2], -1, 2).mean(axis=-1)
-        sides.append((side.W @ change[1:, 1:].T, noise, variance, change[1:, 1:].any(axis=1)))
-    (W, one, v, first), (model, other, u, second) = sides
+    first, second = (np.isin(planes, side.planes) for side in (measured, computed))
+    one, other = (
+        mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed)
+    )
+    v, u = (mean_variances(side.channels())[..., 1:] for side in (one, other))
     both, total = first & second, np.maximum(v + u, 1e-300)
     share = np.where(both, u / total, first)
-    whole = np.concatenate((np.ones((*share.shape[:2], 1)), share), axis=-1)
-    shares = whole[..., None] * np.eye(len(planes) + 1, dtype=complex)
-    chi = both * np.abs(W - model) ** 2 / total
+    parts = np.eye(len(planes) + 1) * np.insert(share, 0, 1.0, axis=-1)[..., None]
+    chi = both * np.abs(one.W - other.W) ** 2 / total
     warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))
     # each two degrees of freedom, and so many chances
-    if both.sum() * W[..., 0].size * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
+    if both.sum() * one.baseline.size * chance(float(chi[s, c, p]), 2) < 1 - LEVEL:
         warnings += (
             f"measured and computed coefficient of plane {planes[p]!r} at sensor {measured.sensors[c]!r}, "
             f"{rpm_text(measured.speeds[s])}, differ by {np.sqrt(chi[s, c, p] / 2):.2g} times their errors: "
             "the model, the trial runs or the stated errors are wrong",
         )
-    by_plane = dict(zip(measured.planes, measured.mounted.weights, strict=True))
-    mounted = np.array([by_plane.get(plane, 0.0) for plane in planes], dtype=complex)
-    noise = one.changed(shares).plus(other.changed(np.eye(len(planes) + 1) - shares))
-    last = measured.mounted._replace(planes=planes, weights=mounted)
+    rest = other.errors.noise.changed(np.eye(len(planes) + 1) - parts)
     return replace(
-        measured,
-        planes=planes,
-        W=W * share + model * (1 - share),
-        errors=measured.errors._replace(noise=noise, mounted=last),
+        one,
+        W=one.W * share + other.W * (1 - share),
+        errors=one.errors._replace(noise=one.errors.noise.changed(parts).plus(rest)),
         remarks=measured.remarks._replace(warnings=warnings),
     )

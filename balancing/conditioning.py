@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.regions import mean_variances
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import listing
@@ -165,8 +166,8 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
     raise UndeterminedError(words)
 
 
-def check_planes(W: ComplexArray, planes: Sequence[str]) -> Conditioning:
-    """What the readings W (N, P) tell of the planes, if they tell them apart.
+def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
+    """Refuse planes that the readings W (N, P) do not tell apart.
 
     Raises
     ------
@@ -184,7 +185,6 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> Conditioning:
         raise UndeterminedError(f"plane {planes[int(p)]!r} has no effect on any reading: leave it out")
     if lost := apart.undetermined:
         raise UndeterminedError(alike_words(W, lost, planes) + REMEDY)
-    return apart
 
 
 def check_stack(
@@ -279,6 +279,7 @@ def check_effects(
     UndeterminedError
         Naming plane and run.
     """
+    variances = mean_variances(covariance).reshape(-1, 1 + len(trials.planes))
     for p, plane in enumerate(trials.planes):
         run = int(np.argmax(np.abs(trials.weights[:, p])))
         words = f"the trial weight in plane {plane!r} (run {trials.runs[run]!r})"
@@ -288,8 +289,7 @@ def check_effects(
                 f"{words} changed no reading: its effect is not determined; "
                 "check that it was mounted and that the run was measured anew"
             )
-        block = covariance[..., 2 + 2 * p : 4 + 2 * p, 2 + 2 * p : 4 + 2 * p].reshape(-1, 2, 2)
-        variance = np.trace(block, axis1=1, axis2=2) / 2
+        variance = variances[:, 1 + p]
         each = np.abs(w[variance > 0]) ** 2 / variance[variance > 0]
         if len(each) and not significant(each, 2 * len(each)):
             larger = size * CLEAR * np.sqrt(2 * variance.sum() / np.sum(np.abs(w) ** 2))

@@ -21,8 +21,7 @@ import numpy as np
 from balancing.trials import Arc, Limits
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.regression import RCOND, stretch, unstretch
-from rotorid.regression.estimate import unit_columns
+from rotorid.regression import solution, stretch, unstretch
 
 Sectors = tuple[Arc, ...] | None
 """Convex arcs (width ≤ π) where a weight may stand; None: anywhere."""
@@ -57,16 +56,6 @@ class Bounds(NamedTuple):
     max_weight: FloatArray
     sectors: tuple[Sectors, ...]
 
-    @property
-    def used(self) -> BoolArray:
-        """Planes that may carry a weight."""
-        return np.array([m > 0 and s != () for m, s in zip(self.max_weight, self.sectors, strict=True)])
-
-    def part(self, planes: BoolArray) -> Bounds:
-        """The bounds for some of the planes alone."""
-        sectors = tuple(s for s, one in zip(self.sectors, planes, strict=True) if one)
-        return self._replace(W=self.W[:, planes], max_weight=self.max_weight[planes], sectors=sectors)
-
     def stacked(self) -> tuple[ComplexArray, ComplexArray, FloatArray]:
         """E (N + P, P), e (N + P,) and limits: amplitudes and weights are |e + E D|."""
         P = len(self.max_weight)
@@ -97,18 +86,10 @@ class _Goal(NamedTuple):
     bound: Callable[[float], float]
 
 
-def solution_and_rank(A: ComplexArray, y: ComplexArray) -> tuple[ComplexArray, int]:
-    """Least squares of A x = y, (P,), and the rank of A with columns of length 1, by one decomposition."""
-    unit, size = unit_columns(A)
-    x, _, rank, _ = np.linalg.lstsq(unit, y, RCOND)
-    return np.asarray(x / size, dtype=complex), int(rank)
-
-
 def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
     """Limits of a job for its equations, none where there are none."""
     N, P = W.shape
-    if limits is None:
-        return Bounds(W, Y, np.full(N, np.inf), np.full(P, np.inf), (None,) * P)
+    limits = limits or Limits.none(1, N, P)
     if limits.residual.size != N or len(limits.max_weight) != P:
         raise ValueError(
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
@@ -174,9 +155,6 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
 
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
     """Whether weights are within every limit."""
-    anywhere = all(sectors is None for sectors in bounds.sectors)
-    if anywhere and min(bounds.max_weight.min(initial=np.inf), bounds.residual.min()) == np.inf:
-        return True
     return bool(
         (np.abs(weights) <= bounds.max_weight).all()
         and (np.abs(bounds.Y + bounds.W @ weights) <= bounds.residual).all()
@@ -245,12 +223,10 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
     if objective(start) >= objective(none):
         start = none
     unit = objective(start)
-    if unit <= 1e-12 * objective(none) or not len(none):
+    if unit <= 1e-12 * objective(none):
         if within(bounds, start):  # nothing is left to minimise
             return Optimum(start, unit, 0.0, (shares * np.abs(Y + W @ start) >= unit).astype(float))
-        if not len(none):
-            raise InfeasibleError("no plane may carry a weight")
-        unit = objective(none) or 1.0
+        unit = objective(none)
     E, e, limit = bounds.stacked()
     limited, size = np.isfinite(limit), np.maximum(np.maximum(limit, np.abs(e + E @ start)), TINY)
     scaled = np.concatenate((rows / unit, (E / size[:, None])[limited]))
@@ -268,7 +244,7 @@ def _levelled(rows: ComplexArray, right: ComplexArray) -> ComplexArray:
         counts = counts / counts.max(initial=TINY) + 1e-8
         weighed = counts * Q.conj().T
         x = np.linalg.solve(weighed @ Q, -(weighed @ right))
-    return solution_and_rank(R, x)[0]
+    return np.asarray(solution(R, x))
 
 
 def _best(bounds: Bounds, goal: _Goal, tolerance: float) -> Optimum:
@@ -423,23 +399,19 @@ def explain(
     amplitude, weight
         Write a number with its unit.
     """
-    L, M, used = bounds.residual, bounds.max_weight, bounds.used
+    L, M = bounds.residual, bounds.max_weight
     planes = planes or [str(p + 1) for p in range(len(M))]
     readings = readings or [f"reading {i + 1}" for i in range(len(L))]
-    part, factor = bounds.part(used), 0.0
-    if L.all():
-        free = part._replace(residual=L + np.inf)
-        relaxed = smallest_maximum(free, 1 / L)
-        factor, best = relaxed.objective, np.abs(bounds.Y + part.W @ relaxed.weights)
+    relaxed = smallest_maximum(bounds._replace(residual=L + np.inf), 1 / L)
+    factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W @ relaxed.weights)
     if factor < 1 - PRICED:
-        return "the limits can be met only to within rounding (0 cannot): relax a limit of the amplitudes"
+        return "the limits can be met only to within rounding: relax a limit of the amplitudes"
     order = np.argsort(-relaxed.prices)
     priced = order[relaxed.prices[order] > PRICED * relaxed.prices.sum()]
-    heavy, high = np.flatnonzero(used)[priced[priced >= len(L)] - len(L)], priced[priced < len(L)]
+    heavy, high = priced[priced >= len(L)] - len(L), priced[priced < len(L)]
     conditions = [f"at most {weight(M[p])} in plane {planes[p]!r}" for p in heavy]
-    for plane, most, sectors in zip(planes, M, bounds.sectors, strict=True):
-        conditions += [f"plane {plane!r} left empty"] if most == 0 else []
-        conditions += [f"the forbidden angles of plane {plane!r}"] if most and sectors is not None else []
+    of_arcs = zip(planes, bounds.sectors, strict=True)
+    conditions += [f"the forbidden angles of plane {name!r}" for name, arcs in of_arcs if arcs is not None]
     stays = [f"{readings[i]} (limit {amplitude(L[i])}) stays at {amplitude(best[i])}" for i in high[:3]]
     digits = 10.0 ** (2 - int(np.floor(np.log10(factor))))
     enough = np.ceil((1 + 1e-4) * factor * digits) / digits  # three digits that leave room for the weights

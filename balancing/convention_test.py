@@ -81,11 +81,14 @@ class OtherReading:
         Weights (P) as JSON has them: the angles are those that the job would write.
     places
         Where to work, degrees as the job would count them, P.
+    angle_sign
+        +1 where these count with the rotation, −1 against it.
     """
 
     words: str
     rows: list[dict[str, Any]]
     places: list[float]
+    angle_sign: int
 
 
 def convention_test(trials: Trials) -> ConventionTest:

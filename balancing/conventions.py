@@ -117,10 +117,6 @@ class Labels:
         """Angles counted as the job does, counted with the rotation; the same turns them back. Any unit."""
         return self.angle_sign * angle + 0.0
 
-    def leading(self, phase: float) -> float:
-        """A phase as the job writes it as a lead; the same turns it back. Any unit."""
-        return self.phase_sign * phase
-
     def arc(self, start: float, width: float, *, opposite: bool = False) -> list[float]:
         """From and to, degrees as the job writes them, of an arc's first angle and width, rad."""
         ends = np.degrees([start, start + width])[:: self.angle_sign] * self.angle_sign

@@ -15,22 +15,22 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.conditioning import UndeterminedError, check_planes, conditioning, unresolved
-from balancing.cones import AT_LIMIT, Bounds, explain
+from balancing.check_run import whitened
+from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
+from balancing.cones import AT_LIMIT, explain
 from balancing.correction import Correction
 from balancing.decision import Case, decide, remedies
-from balancing.groups import Groups, Unknowns, mapped, unknowns
-from balancing.influence import Influence, Whitening, match_speeds, plane_indices
+from balancing.groups import Groups, mapped, unknowns
+from balancing.influence import Influence, match_speeds, plane_indices
 from balancing.methods import NoErrorsError, Solution, solve
-from balancing.regions import LEVEL, real_parts
+from balancing.regions import LEVEL
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
+from balancing.what_if import DRAWS, check_run_spread
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.regression import stretch
 
 EMPTY = 1e-7
 """Effect of a weight, relative to the vibration, below which it is none."""
-DRAWS = 400
 
 
 def correct(  # noqa: PLR0913
@@ -113,17 +113,28 @@ def correct(  # noqa: PLR0913
             row_weights=row_weights,
             strength=strength,
         )
-        kept = None if result.limits is None or limits is None else limits.pick(used, chosen)
-        result = _in_planes(result, grouped, today.part(used, None, chosen), kept)
-        return replace(result, mounted=today.mounted, remove=tuple(p for p in grouped.planes if p in remove))
+        kept = None if limits is None else limits.pick(used, chosen)
+        D, most = grouped.shares @ result.weights, np.inf if kept is None else kept.max_weight
+        heavy = np.abs(D) >= (1 - AT_LIMIT) * most
+        return replace(
+            result,
+            influence=today.part(used, None, chosen),
+            weights=D,
+            draws=result.draws @ grouped.shares.T,
+            fitted=replace(result.fitted, weights=D, active_weights=heavy),
+            limits=None if result.limits is None else kept,
+            mounted=today.mounted,
+            remove=tuple(p for p in grouped.planes if p in remove),
+            unknowns=grouped,
+        )
     part = today.part(used, None, chosen)
-    W, Y = part.W.reshape(-1, len(chosen)), part.baseline.ravel()
+    given = None if row_weights is None else np.broadcast_to(row_weights, today.W.shape[:2])[used].ravel()
+    W, Y, counting = check_stack(part.W.reshape(-1, len(chosen)), part.baseline.ravel(), given)
+    rows, counts = None if np.ptp(counting) == 0 else counting / counting.max(), counting > 0
     if not Y.any():
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
-    rows = _rows_of(row_weights, today.W.shape[:2], used)
-    counts = np.ones(len(Y), dtype=bool) if rows is None else rows > 0
     kept = None if limits is None else limits.pick(used, chosen)
     if kept is not None and not kept.any:
         kept = None
@@ -133,13 +144,15 @@ def correct(  # noqa: PLR0913
     D = fitted.weights
     if kept is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
-    draws, after_covariance, check_rms = _drawn(part, fitted, D)
+    after_covariance, sizes = check_run_spread(part, D)
+    drawn = (fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws(DRAWS))
+    draws = np.concatenate([np.zeros((0, len(D)), dtype=complex), *drawn])
     result = Correction(
         influence=part,
         weights=D,
-        draws=draws,
+        draws=draws[np.isfinite(draws).all(axis=1)],
         after_covariance=after_covariance,
-        check_rms=check_rms,
+        check_rms=float(np.quantile(sizes, LEVEL)),
         mounted=today.mounted,
         conditioning=conditioning(W[counts], part.planes),
         fitted=fitted,
@@ -152,15 +165,6 @@ def correct(  # noqa: PLR0913
     if not result.told_apart:
         unclear = unclear or _alike(case, counts, stated=False)
     return replace(result, decision=decide(result, case, unclear, limits))
-
-
-def _in_planes(result: Correction, of: Unknowns, part: Influence, limits: Limits | None) -> Correction:
-    """A correction of unknowns as one of the planes that they put weights into."""
-    D = of.shares @ result.weights
-    most = np.full(len(D), np.inf) if limits is None else limits.max_weight
-    fitted = replace(result.fitted, weights=D, active_weights=np.abs(D) >= (1 - AT_LIMIT) * most)
-    draws = result.draws @ of.shares.T
-    return replace(result, influence=part, weights=D, draws=draws, fitted=fitted, limits=limits, unknowns=of)
 
 
 def _unclear(case: Case, counts: BoolArray, *, refuse: bool) -> str:
@@ -190,29 +194,29 @@ def fit_part(
     strength: float | None = None,
 ) -> tuple[Solution, str]:
     """Weights, and the method that they follow from; least squares where errors are assumed or hardly any."""
-    errors, N = part.known_errors, part.baseline.size
+    errors = part.known_errors
     asked = method or ("weighted" if errors and strength is None else "least-squares")
 
-    def conflict(bounds: Bounds) -> str:
-        labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
-        return explain(bounds, part.planes, readings, labels.amplitude_words, labels.weight_words)
-
-    def by(name: str) -> Solution:
-        P = len(part.planes)
-        return solve(
-            part.W.reshape(N, P),
-            part.baseline.ravel(),
-            name,
-            channels=part.channels().reshape(N, 2 * P + 2, 2 * P + 2) if errors else None,
-            columns=part.columns().reshape(-1, N, P + 1) if errors else None,
-            row_weights=rows,
-            limits=limits,
-            strength=strength,
-            names=part.planes,
-            conflict=conflict,
-            explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
-        )
-
+    labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
+    by = partial(
+        solve,
+        part.W.reshape(part.baseline.size, -1),
+        part.baseline.ravel(),
+        channels=part.channels() if errors else None,
+        columns=part.columns() if errors else None,
+        row_weights=rows,
+        limits=limits,
+        strength=strength,
+        names=part.planes,
+        conflict=partial(
+            explain,
+            planes=part.planes,
+            readings=readings,
+            amplitude=labels.amplitude_words,
+            weight=labels.weight_words,
+        ),
+        explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
+    )
     try:
         return by(asked), asked
     except (UndeterminedError, NoErrorsError) as error:
@@ -224,59 +228,9 @@ def fit_part(
 
 def _explained(part: Influence, D: ComplexArray) -> bool:
     """Whether what is left of Y₀ + W D, free of other weights, is within what 95 % of the draws leave."""
-    S, C, P = part.W.shape
     noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
-    whitening = Whitening(noise, part.errors.sizes)
-    basis = np.linalg.qr(whitening.white(stretch(part.W.reshape(S * C, 1, P)).reshape(S, C, 2, 2 * P)))[0]
-
-    def left(errors: ComplexArray) -> FloatArray:
-        white = whitening.white(np.moveaxis(real_parts(errors), 0, -1))
-        return np.asarray(np.sum(white**2, axis=0) - np.sum((basis.T @ white) ** 2, axis=0))
-
-    drawn = np.concatenate([left(block) for block in part.noise_draws(noise, DRAWS)])
-    return bool(left((part.baseline + part.W @ D)[None, ..., None])[0] <= np.quantile(drawn, LEVEL))
-
-
-def _drawn(part: Influence, fitted: Solution, D: ComplexArray) -> tuple[ComplexArray, FloatArray, float]:
-    """Weights of every draw (n, P), covariance (S, C, 2, 2) of a check run, and the rms that 95 % stay below.
-
-    Where errors are unknown there are no draws; the others are NaN.
-    """
-    S, C, P = part.W.shape
-    after = part.baseline + part.W @ D
-    weights, sizes = [], []
-    squares = np.zeros((S, C, 2, 2))
-    further = part.further(after, D, DRAWS)
-    for (Y, W), more in zip(part.draws(DRAWS), further, strict=False):
-        n = len(Y)
-        weights.append(fitted.resolve(W.reshape(n, S * C, P), Y.reshape(n, S * C)))
-        read = Y + W @ D + more
-        sizes.append(np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2))))
-        error = real_parts((read - after)[..., None])
-        squares += np.einsum("nsci,nscj->scij", error, error)
-    if not sizes:
-        return np.zeros((0, P), dtype=complex), np.full((S, C, 2, 2), np.nan), float("nan")
-    solved = np.concatenate(weights)
-    bound = float(np.quantile(np.concatenate(sizes), LEVEL))
-    return solved[np.isfinite(solved).all(axis=1)], squares / DRAWS, bound
-
-
-def _rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
-    """Weights of the readings at the speeds used, relative to the largest; None where all are alike.
-
-    Raises
-    ------
-    ValueError
-        Another shape than (speeds, sensors), weights below 0, and where nothing is left.
-    """
-    if given is None:
-        return None
-    weights = np.asarray(given, dtype=np.float64)
-    if weights.shape != shape or not (weights >= 0).all():
-        raise ValueError(
-            f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
-        )
-    chosen = weights[used].ravel()
-    if not chosen.any():
-        raise ValueError("all readings have the weight 0: nothing is left to be minimised")
-    return None if (chosen == chosen[0]).all() else chosen / chosen.max()
+    effects = (z * W[None] for W in np.moveaxis(part.W, -1, 0) for z in (1, 1j))
+    rest, *columns, drawn = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)
+    basis = np.linalg.qr(np.column_stack(columns))[0]
+    left, usual = (np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (rest, drawn))
+    return bool(left <= np.quantile(usual, LEVEL))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
@@ -157,6 +157,11 @@ class Correction(Prediction, Answered):
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
 
+    @classmethod
+    def of(cls, result: Correction, **more: Any) -> Self:  # noqa: ANN401
+        """A correction with other fields and more."""
+        return cls(**{name: getattr(result, name) for name in Correction.__dataclass_fields__} | more)
+
     @property
     def contradictions(self) -> tuple[str, ...]:
         """Sentences on how the runs contradict their conventions; nothing may be mounted then."""
@@ -226,13 +231,11 @@ class Correction(Prediction, Answered):
         Where material is taken away from a plane, `action` says so, `angle_deg` is the place to work at, and
         `equivalent_added_deg` the angle of the added weight that would do the same.
         """
-        *numbers, _, action, _ = self._weight_columns()
-        shown = frame(numbers)
-        if self.remove:
-            shown.insert(1, "action", list(action.values))
-            shown["equivalent_added_deg"] = shown["angle_deg"]
-            shown["angle_deg"] = self.places(self.planes, self.weights)
-        return shown
+        plane, mass, unit, angle, *numbers, _, action, _ = self._weight_columns()
+        if not self.remove:
+            return frame((plane, mass, unit, angle, *numbers))
+        work = replace(angle, values=self.places(self.planes, self.weights))
+        return frame((plane, action, mass, unit, work, *numbers, replace(angle, heading="equivalent_added_deg")))
 
     def otherwise(self, words: str) -> OtherReading:
         """What a correction under other conventions notes of this one; in words, what is otherwise in it."""
@@ -240,7 +243,7 @@ class Correction(Prediction, Answered):
         head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
         *columns, _, at = self.work_columns(planes, self.weights)
         each = [head | row for row in records((*columns, at))]
-        return OtherReading(words, each, self.places(planes, self.weights).tolist())
+        return OtherReading(words, each, self.places(planes, self.weights).tolist(), labels.angle_sign)
 
     def _weight_columns(self) -> tuple[Column, ...]:
         P = len(self.planes)
@@ -321,53 +324,61 @@ class Correction(Prediction, Answered):
 
     def in_words(self) -> str:
         """Weights and their 95 %, in a line."""
-        mass, places = self.labels.weight(self.weights)[0], self.places(self.planes, self.weights)
-        widths, turns = self.half_widths()
-        sizes, angles = widths * self.labels.weight_scale, np.degrees(turns)
-        return ", ".join(
-            f"{plane} {figures(m)}{_within(size)} at {degrees(place)}{_within(angle, '°')}"
-            for plane, m, size, place, angle in zip(self.planes, mass, sizes, places, angles, strict=True)
-        )
+        places = map(degrees, self.places(self.planes, self.weights))
+        each = zip(self.planes, self._sizes()[0].texts, *self._widths(), places, strict=True)
+        words = (f"{plane} {size} {width} at {place} {turn}" for plane, size, width, turn, place in each)
+        return ", ".join(" ".join(one.split()) for one in words)
 
     def _weights_text(self) -> str:
         """Weights and their 95 %, in each plane; under other conventions, and beside what is mounted."""
-        labels, removed = self.labels, set(self.planes) & set(self.remove)
-        plane, mass, *_ = weight_columns(labels, self.planes, self.weights)
-        columns = [plane, mass, Column("angle", self.places(self.planes, self.weights), degrees)]
-        if removed:
-            columns.insert(1, Column("", ["(remove)" if p in removed else "(add)" for p in self.planes]))
+        labels, sizes, removed = self.labels, self._sizes(), [plane in self.remove for plane in self.planes]
+        actions = [Column("", ["(remove)" if away else "(add)" for away in removed])] if any(removed) else []
+        work = [self._place(at, labels.angle_sign) for at in self.places(self.planes, self.weights)]
+        columns = [Column("plane", self.planes), *actions, *sizes, Column("angle", work)]
         if self.region_known:
-            widths, turns = self._widths()
+            widths, turns = self._widths(sizes[0].title or "")
             columns += [Column("95 %", widths), Column("", turns)]
         for other in self.others:  # the mass where that is another than the one shown
-            places = map(degrees, other.places)
+            places = [self._place(at, other.angle_sign) for at in other.places]
             masses = [figures(row["mass"]) for row in other.rows]
             cells = [
                 place if size == figures(here) else f"{size} at {place}"
-                for size, place, here in zip(masses, places, mass.values, strict=True)
+                for size, place, here in zip(masses, places, sizes[0].values, strict=True)
             ]
             columns.append(Column(f"if {other.words}", cells))
         taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
-        conventions = f"{capital(labels.turning_in_words())}; phases as {labels.phase}{taken}"
-        lines = [f"{conventions}; weights for the bare rotor."]
+        lines = [f"{capital(self._counting)}; phases as {labels.phase}{taken}; weights for the bare rotor."]
         if self.mounted.weights.any():
             run, planes, _ = self.mounted
             sizes, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
             each = zip(planes, sizes, places, strict=True)
             stays = {name: f"{figures(size)} at {place}" for name, size, place in each if size}
             cells = [stays.pop(name, "nothing") for name in self.planes]
-            word = "remove" if removed == set(self.planes) else "add"
+            word = "remove" if all(removed) else "add"
             columns.append(Column(f"{word} if {cut(run, _NAME)!r} stays", cells))
             also = [f"{words} in plane {name!r}" for name, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
         return "\n".join([text(columns, width=COLUMNS), *lines])
 
-    def _widths(self) -> tuple[list[str], list[str]]:
-        """Half of the 95 % intervals of the weights' sizes and angles, in words."""
+    def _sizes(self) -> tuple[Column, ...]:
+        """Sizes of the weights, first in the unit of their errors."""
+        return weight_columns(self.labels, self.planes, self.weights)[1:2]
+
+    def _place(self, angle: float, _sign: int) -> str:
+        """Where to work, of degrees that count with the rotation (sign 1) or against it (−1)."""
+        return degrees(angle)
+
+    @property
+    def _counting(self) -> str:
+        return self.labels.turning_in_words()
+
+    def _widths(self, unit: str = "") -> tuple[list[str], list[str]]:
+        """Half of the 95 % intervals of the weights' sizes and angles, in words; empty where not known."""
+        if not self.region_known:
+            return [""] * len(self.planes), [""] * len(self.planes)
         sizes, angles = self.half_widths()
-        unit, scale = self.labels.weight_in, self.labels.weight_scale
-        widths = [f"± {figures(width * scale, 2)} {unit}" for width in sizes]
+        widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}".rstrip() for width in sizes]
         for p in np.flatnonzero(self.held):
             widths[p] = "at its limit"
         return widths, list(map(_angle_width, np.degrees(angles)))
@@ -392,12 +403,8 @@ class Correction(Prediction, Answered):
         return "\n".join(fill(line, WIDTH) for line in lines)
 
 
-def _within(half: float, unit: str = "") -> str:
-    return f" ± {figures(half, 2)}{unit}" if half == half else ""
-
-
 def _angle_width(half: float) -> str:
     """Half width of an angle's interval, degrees, in words."""
     if np.isnan(half):
-        return "angle not determined"
+        return "(angle not determined)"
     return "held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°"

@@ -82,8 +82,8 @@ class Unknowns(NamedTuple):
                     f"plane {plane!r} is in {several}, so that its limits of weight and angles cannot be "
                     "kept: take these away, or leave one out"
                 )
-        inside = self.shares != 0
-        most = np.where(inside, limits.max_weight[:, None] / np.abs(np.where(inside, self.shares, 1)), np.inf)
+        with np.errstate(divide="ignore"):  # planes that an unknown leaves alone
+            most = limits.max_weight[:, None] / np.abs(self.shares)
         arcs = [
             tuple(
                 (start - np.angle(share), width)
@@ -195,7 +195,9 @@ def static_and_couple(planes: Sequence[str]) -> Unknowns | None:
     return Unknowns(("static", "couple"), tuple(planes), shares) if len(planes) == 2 else None
 
 
-def mapped(influence: Influence, names: Sequence[str], shares: ComplexArray) -> Influence:
+def mapped(
+    influence: Influence, names: Sequence[str], shares: ComplexArray, first: Sequence[float] = (1.0,)
+) -> Influence:
     """The coefficients W G of other unknowns, with their errors.
 
     Parameters
@@ -204,10 +206,14 @@ def mapped(influence: Influence, names: Sequence[str], shares: ComplexArray) -> 
         Of P planes.
     names, shares
         Of U unknowns, and G (P, U).
+    first
+        What the baseline is of Y₀, W₁, …; default Y₀.
     """
     change = np.zeros((shares.shape[1] + 1, shares.shape[0] + 1), dtype=complex)
-    change[0, 0], change[1:, 1:] = 1.0, shares.T
+    change[0, : len(first)], change[1:, 1:] = first, shares.T
     errors, there = influence.errors, influence.mounted
     mounted = there._replace(planes=tuple(names), weights=np.linalg.pinv(shares) @ there.weights)
     errors = errors._replace(noise=errors.noise.changed(change), mounted=mounted)
-    return replace(influence, planes=tuple(names), W=influence.W @ shares, errors=errors)
+    baseline = first[0] * influence.baseline + influence.W @ change[0, 1:]
+    W = influence.W @ shares
+    return replace(influence, planes=tuple(names), W=W, baseline=baseline, errors=errors)

@@ -24,15 +24,15 @@ further error, alike for all, such that χ² equals its degrees of freedom.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from balancing.conditioning import UndeterminedError, check_planes, check_stack
+from balancing.conditioning import UndeterminedError, chance, check_planes, check_stack
 from balancing.cones import (
     AT_LIMIT,
     TINY,
@@ -44,9 +44,9 @@ from balancing.cones import (
     explain,
     nearest,
     smallest_maximum,
-    solution_and_rank,
     within,
 )
+from balancing.regions import real_parts
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
@@ -119,9 +119,10 @@ class Solution:
 
 
 class Job(NamedTuple):
-    """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes that may carry a weight.
+    """Equations W (N, P), Y (N,), row weights w (N,), bounds and names of planes.
 
-    `explained` asks whether errors alone may leave what weights leave; None: by χ².
+    `channels` and `columns` as of `solve`, (N, 2P + 2, 2P + 2) and (M, N, P + 1); `explained` asks whether
+    errors alone may leave what weights leave; None: by χ².
     """
 
     method: str
@@ -130,6 +131,8 @@ class Job(NamedTuple):
     w: FloatArray
     bounds: Bounds
     planes: Sequence[str]
+    channels: FloatArray
+    columns: ComplexArray
     explained: Explained | None = None
 
     def fitted(self, D: ComplexArray, resolve: Resolve, **more: Any) -> Solution:  # noqa: ANN401
@@ -142,7 +145,7 @@ class Job(NamedTuple):
         return Solution(D, residual, objective, heavy, high, resolve, **more)
 
 
-Solver = Callable[[Job, FloatArray, ComplexArray], Solution]
+Solver = Callable[[Job], Solution]
 
 
 def method_words(name: str, *, weighted: bool) -> str:
@@ -221,12 +224,10 @@ def solve(  # noqa: PLR0913
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
     planes = names or [str(p + 1) for p in range(P)]
-    if len(planes) != P:
-        raise ValueError(f"{P} planes need as many names")
     bounds, n = bounds_of(K, y, limits), 2 * P + 2
     channels = np.zeros((N, n, n)) if channels is None else channels.reshape(N, n, n)
     columns = np.zeros((0, N, P + 1), complex) if columns is None else columns.reshape(-1, N, P + 1)
-    job = Job(method, K, y, w, bounds, planes, explained)
+    job = Job(method, K, y, w, bounds, planes, channels, columns, explained)
     if strength is not None:
         if method != "least-squares" or limits is not None or not 0 < strength < np.inf:
             raise ValueError(
@@ -234,39 +235,26 @@ def solve(  # noqa: PLR0913
                 "squares without limits only"
             )
         return job.fitted(_normal(K, y, w, strength), lambda W, _: np.nan * W[:, 0])
-    used = bounds.used
+    if () in bounds.sectors:
+        raise ValueError(f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out")
     try:
-        if used.all():
-            return function(job, channels, columns)
-        whole, index = np.eye(P)[used], np.flatnonzero(np.repeat(np.append(True, used), 2))
-        planes = [name for name, one in zip(planes, used, strict=True) if one]
-        asked = None if explained is None else lambda D: explained(D @ whole)
-        part = Job(method, K[:, used], y, w, bounds.part(used), planes, asked)
-        fitted = function(part, channels[:, index[:, None], index], columns[..., index[::2] // 2])
+        return function(job)
     except InfeasibleError:
         raise InfeasibleError(conflict(bounds)) from None
-    return replace(
-        fitted,
-        weights=fitted.weights @ whole,
-        active_weights=(bounds.max_weight == 0) | (fitted.active_weights @ whole > 0),
-        resolve=lambda W, Y: fitted.resolve(W[..., used], Y) @ whole,
-    )
 
 
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
-    weights, rank = solution_and_rank(A, -job.w * job.Y)
-    if rank < A.shape[1]:
-        check_planes(A[job.w > 0], job.planes)
-    return weights
+    check_planes(A[job.w > 0], job.planes)
+    return np.asarray(-solution(A, job.w * job.Y))
 
 
-def _fit_plain(job: Job, *_: Any) -> Solution:  # noqa: ANN401
+def _fit_plain(job: Job) -> Solution:
     best, minmax = _closed_form(job), job.method == "minmax"
 
     def again(bounds: Bounds, target: ComplexArray, tolerance: float = DRAWN) -> Optimum:
-        if minmax or not len(target):
+        if minmax:
             return smallest_maximum(bounds, job.w, tolerance)
         root = stretch(np.linalg.qr(job.w[:, None] * bounds.W)[1])
         left = float(np.linalg.norm(job.w * (bounds.Y + bounds.W @ target)))
@@ -351,15 +339,11 @@ class _Errors(NamedTuple):
         """Weights at which Q is smallest, sought from some start."""
         from scipy.optimize import least_squares
 
-        @lru_cache(1)
-        def at(d: bytes) -> _State:
-            return self.at(np.frombuffer(d, dtype=complex))
-
         for method in ("lm", "trf"):  # the first is fast, the second does not lose its way
             end = least_squares(
-                lambda d: at(d.tobytes()).r,
+                lambda d: self.at(unstretch(d)).r,
                 stretch(start),
-                lambda d: at(d.tobytes()).rows,
+                lambda d: self.at(unstretch(d)).rows,
                 method=method,
                 x_scale="jac",
                 xtol=1e-12,
@@ -373,17 +357,11 @@ class _Errors(NamedTuple):
             "bound; use larger trial weights, fewer planes or another method"
         )
 
-    def chi_square(self, D: ComplexArray, common: FloatArray, *, measured: bool = False) -> float:
-        """χ² of r, least about D, with columns (N, 2P + 2, M) common to all readings; w does not count.
-
-        Weights move it as Ŵ does, or the `measured` W, which is the better test: 3 % instead of 7 % of jobs
-        are beyond its 95 % quantile.
-        """
-        even, (_, n, M) = self._replace(w=np.ones_like(self.w)), common.shape
-        at = even.at(D)
-        rows = even.rows(at.white, self.W[:, None]) if measured else at.rows
+    def chi_square(self, D: ComplexArray, common: FloatArray) -> float:
+        """χ² of r, least about D, with columns (N, 2P + 2, M) common to all readings; w does not count."""
+        at, (_, n, M) = self._replace(w=np.ones_like(self.w)).at(D), common.shape
         shared = (at.white @ stretch([[1.0, *D]]) @ common).reshape(len(at.r), M)
-        X = np.column_stack((rows, shared, at.r))
+        X = np.column_stack((at.rows, shared, at.r))
         G = X.T @ X
         G[n - 2 : -1, n - 2 : -1] += np.eye(M)
         return float(G[-1, -1] - G[-1, :-1] @ solution(G[:-1, :-1], G[:-1, -1]))
@@ -418,28 +396,13 @@ class _Errors(NamedTuple):
         return Q, D
 
 
-def _explaining_share(chi_square: Callable[[float], float], dof: int) -> float:
-    """At which χ², falling from above, is dof: by secants, since 1/χ² is nearly linear in the share."""
-    before, share = 0.0, chi_square(0.0) / dof - 1
-    for _ in range(50):
-        slope = (1 / chi_square(share) - 1 / chi_square(before)) / (share - before)
-        before, share = share, max(share - (1 / chi_square(share) - 1 / dof) / slope, 0.0)
-        if abs(share - before) <= 1e-8 * share:
-            break
-    return share
-
-
-def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solution:
+def _fit_weighted(job: Job) -> Solution:
     start, on, bounds = _closed_form(job), job.w > 0, job.bounds
-    if not len(start):
-        return _fit_plain(job)
-    from scipy.special import chdtrc
-
-    common = np.moveaxis(np.ascontiguousarray(columns[:, on]).view(np.float64), 0, 2)
-    errors = _Errors(job.W[on], job.Y[on], channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
+    common = np.moveaxis(real_parts(job.columns[:, on]), 0, 2)
+    errors = _Errors(job.W[on], job.Y[on], job.channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
     B, D, dof = stretch([[1.0, *start]]), start, 2 * int(on.sum() - len(start))
     variance = float(np.trace(B @ errors.C @ B.T, axis1=1, axis2=2).mean()) / 2
-    if not variance > 1e-12 * channels[:, 0, 0].mean():
+    if not variance > 1e-12 * job.channels[:, 0, 0].mean():
         raise NoErrorsError(
             "the method weighted needs errors of the readings ([errors], --errors or repeated readings)"
         )
@@ -458,14 +421,15 @@ def _fit_weighted(job: Job, channels: FloatArray, columns: ComplexArray) -> Solu
         return wider(share).chi_square(D, common)
 
     chi, share = least(0.0), 0.0
-    unexplained = chi > dof > 0
-    if unexplained and job.explained is not None:
-        unexplained = not job.explained(D)
-    elif unexplained:
-        unexplained = chdtrc(dof, wider(0.0).chi_square(D, common, measured=True)) < 1 - UNEXPLAINED
-    if unexplained:
+    explained = job.explained or (lambda _: chance(chi, dof) >= 1 - UNEXPLAINED)
+    if chi > dof > 0 and not explained(D):
         D = start
-        share = _explaining_share(least, dof)
+        before, share = 0.0, chi / dof - 1
+        for _ in range(50):  # by secants, since 1/χ² is nearly linear in the share
+            miss, last = (1 / least(at) - 1 / dof for at in (share, before))
+            before, share = share, max(share - miss * (share - before) / (miss - last), 0.0)
+            if abs(share - before) <= 1e-8 * share:
+                break
         D = wider(share).minimum(D)
     wide = wider(share)
     if not within(bounds, D):

@@ -101,6 +101,12 @@ def half_width(deviations: FloatArray) -> FloatArray:
     return np.asarray(np.quantile(np.abs(deviations), LEVEL, axis=0))
 
 
+def mean_variances(covariance: FloatArray) -> FloatArray:
+    """Mean of the variances of both parts of n complex numbers, (…, n), of covariances (…, 2n, 2n)."""
+    each = np.einsum("...ii->...i", covariance)
+    return np.asarray(each.reshape(*each.shape[:-1], -1, 2).mean(axis=-1))
+
+
 def real_parts(values: ComplexArray) -> FloatArray:
     """Complex numbers as real ones.
 

@@ -21,6 +21,7 @@ the factor. A mass that is known makes a mass of |D|; where all angles are known
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,16 +29,19 @@ import numpy as np
 from balancing.conditioning import UndeterminedError, check_effects, check_runs
 from balancing.correct import correct
 from balancing.correction import Correction
+from balancing.groups import mapped
 from balancing.influence import Influence, Mounted, fit_runs
 from balancing.noise import Gaussian
-from balancing.tables import degrees
+from balancing.tables import three_figures
 from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
+from rotorid.base.answer import COLUMNS
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, records, text
-from rotorid.base.text import figures
+from rotorid.base.tables import Column, records
+from rotorid.base.text import figures, weight_unit_words
 
 _SAME = 1e-6
+_NOTHING = Mounted("", (), np.zeros(0, dtype=complex))
 
 
 class RotorAndArbor(NamedTuple):
@@ -99,27 +103,22 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             fitted.remarks.contradictions,
         )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
-    P = len(planes)
-    on = trials.weights[-1] if stored is None else np.zeros(P, dtype=complex)
+    P, labels = len(planes), (stored or fitted).labels
+    shares = np.eye(len(runs.planes), 1 + P)[:, 1:].astype(complex)
 
-    def part(combination: tuple[int, int], baseline: ComplexArray) -> Influence:
+    def part(*first: float) -> Influence:
         """The coefficients with this combination of Y₀ and R as baseline."""
-        change = np.zeros((P + 1, fitted.W.shape[-1] + 1), dtype=complex)
-        change[0, :2] = combination
-        if stored is None:
-            change[1:, 2:] = np.eye(P)
-        noise = fitted.errors.noise.changed(change)
+        of = mapped(fitted, planes, shares, first)
+        noise, on = of.errors.noise, trials.weights[-1]
         if stored is not None:
-            noise = noise.plus(stored.errors.noise.changed(np.diag([0.0, *np.ones(P)]).astype(complex)))
-        mounted = Mounted(trials.runs[-1], planes, on)
-        errors = fitted.errors._replace(noise=noise, mounted=mounted, trials=trials)
-        labels = (stored or fitted).labels
-        return replace(fitted, planes=planes, W=W, baseline=baseline, errors=errors, labels=labels)
+            noise, on = noise.plus(stored.errors.noise.changed(np.diag([0.0] + P * [1.0]))), np.zeros(P)
+        errors = of.errors._replace(noise=noise, mounted=Mounted(trials.runs[-1], planes, on), trials=trials)
+        return replace(of, W=W, errors=errors, labels=labels)
 
-    R = fitted.W[..., 0]
-    A = fitted.baseline - R
-    least = 0.0 if A.any() else 1e-12 * np.abs(R).max()  # a correction of nothing at all is refused
-    return RotorAndArbor(part((0, 1), R), part((1, -1), A + least))
+    rotor, arbor = part(0.0, 1.0), part(1.0, -1.0)
+    if not arbor.baseline.any():  # a correction of nothing at all is refused
+        arbor = replace(arbor, baseline=arbor.baseline + 1e-12 * np.abs(rotor.baseline).max())
+    return RotorAndArbor(rotor, arbor)
 
 
 def machine_influence(trials: Trials) -> Influence:
@@ -162,9 +161,8 @@ class ArborCorrection(Correction):
     @property
     def unbalances(self) -> tuple[Correction, ...]:
         """Weights that do what the rotor does, and what its arbor does, with their draws."""
-        nothing = Mounted("", (), np.zeros(0, dtype=complex))
-        bare = [replace(c, remove=(), mounted=nothing) for c in self.rotor_and_arbor]
-        return tuple(replace(c, weights=-c.weights, draws=-c.draws) for c in bare)
+        both = self.rotor_and_arbor
+        return tuple(replace(c, remove=(), weights=-c.weights, draws=-c.draws) for c in both)
 
     def _what(self) -> str:
         return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
@@ -173,9 +171,11 @@ class ArborCorrection(Correction):
         return f"{super()._left()}, beside the arbor's part"
 
     def _weights_text(self) -> str:
-        arbor = Correction._weights_text(self.unbalances[1]).partition("\n")[2].rpartition("\n")[0]
-        head = "Unbalance of the arbor, and all run-out that turns with it, which no index tells from it:"
-        return f"{super()._weights_text()}\n{head}\n{arbor}"
+        words = (
+            "Unbalance of the arbor, and all run-out that turns with it, which no index tells from it, "
+            f"{self.labels.weight_in}: {self.unbalances[1].in_words()}."
+        )
+        return f"{super()._weights_text()}\n{fill(words, COLUMNS)}"
 
     def to_dict(self) -> dict[str, Any]:
         """That of the correction with rotor_unbalance and arbor_unbalance."""
@@ -200,8 +200,7 @@ def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
     """
     at = result.planes, result.speeds
     corrections = tuple(correct(part, None, *at, refuse=False) for part in both)
-    fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
-    return ArborCorrection(**fields, rotor_and_arbor=corrections)
+    return ArborCorrection.of(result, rotor_and_arbor=corrections)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,78 +216,64 @@ class RelativeCorrection(Correction):
     relative: Relative = Relative(True, {}, "")  # noqa: RUF009
 
     @property
-    def masses(self) -> FloatArray:
-        """Masses of the weights in the unit of the trial weights, (P,); NaN: not known."""
-        return np.abs(self.weights) * [self.relative.sizes[plane] for plane in self.planes]
-
-    @property
-    def turns(self) -> FloatArray:
-        """How far to move the trial weights, degrees as the job counts them, -180 … 180, (P,)."""
-        return np.asarray((self.places(self.planes, self.weights) + 180) % 360 - 180)
-
-    def _place(self, turn: float, sign: int) -> str:
-        if not self.relative.angle:
-            return degrees(turn)
-        turn *= sign
-        return f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation"
-
-    def _what(self) -> str:
-        if len(self.planes) > 1:
-            return "Change the trial weights as the table says"
-        place = self._place(float(self.turns[0]), self.labels.angle_sign)
-        times = figures(float(np.abs(self.weights[0])), 3)
-        if self.relative.angle and not self.remove:
-            return f"Move the trial weight by {place} and take {times} times as much"
-        start = f"{place} from its place" if self.relative.angle else f"at {place}"
-        return f"{'Remove' if self.remove else 'Mount'} {times} {TRIAL_WEIGHTS}, {start}"
-
-    @property
     def parts(self) -> None:
         """Weights that are multiples of different trial weights have no static part."""
 
-    def _weights_text(self) -> str:
-        labels, columns = self.labels, [Column("plane", self.planes)]
-        columns.append(Column("times", np.abs(self.weights), lambda times: figures(times, 3)))
-        if not np.isnan(self.masses).all():
-            columns.append(Column(self.relative.unit.replace("_", "·"), self.masses, figures))
-        columns.append(Column("place", [self._place(turn, labels.angle_sign) for turn in self.turns]))
-        if self.region_known:
-            sizes, angles = self.half_widths()
-            turns = [
-                "not determined" if np.isnan(a) else f"± {figures(float(np.degrees(a)), 2)}°" for a in angles
-            ]
-            columns += [Column("95 %", sizes, lambda w: f"± {figures(w, 2)}"), Column("", turns)]
-        for other in self.others:
-            sign = labels.angle_sign * (1 if other.rows[0]["angles"] == labels.angle_words else -1)
-            turned = [self._place((place + 180) % 360 - 180, sign) for place in other.places]
-            columns.append(Column(f"if {other.words}", turned))
-        start = "places count from it" if self.relative.angle else labels.turning_in_words()
-        taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
-        caption = f"Times the trial weight, instead of it; {start}; phases as {labels.phase}{taken}."
-        return f"{text(columns)}\n{caption}"
+    def _what(self) -> str:
+        if len(self.planes) > 1:
+            return super()._what()
+        (angle,), times = self.places(self.planes, self.weights), three_figures(abs(self.weights[0]))
+        place = self._place(angle, self.labels.angle_sign)
+        if self.relative.angle and not self.remove:
+            return f"Move the trial weight by {place} and take {times} times as much"
+        start = " from its place" if self.relative.angle else ""
+        return f"{'Remove' if self.remove else 'Mount'} {times} {TRIAL_WEIGHTS}, {place}{start}"
+
+    def _masses(self) -> FloatArray:
+        """In the unit of the trial weights, (P,); NaN: not known."""
+        return np.abs(self.weights) * [self.relative.sizes[plane] for plane in self.planes]
+
+    def _sizes(self) -> tuple[Column, ...]:
+        masses = Column("mass", self._masses(), figures, title=weight_unit_words(self.relative.unit))
+        times = Column("times", np.abs(self.weights), three_figures)
+        return (times,) if np.isnan(self._masses()).all() else (times, masses)
+
+    def _place(self, angle: float, sign: int) -> str:
+        if not self.relative.angle:
+            return super()._place(angle, sign)
+        turn = sign * ((angle + 180) % 360 - 180)
+        return f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation"
+
+    @property
+    def _counting(self) -> str:
+        return f"{TRIAL_WEIGHTS}; {'angles from it' if self.relative.angle else super()._counting}"
 
     def _weight_columns(self) -> tuple[Column, ...]:
-        columns = {column.heading: column for column in super()._weight_columns()}
+        plane, times, _, angle, std, angle_std, *last, at = super()._weight_columns()
         nothing = np.full(len(self.planes), np.nan)
-        new = {
-            "times_trial": np.abs(self.weights),
-            "times_trial_std": np.array(columns["mass_std"].values),
-            "turn_deg": self.turns if self.relative.angle else nothing,
-            "mass": self.masses,
-            "mass_std": self.masses * columns["mass_std"].values / np.abs(self.weights),
-            "unit": [self.relative.unit] * len(self.planes),
-        }
+        turn = Column("turn_deg", nothing)
         if self.relative.angle:
-            new |= {"angle_deg": nothing, "remove_at_deg": nothing}
-        columns |= {name: Column(name, values) for name, values in new.items()}
-        last = [columns.pop(name) for name in ("covariance", "action", "remove_at_deg")]
-        return (*columns.values(), *last)
+            turn = replace(turn, values=(self.places(self.planes, self.weights) + 180) % 360 - 180)
+            angle, at = (replace(column, values=nothing) for column in (angle, at))
+        masses = self._masses()
+        return (
+            plane,
+            replace(times, values=masses),
+            Column("unit", [self.relative.unit] * len(masses)),
+            angle,
+            replace(std, values=masses * std.values / np.abs(self.weights)),
+            angle_std,
+            replace(times, heading="times_trial"),
+            replace(std, heading="times_trial_std"),
+            turn,
+            *last,
+            at,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what only a known trial weight would tell is None."""
-        unknown = {"mounted_in_last_run": None, "add_to_mounted": None}
         relative = ["mass", "angle"] if self.relative.angle else ["mass"]
-        return super().to_dict() | unknown | {"relative_to_trial_weight": relative}
+        return super().to_dict() | {"relative_to_trial_weight": relative}
 
 
 def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
@@ -306,5 +291,4 @@ def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
     RelativeCorrection
         Whose JSON has times_trial and turn_deg of every plane.
     """
-    fields = {name: getattr(result, name) for name in Correction.__dataclass_fields__}
-    return RelativeCorrection(**fields, relative=relative)
+    return RelativeCorrection.of(result, relative=relative, mounted=_NOTHING)

@@ -184,26 +184,24 @@ class Trials:
         self._check_readings(readings)
         if self.amplitudes_only:
             readings = np.abs(readings).astype(complex)
-        weights = np.array(self.weights, dtype=complex)
-        if weights.shape != (R, P) or not np.isfinite(weights).all():
-            raise ValueError(f"weights must be finite, of shape ({R} runs, {P} planes); got {weights.shape}")
-        arrays: dict[str, AnyArray] = {"readings": readings, "weights": weights}
-        missing = np.isnan(readings)
-        for name, axes in (("steps", (2,)), ("covariance", (2, 2))):
+        keep(self, readings=readings)
+        shapes = {
+            "weights": (R, P),
+            "index": (R,),
+            "steps": (2, *readings.shape),
+            "covariance": (2, 2, *readings.shape),
+        }
+        for name, shape in shapes.items():
             if getattr(self, name) is None:
                 continue
-            array, shape = np.array(getattr(self, name), dtype=np.float64), (*axes, *readings.shape)
-            wrong = ~np.isfinite(array) | ((array < 0) & (name == "steps"))
-            if array.shape != shape or (wrong & ~missing).any():
-                raise ValueError(f"{name} must be finite, of shape {shape}, steps ≥ 0; got {array.shape}")
-            array[..., missing] = np.nan
-            arrays[name] = array
-        if self.index is not None:
-            index = np.array(self.index, dtype=np.float64)
-            if index.shape != (R,) or not np.isfinite(index).all():
-                raise ValueError(f"index must be {R} finite angles, one for each run; got {index.tolist()}")
-            arrays["index"] = index
-        keep(self, **arrays)
+            array: AnyArray = np.array(getattr(self, name), dtype=complex if name == "weights" else float)
+            there = np.ones(shape, dtype=bool) if len(shape) < 3 else ~np.isnan(readings)
+            if array.shape != shape or not np.isfinite(array[..., there]).all():
+                raise ValueError(f"{name} must be finite, of shape {shape}; got {array.shape}")
+            array[..., ~there] = np.nan
+            keep(self, **{name: array})
+        if self.steps is not None and (self.steps < 0).any():
+            raise ValueError("steps must be finite, of shape (2, …) and ≥ 0")
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)
@@ -271,7 +269,7 @@ class Limits:
     Raises
     ------
     ValueError
-        Negative or NaN limits, arcs that are none, planes without an angle that is left.
+        Limits that are not above 0 (a plane without a weight is left out), arcs that are none.
     """
 
     max_weight: FloatArray
@@ -281,8 +279,8 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_weight", "residual"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            if not (array >= 0).all():
-                raise ValueError(f"the limits {name} must be numbers ≥ 0 (infinite for none)")
+            if not (array > 0).all():
+                raise ValueError(f"the limits {name} must be numbers above 0 (infinite for none)")
             keep(self, **{name: array})
         arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
         start, width = arcs.T

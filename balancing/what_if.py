@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 DRAWS = 400
 BETTER = 0.9
 """Of the rms of the bare rotor: what 95 of 100 check runs must stay below."""
-FEW = 6
-"""Readings that are shown in one table."""
 RISES = 0.1
 """Of the largest reading: a smaller rise is not worth a word."""
 ROTORS = 2000
@@ -113,13 +111,12 @@ class WhatIf(Outlook, Answered):
         shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
         table = f"{shown}:\n{text(self.columns(), left=2)}"
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.after, self.within)
-        few = self.before.size <= FEW
         return Answer(
             "\n".join((first, *self.worse)),
-            f"{on}\n{table if few else f'Largest{largest}'}",
+            f"{on}\nLargest{largest}",
             remarks.warnings,
             remarks.notes,
-            () if few else (table,),
+            (table,),
             "every reading",
             to_mount=True,
         )
@@ -171,20 +168,15 @@ def what_if(
         D[plane_indices(today, list(weights))] = list(weights.values())
     used = range(len(today.speeds)) if speeds is None else match_speeds(speeds, today.speeds)
     part = today.part(used)
-    off = check_readings(part, D)
-    after, before = part.baseline + part.W @ D, rms(part.baseline)
-    word: Word = "not judged"
-    width = bound = np.nan
-    if len(off):
-        sizes = np.sqrt(np.mean(np.abs(after + off) ** 2, axis=(1, 2)))
-        low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL))
-        word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
-        width = float(half_width(sizes - rms(after)))
+    (covariance, sizes), before = check_run_spread(part, D), rms(part.baseline)
+    low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL)).tolist()
+    width = float(half_width(sizes - rms(part.baseline + part.W @ D)))
+    word: Word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
     removed = tuple(plane for plane in today.planes if plane in remove)
-    parts, n = real_parts(off[..., None]), len(off)
-    V = np.einsum("nsci,nscj->scij", parts, parts) / n if n else np.full((*after.shape, 2, 2), np.nan)
     worse = worse_elsewhere(today, D, part.speeds)
-    return WhatIf(part, D, V, float(bound), width, word, worse, remove=removed)
+    return WhatIf(
+        part, D, covariance, bound, width, "not judged" if np.isnan(bound) else word, worse, remove=removed
+    )
 
 
 def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
@@ -193,6 +185,15 @@ def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
     each = zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False)
     off = [Y + W @ weights + more - after for (Y, W), more in each]
     return np.concatenate([np.zeros((0, *after.shape), dtype=complex), *off])
+
+
+def check_run_spread(influence: Influence, weights: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN where errors are unknown."""
+    off = check_readings(influence, weights)
+    off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
+    read, parts = influence.baseline + influence.W @ weights + off, real_parts(off[..., None])
+    covariance = np.einsum("nsci,nscj->scij", parts, parts) / len(off)
+    return covariance, np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2)))
 
 
 def worse_elsewhere(today: Influence, weights: ComplexArray, used: FloatArray) -> tuple[str, ...]:
@@ -266,9 +267,9 @@ def mode_made_worse(
     common = np.vdot(here, there)
     if abs(common) < AGREES * np.linalg.norm(here) * np.linalg.norm(there) or not outlook.weights.any():
         return ()
-    W = W * common / np.linalg.norm(here) ** 2
-    A, b, y = W[:-1].reshape(-1, count), W[-1], outlook.before.ravel()
-    added = planes[-1] @ outlook.weights * common / np.linalg.norm(here) ** 2
+    scale = common / np.linalg.norm(here) ** 2
+    A, b, y = scale * W[:-1].reshape(-1, count), scale * W[-1], outlook.before.ravel()
+    added = scale * planes[-1] @ outlook.weights
     rng = np.random.default_rng(0)
     u = rng.standard_normal((ROTORS, count, 2)) @ [1, 1j] * np.linalg.norm(y) / np.linalg.norm(A)
     u = u / np.sqrt(rng.chisquare(2, (ROTORS, 1)))

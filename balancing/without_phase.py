@@ -9,7 +9,7 @@ interval of the vibration that it leaves ends below 0.9 of the present, whicheve
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from balancing.amplitudes import Fit, best_weights, choices, effects
 from balancing.conditioning import UndeterminedError, chance
+from balancing.cones import allowed_sectors, stands_in
 from balancing.correction import MountDecision
 from balancing.decision import HARDLY_BELOW
 from balancing.regions import LEVEL, Region, half_width
@@ -228,7 +229,7 @@ class WithoutPhase(Answered):
         readings = reading_columns(self.labels, self.trials.speeds, self.trials.sensors)
         return (
             Column("run", np.repeat(self.trials.runs, len(first.before))),
-            *(Column(one.heading, tuple(one.values) * R, one.shown, title=one.title) for one in readings),
+            *(replace(one, values=tuple(one.values) * R) for one in readings),
             Column("read", np.abs(self.trials.mean).ravel() * scale, three_figures),
             Column("fitted", fitted.ravel() * scale, three_figures),
         )
@@ -249,8 +250,7 @@ class WithoutPhase(Answered):
     def answer(self) -> Answer:
         """What to do, every solution with its 95 %, and the amplitudes behind it."""
         left = [f"{100 * one.left:.0f} %" if one.left < 10 else "anything" for one in self.solutions]
-        cells = [cell for words in left for cell in (words, *[""] * (len(self.planes) - 1))]
-        leaves = Column("left", cells, title="leaves at most")
+        leaves = Column("left", np.repeat(left, len(self.planes)), title="leaves at most")
         caption = (
             f"{self.labels.turning_in_words()}; amplitudes ± {percent(self.scatter.relative)} % "
             f"({self.scatter.origin}), {counted(len(self.solutions), 'solution')}."
@@ -430,12 +430,8 @@ def _decide(
     """Mount what leaves less than 0.9 of the present vibration by every solution, where it may stand."""
     labels, before, weights = trials.labels, rms(solutions[0].before), solutions[0].weights
     expected, cause, instead = before * max(one.left for one in solutions), "", ""
-    arcs = () if limits is None else zip(trials.planes, weights, limits.forbidden, strict=True)
-    forbidden = [
-        repr(plane)
-        for plane, weight, each in arcs
-        if any(1e-9 < (np.angle(weight) - start) % (2 * np.pi) < width - 1e-9 for start, width in each)
-    ]
+    arcs = () if limits is None else zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
+    forbidden = [repr(plane) for plane, D, each in arcs if not stands_in(D, allowed_sectors(each))]
     word: Literal["mount", "do not mount", "measure again"] = "do not mount"
     if scatter.origin != "estimated" and chance(scatter.chi_square, scatter.dof) < CONTRADICTION:
         word, cause = "measure again", _contradiction(trials, scatter)

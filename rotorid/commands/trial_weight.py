@@ -155,7 +155,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         size(options.radius, "--radius", "200mm"),
         load,
         fraction=(10.0 if options.share is None else options.share) / 100,
-        phase=None if phase is None else labels.leading(radians(degrees(phase, "--reading-phase"))),
+        phase=None if phase is None else labels.phase_sign * radians(degrees(phase, "--reading-phase")),
         lag=_lag(options),
         sensor_angle=labels.with_rotation(radians(degrees(options.sensor_angle, "--sensor-angle"))),
         labels=labels,

@@ -191,7 +191,7 @@ def test_stated_errors_refuse_what_assumed_ones_only_warn_of():
     [
         ({"strength": 0.1, "method": "minmax"}, "least squares without limits only"),
         ({"row_weights": np.ones(3)}, "shape"),
-        ({"row_weights": np.zeros((1, 2))}, "all readings have the weight 0"),
+        ({"row_weights": np.zeros((1, 2))}, "not all zero"),
         ({"planes": ["X"]}, "there is no plane 'X'"),
         ({"speeds": [120.0]}, "there are no coefficients at"),
         ({"baseline": np.zeros((1, 2))}, "there is nothing to balance"),

@@ -75,6 +75,7 @@ def test_silent_wrong_answers_are_refused(method, most, W, Y, more, error, messa
             {"limits": limits(3, 1, max_weight=1)},
             "the limits are for 3 readings and 1 planes; there are 2",
         ),
+        ({"limits": limits(2, 1, forbidden=(((0, 4), (3, 4)),))}, "leave plane '1' no angle"),
         ({"method": "weighted"}, "needs errors of the readings"),
         ({"method": "minmax", "strength": 0.1}, "least squares without limits only"),
     ],
