@@ -27,7 +27,15 @@ from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
 from balancing.errors import reading_of
-from balancing.influence import Influence, Whitening, estimate_influence, match_speeds
+from balancing.influence import (
+    Influence,
+    Whitening,
+    estimate_influence,
+    in_order,
+    local_runs,
+    match_readings,
+    with_readings,
+)
 from balancing.noise import Noise
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import (
@@ -268,20 +276,15 @@ def compare_check(
         For sensors, speeds or planes without coefficients, and a baseline that does not fit.
     """
     today = influence if baseline is None else influence.rebased(baseline)
-    at = match_speeds(check.speeds, today.speeds)
-    part = today.part(at, [index_of(name, today.sensors, "sensor") for name in check.sensors])
-    T = np.zeros((len(check.runs), len(part.planes)), dtype=complex)
-    for plane, weights in _mounted(check, correction).items():
-        if plane in part.planes or weights.any():
-            T[:, index_of(plane, part.planes, "plane")] = weights
-    predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, T)
+    part = today.part(*match_readings(check, today))
+    local = local_runs(part, _as_mounted(check, correction))
+    predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, local.weights)
     difference = check.mean - predicted
     reading = reading_of(check)
     covariance = np.full((*difference.shape, 2, 2), np.nan)
     distance = covariance[..., 0, 0]
     chi_square = probability = explained = change = None
     if part.known_errors:
-        local = replace(check, planes=part.planes, weights=T, speeds=part.speeds)
         noise = part.difference_noise(local)
         V = noise.covariance(part.errors.sizes)
         R, S, C = difference.shape
@@ -298,7 +301,7 @@ def compare_check(
         sensors=check.sensors,
         planes=part.planes,
         speeds=part.speeds,
-        weights=T,
+        weights=local.weights,
         as_proposed=not check.planes,
         before=part.baseline,
         predicted=predicted,
@@ -367,15 +370,6 @@ def last_run(runs: Trials) -> Trials:
     return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
 
 
-def index_of(name: str, names: tuple[str, ...], what: str) -> int:
-    """Index of a name of a check run among those of the coefficients."""
-    if name not in names:
-        raise ValueError(
-            f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "
-            f"{', '.join(map(repr, names))}"
-        )
-    return names.index(name)
-
 
 def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:
     """Influence coefficients from trial runs and check runs together.
@@ -405,17 +399,17 @@ def refine(trials: Trials, check: Trials, corrections: Correction | None = None)
     return estimate_influence(with_check_runs(trials, check, corrections))
 
 
-def _mounted(check: Trials, correction: Correction | None) -> dict[str, ComplexArray]:
-    """Weights of each run of a check by plane, (R,): its own, or else what was proposed."""
+def _as_mounted(check: Trials, correction: Correction | None) -> Trials:
+    """Check runs with what was proposed as their weights, where they have none."""
     if check.planes:
-        return dict(zip(check.planes, check.weights.T, strict=True))
+        return check
     if correction is None:
         raise ValueError(
             f"what was mounted in the check run {check.runs[0]!r} is not known: give its weights table, or "
             "the corrections that were mounted"
         )
-    every = np.tile(correction.weights[:, None], len(check.runs))
-    return dict(zip(correction.planes, every, strict=True))
+    weights = np.tile(correction.weights, (len(check.runs), 1))
+    return replace(check, planes=correction.planes, weights=weights)
 
 
 def with_check_runs(trials: Trials, check: Trials, corrections: Correction | None = None) -> Trials:
@@ -431,19 +425,15 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
     ValueError
         For check runs of other sensors and speeds, and where nobody says what was mounted.
     """
-    at = match_speeds(trials.speeds, check.speeds, "readings of the check run")
     if {*check.sensors} != {*trials.sensors}:
         raise ValueError(
             f"the check runs have readings of {listing(map(repr, check.sensors), 'and')}, the trial runs of "
             f"{listing(map(repr, trials.sensors), 'and')}: give those of the same sensors"
         )
-    pick = np.ix_(at, [check.sensors.index(name) for name in trials.sensors])
-    mounted, R = _mounted(check, corrections), len(trials.runs)
-    planes = tuple(dict.fromkeys((*trials.planes, *(p for p, weights in mounted.items() if weights.any()))))
-    T = np.zeros((R + len(check.runs), len(planes)), dtype=complex)
-    T[:R, : len(trials.planes)] = trials.weights
-    for p, plane in enumerate(planes):
-        T[R:, p] = mounted.get(plane, 0.0)
+    check = with_readings(_as_mounted(check, corrections), trials, "readings of the check run")
+    added = [plane for plane, there in zip(check.planes, check.weights.any(axis=0), strict=True) if there]
+    planes = tuple(dict.fromkeys((*trials.planes, *added)))
+    weights = [in_order(runs.weights, runs.planes, planes) for runs in (trials, check)]
     stated = trials.errors or check.errors
     measured = [each.covariance for each in (trials, check) if each.covariance is not None]
     # of typed readings beside measured ones: the mean of these, or none beside stated errors
@@ -451,16 +441,15 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
 
     def joined(name: str, missing: FloatArray) -> Any:  # noqa: ANN401
         """Arrays (…, K, R, S, C) of both as one, NaN where one has fewer repeats."""
-        both = [getattr(trials, name), getattr(check, name)]
-        if all(array is None for array in both):
+        if all(getattr(runs, name) is None for runs in (trials, check)):
             return None
-        both[1] = None if both[1] is None else both[1][..., *pick]
         most, padded = max(len(trials.readings), len(check.readings)), []
-        for runs, array in zip((trials, check), both, strict=True):
-            K, R = runs.readings.shape[:2]
-            full = np.multiply.outer(missing, np.ones((K, R, *trials.readings.shape[2:])))
-            gap = [*[(0, 0)] * missing.ndim, (0, most - K), *[(0, 0)] * 3]
-            padded.append(np.pad(full if array is None else array, gap, constant_values=np.nan))
+        for runs in (trials, check):
+            array = getattr(runs, name)
+            if array is None:
+                array = np.multiply.outer(missing, np.ones(runs.readings.shape))
+            gap = [*[(0, 0)] * missing.ndim, (0, most - len(runs.readings)), *[(0, 0)] * 3]
+            padded.append(np.pad(array, gap, constant_values=np.nan))
         return np.concatenate(padded, axis=-3)
 
     return replace(
@@ -468,7 +457,7 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
         runs=(*trials.runs, *(f"{name} (check)" if name in trials.runs else name for name in check.runs)),
         planes=planes,
         readings=joined("readings", np.ones(())),
-        weights=T,
+        weights=np.concatenate(weights),
         errors=stated,
         run_errors=trials.run_errors or check.run_errors,
         warnings=tuple(dict.fromkeys(trials.warnings + check.warnings)),

@@ -65,7 +65,7 @@ class Split:
     @property
     def relative_error(self) -> float:
         """|error| by the size of the target (a target of 0: by what is mounted, or 0)."""
-        return _relative(self.mounting.vector, self.target)
+        return abs(self.error) / (abs(self.target) or abs(self.mounting.vector) or 1.0)
 
     @property
     def pieces(self) -> int:
@@ -90,7 +90,9 @@ class Split:
             pieces = zip(self.mounting.counts[h], self.holes.pieces, strict=False)
             each = [{"count": int(n), "mass": labels.weight_entry(size)["mass"]} for n, size in pieces if n]
             rows.append({"hole": self.holes.names[h], **weight, "pieces": each})
-        return _document("holes", self.target, labels, self.mounting.vector) | {
+        return _document("holes", self.target, labels) | {
+            "error": labels.weight_entry(self.error),
+            "relative_error": self.relative_error,
             "holes": rows,
             "mounted": labels.weight_entry(self.mounting.vector),
             "number_of_pieces": self.pieces,
@@ -374,18 +376,10 @@ def drill(target: complex, radius: float, diameter: float, density: float = STEE
 OneWeight = Split | TwoPlanes | TwoPositions | Removal
 
 
-def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:
-    """Keys that every document has; with the error where a weight is made."""
+def _document(method: str, target: complex, labels: Labels) -> dict[str, Any]:
+    """Keys that every document has."""
     head = {"method": method, "unit": labels.weight_unit, "angles": labels.angles}
-    document: dict[str, Any] = {**head, "target": labels.weight_entry(target)}
-    if made is not None:
-        document["error"] = labels.weight_entry(made - target)
-        document["relative_error"] = _relative(made, target)
-    return document
-
-
-def _relative(made: complex, target: complex) -> float:
-    return abs(made - target) / (abs(target) or abs(made) or 1.0)
+    return {**head, "target": labels.weight_entry(target)}
 
 
 def _positive(*sizes: float) -> None:

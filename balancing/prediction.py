@@ -13,7 +13,7 @@ import numpy as np
 from balancing.conditioning import Conditioning
 from balancing.conventions import Labels
 from balancing.groups import Unknowns, mapped, static_and_couple
-from balancing.influence import Influence, Mounted
+from balancing.influence import Influence, Mounted, in_order
 from balancing.methods import Solution, method_words
 from balancing.regions import Region, half_width, reach
 from balancing.tables import (
@@ -247,9 +247,7 @@ class Prediction(Outlook):
     @property
     def to_add(self) -> ComplexArray:
         """What to add to the weights mounted now, one per plane of `mounted`."""
-        total = dict(zip(self.planes, self.weights, strict=True))
-        planes = [total.get(plane, 0.0) for plane in self.mounted.planes]
-        return np.array(planes, dtype=complex) - self.mounted.weights
+        return in_order(self.weights, self.planes, self.mounted.planes) - self.mounted.weights
 
     @property
     def active(self) -> tuple[str, ...]:

@@ -33,26 +33,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.conventions import Labels
+from balancing.influence import Influence, plane_indices
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records
-from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from balancing.influence import Influence
-
-
 GRAVITY = 9.80665
 RISKY = 0.25
 """Of the load, for the force of a first trial weight."""
 
 _LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
-_LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
+
 
 
 @dataclass(frozen=True)
@@ -121,7 +117,7 @@ class TrialWeight(Answered):
         """Centrifugal force at the highest speed, N; None for masses without a radius."""
         if self.radius is None and not self.labels.unbalances:
             return None
-        return self.amount * (1.0 if self.radius is None else self.radius) * self.speed**2
+        return self.amount * (self.radius or 1.0) * self.speed**2
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
@@ -245,7 +241,7 @@ def trial_from_force(  # noqa: PLR0913
             "an angle needs both the phase of the initial reading and the lag: give the other one, too"
         )
     if phase is not None and lag is not None:
-        angle = opposing_angle(phase, lag.expected, sensor_angle=sensor_angle)
+        angle = opposing_angle(phase, lag.expected, sensor_angle)
         reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
     warnings = _force_warning(fraction)
@@ -290,14 +286,10 @@ def trial_from_coefficients(
         For a plane that is not known or acts on no reading, and readings that are lacking or
         zero.
     """
-    if plane not in influence.planes:
-        raise ValueError(
-            f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
-        )
-    Y, w = influence.baseline, influence.W[..., influence.planes.index(plane)]
-    labels = influence.labels
+    [p] = plane_indices(influence, [plane])
+    Y, w, labels = influence.baseline, influence.W[..., p], influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
-    at = radius if trial_radius is None else trial_radius
+    at = trial_radius or radius
     scale = 1.0 if radius is None or at is None else radius / at
     size = float(np.abs(Y).max())
     if not size > 0:
@@ -378,29 +370,19 @@ def expected_lag(
     return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
 
 
-def opposing_angle(
-    phase: float,
-    lag: float,
-    *,
-    sensor_angle: float = 0.0,
-    key_phasor: float = 0.0,
-    quantity: Quantity = "displacement",
-) -> float:
+def opposing_angle(phase: float, lag: float, sensor_angle: float = 0.0) -> float:
     """Angle opposite to the heavy spot, rad with the rotation, 0 ≤ angle < 2π (derived in the module).
 
     Parameters
     ----------
     phase
-        Of the reading, rad, positive = lead.
+        Of the reading as a displacement, rad, positive = lead.
     lag
         ψ, rad.
-    sensor_angle, key_phasor
-        α and κ, rad with the rotation, from any common origin.
-    quantity
-        What the sensor reads.
+    sensor_angle
+        α − κ, of the sensor from the key phasor, rad with the rotation.
     """
-    angle = phase - _LEAD[quantity] + sensor_angle - key_phasor + lag + math.pi
-    return angle % (2 * math.pi)
+    return (phase + sensor_angle + lag + math.pi) % (2 * math.pi)
 
 
 def positive(what: str, value: float) -> None:

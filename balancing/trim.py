@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from balancing.correction import Correction
-from balancing.influence import match_speeds
+from balancing.influence import in_order, match_readings
 from balancing.mount import Mounted
 from balancing.tables import reading_columns, rms, small, three_figures, vector_columns, weight_rows
 from balancing.trials import Trials
@@ -104,11 +104,8 @@ class LeftToDo(Answered):
         ]
         lines = []
         if self.word == "trim" and self.pieces is not None:
-            each = zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True)
-            lines += ["", f"Trim with pieces, in {c.labels.weight_in}:"]
-            lines += [
-                f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
-            ]
+            lines = ["", f"Trim with pieces, in {c.labels.weight_in}:"]
+            lines += [f"  {line}" for line in self.pieces.in_planes()]
         elif self.word == "trim":
             places = c.places(self.planes, self.trim).tolist()
             add = zip(self.planes, self.trim.tolist(), places, strict=True)
@@ -154,10 +151,12 @@ def after_check_run(
     """
     c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
     run, planes, there = c.mounted
-    pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
+    pick = np.ix_(*match_readings(check, c.influence))
     bare = c.before[pick] if bare is None else bare
     now, before = rms(check.mean[-1]), rms(bare)
-    trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
+    trim, made = c.to_add, c
+    if pieces is not None:
+        trim, made = in_order(pieces.weights, pieces.correction.planes, planes), pieces
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
     change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
     change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
@@ -206,11 +205,4 @@ def _within_its_error(c: Correction) -> bool:
     """Whether what is mounted may be the right weights."""
     if not c.region_known:
         return False
-    there = dict(zip(*c.mounted[1:], strict=True))
-    return c.region().holds(np.array([there.get(plane, 0.0) for plane in c.planes], dtype=complex))
-
-
-def _in_planes(pieces: Mounted, planes: tuple[str, ...]) -> ComplexArray:
-    """Weights of pieces, (P,), in these planes."""
-    chosen = dict(zip(pieces.correction.planes, pieces.weights, strict=True))
-    return np.array([chosen.get(plane, 0.0) for plane in planes], dtype=complex)
+    return c.region().holds(in_order(c.mounted.weights, c.mounted.planes, c.planes))

@@ -22,12 +22,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.check_run import index_of, last_run
+from balancing.check_run import last_run
 from balancing.conditioning import chance, check_planes
 from balancing.conventions import Labels
 from balancing.correct import fit_part
 from balancing.correction import Correction
-from balancing.influence import Influence, match_speeds, plane_indices
+from balancing.influence import Influence, match_readings, plane_indices
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
 from balancing.prediction import Outlook
@@ -322,14 +322,13 @@ def verdict_of_check(
     ValueError
         Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
     """
-    at = match_speeds(check.speeds, influence.speeds)
-    sensors = [index_of(name, influence.sensors, "sensor") for name in check.sensors]
+    where = match_readings(check, influence)
     bare = replace(last_run(check), planes=(), weights=np.zeros((1, 0), dtype=complex))
-    left = influence.part(at, sensors).rebased(bare)
+    left = influence.part(*where).rebased(bare)
     judged: list[Judgement] = []
     warnings = left.remarks.warnings
     if tolerance is not None:
-        part = left.part(range(len(at)), None, plane_indices(left, tolerance.planes))
+        part = left.part(range(len(left.speeds)), None, plane_indices(left, tolerance.planes))
         S, C, P = part.W.shape
         check_planes(part.W.reshape(-1, P), part.planes)
         fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
@@ -344,7 +343,7 @@ def verdict_of_check(
             )
     if limits is not None:
         covariance = left.channels()[..., :2, :2] if left.known_errors else np.full((2, 2), np.nan)
-        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(at, sensors)])
+        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(*where)])
     return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 
