@@ -370,7 +370,6 @@ def last_run(runs: Trials) -> Trials:
     return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
 
 
-
 def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:
     """Influence coefficients from trial runs and check runs together.
 

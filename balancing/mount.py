@@ -33,7 +33,6 @@ from balancing.tables import (
     small,
     three_figures,
     vector_columns,
-    weight_columns,
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
@@ -87,7 +86,7 @@ class Mounted(Answered):
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels
         covariance = c.after_covariance if c.errors_known else None
-        actions = Column("action", [_action(c, plane) for plane in c.planes])
+
         residuals = (
             *reading_columns(labels, c.speeds, c.sensors),
             *vector_columns(labels, "after", self.after),
@@ -95,7 +94,7 @@ class Mounted(Answered):
         )
         return plain(
             {
-                "planes": records((*weight_columns(labels, c.planes, self.weights), actions)),
+                "planes": records(c.work_columns(c.planes, self.weights)[:-1]),
                 "on_top_of": self.on_top_of,
                 "warnings": [],
                 "holes": records(_columns(self)),
@@ -290,10 +289,6 @@ def _enough(
     return enough
 
 
-def _action(correction: Correction, plane: str) -> str:
-    return "remove" if plane in correction.remove else "add"
-
-
 def _columns(m: Mounted) -> tuple[Column, ...]:
     """A row for each hole that gets something; one without hole for a plane where any angle is possible."""
     c, labels = m.correction, m.correction.labels
@@ -307,15 +302,14 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         for h in np.flatnonzero(mounting.amounts > 0).tolist():
             words = "" if holes.free_amounts else content(holes, mounting, h, labels.weight_scale)
             places.append((plane, holes.names[h], vectors[h], words))
-    planes = [place[0] for place in places]
-    size, angle = labels.weight([place[2] for place in places])
-    gone = np.array([plane in c.remove for plane in planes])
+    planes, weights = ([place[k] for place in places] for k in (0, 2))
+    _, mass, unit, _, action, _ = c.work_columns(planes, weights)
     return (
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
-        Column("action", [_action(c, plane) for plane in planes], None),
+        replace(action, shown=None),
         Column("hole", [place[1] for place in places]),
-        Column("angle_deg", np.round(np.mod(angle + 180.0 * gone, 360), 9), "{:.1f}°".format, title="angle"),
-        Column("mass", size, figures, title=labels.weight_in),
-        Column("unit", [labels.weight_unit] * len(places), None),
+        Column("angle_deg", np.round(c.places(planes, weights), 9), "{:.1f}°".format, title="angle"),
+        mass,
+        unit,
         Column("pieces", [place[3] for place in places]),
     )

@@ -51,7 +51,6 @@ SAME = 1e-9
 _LONGEST, _PAIRS, _CONTENTS = 20_000, 1_000_000, 100_000
 _LISTED, _BEST, _BRANCHES = 1000, (300, 60), (40, 8)
 """Vectors of a plane for every number; choices of every number that are kept, and branches: last, before."""
-_MIX = np.random.default_rng(0).integers(1, 2**62, 100)
 
 
 class Vectors(NamedTuple):
@@ -83,7 +82,7 @@ class PlaneVectors:
     arcs
         First angle and width of arcs in which no hole is used.
     max_weight
-        Largest |mounted + d|, beside that of the holes.
+        Largest |mounted + d|.
     heavier
         More than two pieces weigh at most so many times the least sum that makes what is wanted; there are at
         most four more than that sum needs.
@@ -102,7 +101,7 @@ class PlaneVectors:
         max_weight: float = np.inf,
         heavier: float = np.inf,
     ) -> None:
-        self.holes, self.wanted, self.max_weight = holes, wanted, min(holes.max_weight, max_weight)
+        self.holes, self.wanted, self.max_weight = holes, wanted, max_weight
         self.usable, self.heaviest = holes.outside(arcs), np.inf
         where = np.flatnonzero(self.usable)
         if not len(where):
@@ -166,13 +165,11 @@ class PlaneVectors:
 
     def _distinct(self, sums: ComplexArray, used: FloatArray) -> IndexArray:
         """Of equal sums (that use the same of a stock) those of the fewest pieces, then the lightest."""
-        scarce = used[:, self.stock < self.most].T
-        # a hash of whole numbers: different ones are the same with a chance of 1e-7 in a list
-        parts = (*(np.rint(part / (SAME * self.reach)) for part in (sums.real, sums.imag)), *scarce)
-        mixed = np.add.reduce([part.astype(np.int64) * mix for part, mix in zip(parts, _MIX, strict=False)])
+        places = np.rint(np.array((sums.real, sums.imag)) / (SAME * self.reach))
+        keys = np.vstack((places, used[:, self.stock < self.most].T))
         cost = used @ (1 + 0.5 * self.sizes / self.reach)
-        order = np.lexsort((cost, mixed))
-        return np.asarray(order[np.diff(mixed[order], prepend=np.iinfo(np.int64).min) != 0])
+        order = np.lexsort((cost, *keys))
+        return np.asarray(order[(np.diff(keys[:, order], prepend=np.nan) != 0).any(axis=0)])
 
     def near(self, z: complex, count: int, number: int | None = None) -> Vectors:
         """About `count` vectors near z, the nearest first, of so many pieces or (None) of any number."""
@@ -216,7 +213,7 @@ class PlaneVectors:
 
     def mount(self, put: IntArray) -> Mounting:
         """What goes where, (H, K) as `Vectors` have it."""
-        return mounting(self.holes, None if self.holes.free_amounts else put, put @ self.sizes)
+        return mounting(self.holes, put @ self.sizes, None if self.holes.free_amounts else put)
 
     def listed(self, z: complex) -> Vectors:
         """Vectors near a point, of every number of pieces, for `around`."""
@@ -253,7 +250,7 @@ class PlaneVectors:
 
     def place(self, z: complex) -> Mounting:
         """Amounts of any size that make z."""
-        return mounting(self.holes, amounts=lightest(self.holes, self.usable, z, np.inf))
+        return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf))
 
 
 def _few(half: _Half, most: int) -> _Half:

@@ -50,7 +50,6 @@ RISKY = 0.25
 _LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
 
 
-
 @dataclass(frozen=True)
 class Lag:
     """How far a vibration lags the unbalance behind it.

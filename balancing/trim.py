@@ -82,7 +82,7 @@ class LeftToDo(Answered):
                 "word": self.word,
                 "why": self.why,
                 "run": self.run,
-                "mounted": weight_rows(self.correction.labels, self.planes, self.there),
+                "mounted": weight_rows(labels, self.planes, self.there),
                 "add": self.correction.work_rows(self.planes, self.trim),
                 "holes": [] if self.pieces is None else self.pieces.to_dict()["holes"],
                 "readings": records(readings) if self.word == "trim" else [],
