@@ -34,9 +34,11 @@ from balancing.influence import (
     in_order,
     local_runs,
     match_readings,
+    picked,
     with_readings,
 )
 from balancing.noise import Noise
+from balancing.prediction import rms_change, shown
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import (
     ROUNDING,
@@ -45,7 +47,6 @@ from balancing.tables import (
     reading_columns,
     rms,
     small,
-    three_figures,
     vector_columns,
     weight_rows,
 )
@@ -133,10 +134,9 @@ class CheckComparison(Answered):
         if len(self.runs) > 1:
             where += f" in run {self.runs[r]!r}"
         if self.probability is None:
-            most = figures(size[r, s, k] * self.labels.vibration_scale, 3)
             return (
                 "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-                f"{where} differs most, by {most} {self.labels.vibration_in}".rstrip()
+                f"{where} differs most, by {shown(self.labels, size[r, s, k])}"
             )
         share = 100 * self.probability
         chance = f"probability {f'{share:.0f}' if share > 1 else 'below 1'} %"
@@ -198,12 +198,11 @@ class CheckComparison(Answered):
     @property
     def headline(self) -> str:
         """Whether the rotor does what was predicted, and what is left in the last run, in a sentence."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        last = self.before, self.predicted[-1], self.achieved[-1]
-        before, predicted, achieved = (rms(z) * scale for z in last)
+        scale = self.labels.vibration_scale
+        predicted = small(rms(self.predicted[-1]) * scale, rms(self.before) * scale)
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
-        left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
-        return f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+        left = rms_change(self.labels, self.before, self.achieved[-1])
+        return f"{heads[self.explained]}: with the weights {left} ({predicted} predicted)."
 
     @property
     def answer(self) -> Answer:
@@ -241,9 +240,9 @@ class CheckComparison(Answered):
     def _readings_text(self) -> str:
         hidden = {"before", "before_phase_deg", "difference_phase_deg"}
         hidden |= {"distance"} if self.explained is None else set()
-        shown = [column for column in self._columns() if column.heading not in hidden]
+        columns = [column for column in self._columns() if column.heading not in hidden]
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        table = text(shown, left=2 + (len(self.runs) > 1))
+        table = text(columns, left=2 + (len(self.runs) > 1))
         return f"Vibration{unit}, predicted and achieved\n{table}"
 
 
@@ -365,9 +364,7 @@ def last_run(runs: Trials) -> Trials:
     Trials
         With its readings and weights.
     """
-    parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
-    last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
-    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
+    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **picked(runs, np.s_[-1:, :, :]))
 
 
 def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:

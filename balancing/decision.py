@@ -26,9 +26,10 @@ import numpy as np
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.influence import in_order
+from balancing.prediction import shown
 from balancing.tables import rms
 from balancing.what_if import worse_elsewhere
-from rotorid.base.text import capital, figures, listing
+from rotorid.base.text import capital, listing
 from rotorid.regression import solution
 
 if TYPE_CHECKING:
@@ -55,13 +56,6 @@ _ALL = 4
 _MORE = 1 + 1e-6
 """Above a limit by more than rounding."""
 
-
-def _error_form(covariance: FloatArray, row_weights: FloatArray) -> ComplexArray:
-    """F (P + 1, P + 1) from covariances (N, 2P + 2, 2P + 2) of (Re Y, Im Y, Re W₁, …), row weights (N,)."""
-    n = covariance.shape[-1]
-    total = np.einsum("n,nij->ij", row_weights**2, covariance).reshape(n // 2, 2, n // 2, 2)
-    real = total[:, 0, :, 0] + total[:, 1, :, 1]
-    return np.asarray(real + 1j * (total[:, 0, :, 1] - total[:, 1, :, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +92,9 @@ class Case:
         w = np.ones(N) if self.row_weights is None else self.row_weights
         w = w / np.linalg.norm(w)
         A = w[:, None] * np.column_stack((self.part.baseline.ravel(), self.W))
-        F = _error_form(self.part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
-        return np.asarray(A.conj().T @ A), F
+        covariance = self.part.channels().reshape(N, P + 1, 2, P + 1, 2)
+        V = np.einsum("n,nicjd->cdij", w**2, covariance)
+        return np.asarray(A.conj().T @ A), V[0, 0] + V[1, 1] + 1j * (V[0, 1] - V[1, 0])
 
     @property
     def before(self) -> float:
@@ -162,7 +157,7 @@ class Case:
 
     def shown(self, size: float, digits: int = 3) -> str:
         """An amplitude with its unit."""
-        return f"{figures(size * self.labels.vibration_scale, digits)} {self.labels.vibration_in}".rstrip()
+        return shown(self.labels, size, digits)
 
     @property
     def coarse(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 
 SAME_ANGLE = float(np.radians(1e-3))
 """Holes nearer to each other than this are one place, and a hole this near to an arc's end is on it."""
@@ -183,17 +183,21 @@ def from_list(
     return Holes(phi, sizes, int(per_hole), float(step), there, left, named)
 
 
-def mounting(holes: Holes, amounts: FloatArray, counts: IntArray | None = None) -> Mounting:
-    """The mounting of `amounts` (H,), those of `counts` (H, K) of the pieces where they are not free."""
-    number = np.zeros((len(amounts), len(holes.pieces)), dtype=np.int64) if counts is None else counts
-    return Mounting(number, amounts, complex(amounts @ np.exp(1j * holes.angles)))
+def mounting(holes: Holes, counts: AnyArray, sizes: FloatArray) -> Mounting:
+    """The mounting of `counts` (H, K) of pieces, or of amounts, of these sizes (K,)."""
+    amounts = counts @ sizes
+    return Mounting(counts[:, : len(holes.pieces)], amounts, complex(amounts @ np.exp(1j * holes.angles)))
 
 
-def content(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
-    """What goes into a hole, in units of 1 / scale: "2 × 150 + 50", or a free amount."""
-    each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
-    parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
-    return " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
+def contents(holes: Holes, mounting: Mounting, scale: float) -> list[tuple[int, complex, str]]:
+    """Every hole in use, its weight, and what goes into it in units of 1 / scale: "2 × 150 + 50"."""
+    used, weights = [], mounting.amounts * np.exp(1j * holes.angles)
+    for h in np.flatnonzero(mounting.amounts).tolist():
+        each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
+        parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
+        words = " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
+        used.append((h, complex(weights[h]), words))
+    return used
 
 
 def lightest(holes: Holes, usable: BoolArray, z: complex, most: float) -> FloatArray:

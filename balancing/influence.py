@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -338,9 +338,13 @@ def with_readings(runs: Trials, of: Influence | Trials, what: str) -> Trials:
         As of `match_readings`.
     """
     at = np.ix_(*match_readings(of, runs, what))
+    return replace(runs, speeds=of.speeds, sensors=of.sensors, **picked(runs, at))
+
+
+def picked(runs: Trials, at: tuple[Any, ...]) -> dict[str, Any]:
+    """Arrays of readings, steps and covariances, as far as there are some, at indices of the last axes."""
     arrays = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
-    picked = {name: array[..., *at] for name, array in arrays.items() if array is not None}
-    return replace(runs, speeds=of.speeds, sensors=of.sensors, **picked)
+    return {name: array[..., *at] for name, array in arrays.items() if array is not None}
 
 
 def in_order(weights: ComplexArray, planes: Sequence[str], wanted: Sequence[str]) -> ComplexArray:
@@ -499,7 +503,7 @@ def fit_runs(trials: Trials) -> Influence:
         baseline=theta[..., 0],
         errors=errors,
         labels=trials.labels,
-        remarks=Remarks(trials.warnings + reading.warnings + disagree, unseen(trials, run), disagree),
+        remarks=Remarks(trials.warnings + reading.warnings + disagree, unseen(run), disagree),
     )
 
 

@@ -21,9 +21,10 @@ from numpy.typing import ArrayLike
 from balancing.correction import Correction
 from balancing.decision import HARDLY_BELOW
 from balancing.groups import PIECES
-from balancing.holes import Holes, content, equal_together
+from balancing.holes import Holes, contents, equal_together
 from balancing.influence import Influence, in_order, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
+from balancing.prediction import rms_change
 from balancing.regions import LEVEL
 from balancing.tables import (
     covariance_column,
@@ -117,9 +118,8 @@ class Mounted(Answered):
     def answer(self) -> Answer:
         """What goes into which hole and what it leaves; then hole by hole."""
         c, labels = self.correction, self.correction.labels
-        unit = labels.vibration_in
-        old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
-        left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
+        unit, left = labels.vibration_in, rms_change(labels, c.before, self.after)
+        free = small(*(rms(readings) * labels.vibration_scale for readings in (c.after, c.before)))
         first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
         if not c.sound or self.check_rms > HARDLY_BELOW * rms(c.before):
             first = "These pieces would leave"
@@ -133,7 +133,7 @@ class Mounted(Answered):
             f"{capital(labels.turning_in_words())}: {self._first_holes()}.",
             "",
             f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}",
-            f"Weights at any angle: {c.in_words()}; rms {small(rms(free), old.max())} {unit}".rstrip() + ".",
+            f"Weights at any angle: {c.in_words()}; rms {free} {unit}".rstrip() + ".",
         ]
         fewer = map(self._left, self.discrete.fewer)
         less = [f"{one['pieces']} → {three_figures(one['rms_after'])}" for one in fewer]
@@ -233,19 +233,14 @@ def mount(
         counts = (1.0 if counts is None else counts) / np.sqrt(variance.clip(1e-6 * variance.max()))
     bound, limits, rows = _bound(c), c.limits, (W, Y.ravel())
     wanted = c.weights - there
-    enough = predicted = _enough(c, Y, bound)
     together = c.unknowns is not None and c.unknowns.constrained
     if together:
         rows, counts = (np.eye(len(planes), dtype=complex), -wanted), None
         limits = limits and replace(limits, residual=np.full((1, len(planes)), np.inf))
-
-        def enough(D: ComplexArray) -> bool:
-            return predicted(D) and bool(norm(D - wanted) <= PIECES * norm(wanted))
-
     discrete = solve_discrete(
         *rows,
         each,
-        enough,
+        _enough(c, Y, bound, PIECES * norm(wanted) if together else np.inf, wanted),
         wanted=wanted,
         method="minmax" if c.method == "minmax" and not together else "least-squares",
         row_weights=counts,
@@ -266,9 +261,9 @@ def _bound(c: Correction) -> Callable[[ComplexArray], float]:
 
 
 def _enough(
-    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float]
+    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float], apart: float, wanted: ComplexArray
 ) -> Callable[[ComplexArray], bool]:
-    """Whether weights D (P,), added to what reads Y, leave little enough.
+    """Whether weights D (P,), added to what reads Y, leave little enough, not too far from those wanted.
 
     Limits that not even any weights are sure to keep ask for no more pieces.
     """
@@ -284,7 +279,7 @@ def _enough(
 
     def enough(D: ComplexArray) -> bool:
         left = Y + c.influence.W @ D
-        return kept(left) if judged else bound(left) <= most
+        return bool(norm(D - wanted) <= apart) and (kept(left) if judged else bound(left) <= most)
 
     return enough
 
@@ -298,10 +293,8 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         if holes is None or mounting is None:
             places.append((plane, _ANY, weight, ""))
             continue
-        vectors = mounting.amounts * np.exp(1j * holes.angles)
-        for h in np.flatnonzero(mounting.amounts > 0).tolist():
-            words = "" if holes.free_amounts else content(holes, mounting, h, labels.weight_scale)
-            places.append((plane, holes.names[h], vectors[h], words))
+        for h, vector, words in contents(holes, mounting, labels.weight_scale):
+            places.append((plane, holes.names[h], vector, "" if holes.free_amounts else words))
     planes, weights = ([place[k] for place in places] for k in (0, 2))
     _, mass, unit, _, action, _ = c.work_columns(planes, weights)
     return (

@@ -178,8 +178,7 @@ class PlaneVectors:
         nearest = []
         most, everything = self.most if number is None else number, 2 * (abs(z) + self.reach)
         apart = 0.0 if number is None else 2 * everything  # another number is far away
-        for where, halves in zip(self.parts, self.halves, strict=True):
-            first, second = (_few(half, most) for half in halves)
+        for where, (first, second) in zip(self.parts, self.halves, strict=True):
             tree = cKDTree(_points(z - first.sums, (most - _number(first.used)) * apart))
             other = cKDTree(_points(second.sums, _number(second.used) * apart))
             # along the wanted weight both halves make so much at most
@@ -211,9 +210,6 @@ class PlaneVectors:
         ]
         return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
-    def mount(self, put: IntArray) -> Mounting:
-        """What goes where, (H, K) as `Vectors` have it."""
-        return mounting(self.holes, put @ self.sizes, None if self.holes.free_amounts else put)
 
     def listed(self, z: complex) -> Vectors:
         """Vectors near a point, of every number of pieces, for `around`."""
@@ -250,13 +246,8 @@ class PlaneVectors:
 
     def place(self, z: complex) -> Mounting:
         """Amounts of any size that make z."""
-        return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf))
+        return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf)[:, None], np.ones(1))
 
-
-def _few(half: _Half, most: int) -> _Half:
-    """The sums of a half that take so many pieces at most."""
-    kept = _number(half.used) <= most
-    return _Half(half.sums[kept], half.used[kept], half.picks[kept])
 
 
 def _number(used: FloatArray) -> FloatArray:
@@ -394,9 +385,9 @@ def solve_discrete(
         weights = np.zeros(P, dtype=complex)
         weights[fixed], weights[free] = D[n], follow @ np.append(D[n], 1.0)
         each = zip(fixed, rows[n], lists, strict=True)
-        put = {p: one.mount(vectors.put[row]) for p, row, (one, vectors) in each}
-        put |= {p: sets[p].place(complex(weights[p])) for p in free if list(named.values())[p]}
-        mountings = tuple(map(put.get, range(P)))
+        made = {p: mounting(one.holes, vectors.put[row], one.sizes) for p, row, (one, vectors) in each}
+        made |= {p: sets[p].place(complex(weights[p])) for p in free if list(named.values())[p]}
+        mountings = tuple(map(made.get, range(P)))
         return Discrete(mountings, weights, Y + W @ weights, float(value[n]))
 
     each = [choice(n) for n in best]

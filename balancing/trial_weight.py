@@ -120,12 +120,12 @@ class TrialWeight(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        size, angle = self._size_and_angle()
         document = {
             "plane": self.plane,
             "mass": size,
             "unit": self.labels.weight_unit,
-            "angle_deg": None if self.angle is None else angle,
+            "angle_deg": angle,
             "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
             "basis": self.basis,
             "radius_m": self.radius,
@@ -150,10 +150,10 @@ class TrialWeight(Answered):
     def answer(self) -> Answer:
         """Amount and place, what for, and the readings expected with it."""
         labels, share = self.labels, self._share()
-        size, turned = labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        size, turned = self._size_and_angle()
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
-        if self.angle is not None:
+        if turned is not None:
             angle = f"at {turned:.0f}° {labels.angle_words}"
             angle += f" (± {math.degrees(self.angle_reach):.0f}°)" if self.angle_reach else ""
         lines = [f"Plane {self.plane}: {self.basis}"]
@@ -170,6 +170,11 @@ class TrialWeight(Answered):
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
             to_mount=True,
         )
+
+    def _size_and_angle(self) -> tuple[float, float | None]:
+        """As the job has them."""
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        return float(size), None if self.angle is None else float(angle)
 
     def _share(self) -> float | None:
         """Force in percent of the load; None where one of both is unknown."""
@@ -300,17 +305,17 @@ def trial_from_coefficients(
     warnings: list[str] = []
     positive("share of the largest reading", share)
     s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
-    amount = share * size / float(abs(w[s, c])) * scale
+    amount = share * size / float(abs(w[s, c]))
     reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
     basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
-    if amount > limit * scale:
-        amount, basis = limit * scale, "the largest weight of the plane"
+    if amount > limit:
+        amount, basis = limit, "the largest weight of the plane"
         warnings.append(
             f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
             f"weight of plane {plane!r}: that is proposed"
         )
     angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
-    expected = Y + w * (amount / scale * np.exp(1j * angle))
+    expected = Y + w * (amount * np.exp(1j * angle))
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
@@ -319,7 +324,7 @@ def trial_from_coefficients(
         )
     weight = TrialWeight(
         plane=plane,
-        amount=float(amount),
+        amount=amount * scale,
         angle=angle,
         angle_reach=0.0,
         basis=f"{basis}; angle from the coefficients",

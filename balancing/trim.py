@@ -15,7 +15,8 @@ import numpy as np
 from balancing.correction import Correction
 from balancing.influence import in_order, match_readings
 from balancing.mount import Mounted
-from balancing.tables import reading_columns, rms, small, three_figures, vector_columns, weight_rows
+from balancing.prediction import rms_change, shown
+from balancing.tables import reading_columns, rms, vector_columns, weight_rows
 from balancing.trials import Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -149,7 +150,7 @@ def after_check_run(
     bare
         Vibration of the bare rotor at the speeds and sensors of the check, (S, C); None: the correction's.
     """
-    c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
+    c, labels = correction, correction.labels
     run, planes, there = c.mounted
     pick = np.ix_(*match_readings(check, c.influence))
     bare = c.before[pick] if bare is None else bare
@@ -158,8 +159,9 @@ def after_check_run(
     if pieces is not None:
         trim, made = in_order(pieces.weights, pieces.correction.planes, planes), pieces
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
-    change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
-    change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
+    change = rms_change(labels, check.mean[-1], made.after[pick])
+    if bound is not None:
+        change += f", below {figures(bound * labels.vibration_scale, 2)} in 95 of 100 check runs"
     left = after if bound is None or judged == "fail" else bound
     worth = trim.any() and left < WORTH * now
     again = c.decision.cause if c.decision.word == "measure again" else ""
@@ -173,9 +175,9 @@ def after_check_run(
         word, why = "done", "every limit is kept"
     elif now >= before and explained is not True and there.any():
         word = "take off what is mounted"
-        why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
-        why += f"; {stop or 'check what was mounted, and where'}"
-    elif settled and _within_its_error(c):
+        why = f"the bare rotor had rms {shown(labels, before)}; "
+        why += stop or "check what was mounted, and where"
+    elif settled and c.region_known and c.region().holds(in_order(there, planes, c.planes)):
         word = "done"
         why = f"a trim would be within its own error ({change})"
         why += f", and may be worth it: {', '.join(c.work_words(planes, trim))}" if worth else ""
@@ -201,8 +203,4 @@ def after_check_run(
     )
 
 
-def _within_its_error(c: Correction) -> bool:
-    """Whether what is mounted may be the right weights."""
-    if not c.region_known:
-        return False
-    return c.region().holds(in_order(c.mounted.weights, c.mounted.planes, c.planes))
+

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.patches import Circle, Wedge
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, content
+from balancing.holes import Holes, Mounting, contents
 from balancing.plots.polar import on_paper, turn_sign
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.plot_style import TEXT, new_figure
@@ -77,9 +77,9 @@ def draw_disc(  # noqa: PLR0913
     weights, taken = [*loose], np.zeros(1) if holes is None else holes.taken
     texts = [f"{minus}{labels.weight_words(abs(w))}\n{labels.weight(sign * w)[1]:.1f}°" for w in loose]
     if holes is not None and mounting is not None:
-        for h in np.flatnonzero(mounting.amounts).tolist():
-            weights.append(complex(mounting.amounts[h] * np.exp(1j * holes.angles[h])))
-            texts.append(f"{holes.names[h]}: {minus}{content(holes, mounting, h, labels.weight_scale)}")
+        for h, made, words in contents(holes, mounting, labels.weight_scale):
+            weights.append(made)
+            texts.append(f"{holes.names[h]}: {minus}{words}")
     at = sign * zero * on_paper(labels, weights)
     scale = min(0.1, _HOLES * np.pi / len(taken)) / np.sqrt(max([*np.abs(at), *taken]) or 1.0)
     what = f"{'take away' if remove else 'add'}, {labels.weight_in}"
