@@ -27,8 +27,18 @@ from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
 from balancing.errors import reading_of
-from balancing.influence import Influence, Whitening, estimate_influence, match_speeds
+from balancing.influence import (
+    Influence,
+    Whitening,
+    estimate_influence,
+    in_order,
+    local_runs,
+    match_readings,
+    picked,
+    with_readings,
+)
 from balancing.noise import Noise
+from balancing.prediction import rms_change, shown
 from balancing.regions import LEVEL, real_parts
 from balancing.tables import (
     ROUNDING,
@@ -37,7 +47,6 @@ from balancing.tables import (
     reading_columns,
     rms,
     small,
-    three_figures,
     vector_columns,
     weight_rows,
 )
@@ -125,10 +134,9 @@ class CheckComparison(Answered):
         if len(self.runs) > 1:
             where += f" in run {self.runs[r]!r}"
         if self.probability is None:
-            most = figures(size[r, s, k] * self.labels.vibration_scale, 3)
             return (
                 "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-                f"{where} differs most, by {most} {self.labels.vibration_in}".rstrip()
+                f"{where} differs most, by {shown(self.labels, size[r, s, k])}"
             )
         share = 100 * self.probability
         chance = f"probability {f'{share:.0f}' if share > 1 else 'below 1'} %"
@@ -190,12 +198,11 @@ class CheckComparison(Answered):
     @property
     def headline(self) -> str:
         """Whether the rotor does what was predicted, and what is left in the last run, in a sentence."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
-        last = self.before, self.predicted[-1], self.achieved[-1]
-        before, predicted, achieved = (rms(z) * scale for z in last)
+        scale = self.labels.vibration_scale
+        predicted = small(rms(self.predicted[-1]) * scale, rms(self.before) * scale)
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
-        left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
-        return f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+        left = rms_change(self.labels, self.before, self.achieved[-1])
+        return f"{heads[self.explained]}: with the weights {left} ({predicted} predicted)."
 
     @property
     def answer(self) -> Answer:
@@ -233,9 +240,9 @@ class CheckComparison(Answered):
     def _readings_text(self) -> str:
         hidden = {"before", "before_phase_deg", "difference_phase_deg"}
         hidden |= {"distance"} if self.explained is None else set()
-        shown = [column for column in self._columns() if column.heading not in hidden]
+        columns = [column for column in self._columns() if column.heading not in hidden]
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        table = text(shown, left=2 + (len(self.runs) > 1))
+        table = text(columns, left=2 + (len(self.runs) > 1))
         return f"Vibration{unit}, predicted and achieved\n{table}"
 
 
@@ -268,20 +275,15 @@ def compare_check(
         For sensors, speeds or planes without coefficients, and a baseline that does not fit.
     """
     today = influence if baseline is None else influence.rebased(baseline)
-    at = match_speeds(check.speeds, today.speeds)
-    part = today.part(at, [index_of(name, today.sensors, "sensor") for name in check.sensors])
-    T = np.zeros((len(check.runs), len(part.planes)), dtype=complex)
-    for plane, weights in _mounted(check, correction).items():
-        if plane in part.planes or weights.any():
-            T[:, index_of(plane, part.planes, "plane")] = weights
-    predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, T)
+    part = today.part(*match_readings(check, today))
+    local = local_runs(part, _as_mounted(check, correction))
+    predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, local.weights)
     difference = check.mean - predicted
     reading = reading_of(check)
     covariance = np.full((*difference.shape, 2, 2), np.nan)
     distance = covariance[..., 0, 0]
     chi_square = probability = explained = change = None
     if part.known_errors:
-        local = replace(check, planes=part.planes, weights=T, speeds=part.speeds)
         noise = part.difference_noise(local)
         V = noise.covariance(part.errors.sizes)
         R, S, C = difference.shape
@@ -298,7 +300,7 @@ def compare_check(
         sensors=check.sensors,
         planes=part.planes,
         speeds=part.speeds,
-        weights=T,
+        weights=local.weights,
         as_proposed=not check.planes,
         before=part.baseline,
         predicted=predicted,
@@ -362,19 +364,7 @@ def last_run(runs: Trials) -> Trials:
     Trials
         With its readings and weights.
     """
-    parts = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
-    last = {name: part[..., -1:, :, :] for name, part in parts.items() if part is not None}
-    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **last)
-
-
-def index_of(name: str, names: tuple[str, ...], what: str) -> int:
-    """Index of a name of a check run among those of the coefficients."""
-    if name not in names:
-        raise ValueError(
-            f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "
-            f"{', '.join(map(repr, names))}"
-        )
-    return names.index(name)
+    return replace(runs, runs=runs.runs[-1:], weights=runs.weights[-1:], **picked(runs, np.s_[-1:, :, :]))
 
 
 def refine(trials: Trials, check: Trials, corrections: Correction | None = None) -> Influence:
@@ -405,17 +395,17 @@ def refine(trials: Trials, check: Trials, corrections: Correction | None = None)
     return estimate_influence(with_check_runs(trials, check, corrections))
 
 
-def _mounted(check: Trials, correction: Correction | None) -> dict[str, ComplexArray]:
-    """Weights of each run of a check by plane, (R,): its own, or else what was proposed."""
+def _as_mounted(check: Trials, correction: Correction | None) -> Trials:
+    """Check runs with what was proposed as their weights, where they have none."""
     if check.planes:
-        return dict(zip(check.planes, check.weights.T, strict=True))
+        return check
     if correction is None:
         raise ValueError(
             f"what was mounted in the check run {check.runs[0]!r} is not known: give its weights table, or "
             "the corrections that were mounted"
         )
-    every = np.tile(correction.weights[:, None], len(check.runs))
-    return dict(zip(correction.planes, every, strict=True))
+    weights = np.tile(correction.weights, (len(check.runs), 1))
+    return replace(check, planes=correction.planes, weights=weights)
 
 
 def with_check_runs(trials: Trials, check: Trials, corrections: Correction | None = None) -> Trials:
@@ -431,19 +421,15 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
     ValueError
         For check runs of other sensors and speeds, and where nobody says what was mounted.
     """
-    at = match_speeds(trials.speeds, check.speeds, "readings of the check run")
     if {*check.sensors} != {*trials.sensors}:
         raise ValueError(
             f"the check runs have readings of {listing(map(repr, check.sensors), 'and')}, the trial runs of "
             f"{listing(map(repr, trials.sensors), 'and')}: give those of the same sensors"
         )
-    pick = np.ix_(at, [check.sensors.index(name) for name in trials.sensors])
-    mounted, R = _mounted(check, corrections), len(trials.runs)
-    planes = tuple(dict.fromkeys((*trials.planes, *(p for p, weights in mounted.items() if weights.any()))))
-    T = np.zeros((R + len(check.runs), len(planes)), dtype=complex)
-    T[:R, : len(trials.planes)] = trials.weights
-    for p, plane in enumerate(planes):
-        T[R:, p] = mounted.get(plane, 0.0)
+    check = with_readings(_as_mounted(check, corrections), trials, "readings of the check run")
+    added = [plane for plane, there in zip(check.planes, check.weights.any(axis=0), strict=True) if there]
+    planes = tuple(dict.fromkeys((*trials.planes, *added)))
+    weights = [in_order(runs.weights, runs.planes, planes) for runs in (trials, check)]
     stated = trials.errors or check.errors
     measured = [each.covariance for each in (trials, check) if each.covariance is not None]
     # of typed readings beside measured ones: the mean of these, or none beside stated errors
@@ -451,16 +437,15 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
 
     def joined(name: str, missing: FloatArray) -> Any:  # noqa: ANN401
         """Arrays (…, K, R, S, C) of both as one, NaN where one has fewer repeats."""
-        both = [getattr(trials, name), getattr(check, name)]
-        if all(array is None for array in both):
+        if all(getattr(runs, name) is None for runs in (trials, check)):
             return None
-        both[1] = None if both[1] is None else both[1][..., *pick]
         most, padded = max(len(trials.readings), len(check.readings)), []
-        for runs, array in zip((trials, check), both, strict=True):
-            K, R = runs.readings.shape[:2]
-            full = np.multiply.outer(missing, np.ones((K, R, *trials.readings.shape[2:])))
-            gap = [*[(0, 0)] * missing.ndim, (0, most - K), *[(0, 0)] * 3]
-            padded.append(np.pad(full if array is None else array, gap, constant_values=np.nan))
+        for runs in (trials, check):
+            array = getattr(runs, name)
+            if array is None:
+                array = np.multiply.outer(missing, np.ones(runs.readings.shape))
+            gap = [*[(0, 0)] * missing.ndim, (0, most - len(runs.readings)), *[(0, 0)] * 3]
+            padded.append(np.pad(array, gap, constant_values=np.nan))
         return np.concatenate(padded, axis=-3)
 
     return replace(
@@ -468,7 +453,7 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
         runs=(*trials.runs, *(f"{name} (check)" if name in trials.runs else name for name in check.runs)),
         planes=planes,
         readings=joined("readings", np.ones(())),
-        weights=T,
+        weights=np.concatenate(weights),
         errors=stated,
         run_errors=trials.run_errors or check.run_errors,
         warnings=tuple(dict.fromkeys(trials.warnings + check.warnings)),

@@ -25,9 +25,11 @@ import numpy as np
 
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
+from balancing.influence import in_order
+from balancing.prediction import shown
 from balancing.tables import rms
 from balancing.what_if import worse_elsewhere
-from rotorid.base.text import capital, figures, listing
+from rotorid.base.text import capital, listing
 from rotorid.regression import solution
 
 if TYPE_CHECKING:
@@ -54,13 +56,6 @@ _ALL = 4
 _MORE = 1 + 1e-6
 """Above a limit by more than rounding."""
 
-
-def _error_form(covariance: FloatArray, row_weights: FloatArray) -> ComplexArray:
-    """F (P + 1, P + 1) from covariances (N, 2P + 2, 2P + 2) of (Re Y, Im Y, Re W₁, …), row weights (N,)."""
-    n = covariance.shape[-1]
-    total = np.einsum("n,nij->ij", row_weights**2, covariance).reshape(n // 2, 2, n // 2, 2)
-    real = total[:, 0, :, 0] + total[:, 1, :, 1]
-    return np.asarray(real + 1j * (total[:, 0, :, 1] - total[:, 1, :, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +92,9 @@ class Case:
         w = np.ones(N) if self.row_weights is None else self.row_weights
         w = w / np.linalg.norm(w)
         A = w[:, None] * np.column_stack((self.part.baseline.ravel(), self.W))
-        F = _error_form(self.part.channels().reshape(N, 2 * P + 2, 2 * P + 2), w)
-        return np.asarray(A.conj().T @ A), F
+        covariance = self.part.channels().reshape(N, P + 1, 2, P + 1, 2)
+        V = np.einsum("n,nicjd->cdij", w**2, covariance)
+        return np.asarray(A.conj().T @ A), V[0, 0] + V[1, 1] + 1j * (V[0, 1] - V[1, 0])
 
     @property
     def before(self) -> float:
@@ -113,8 +109,7 @@ class Case:
     @property
     def clearness(self) -> FloatArray:
         """Effect of each plane in units of its errors, (P,)."""
-        error = np.sqrt(np.diag(self.forms[1]).real[1:].clip(0.0))
-        return np.asarray(np.where(error > 0, self.effect / np.where(error > 0, error, 1.0), np.inf))
+        return np.asarray(self.effect / np.sqrt(np.diag(self.forms[1]).real[1:].clip(1e-300)))
 
     @property
     def weak(self) -> list[int]:
@@ -156,14 +151,23 @@ class Case:
 
     def trial_weight(self, p: int) -> float:
         """The largest one of a plane, kg; 0: there was none."""
-        trials, name = self.today.trials, self.names[p]
-        if trials is None or name not in trials.planes:
+        if (trials := self.today.trials) is None:
             return 0.0
-        return float(np.abs(trials.weights[:, trials.planes.index(name)]).max())
+        return float(np.abs(in_order(trials.weights, trials.planes, [self.names[p]])).max())
 
     def shown(self, size: float, digits: int = 3) -> str:
         """An amplitude with its unit."""
-        return f"{figures(size * self.labels.vibration_scale, digits)} {self.labels.vibration_in}".rstrip()
+        return shown(self.labels, size, digits)
+
+    @property
+    def coarse(self) -> tuple[str, ...]:
+        """That readings have hardly more than one digit; none: they have."""
+        trials = self.today.trials
+        if trials is None or trials.steps is None:
+            return ()
+        step, size = float(np.nanmedian(trials.steps[0])), rms(trials.mean)
+        words = f"(steps of {self.shown(step, 2)}, readings of {self.shown(size, 2)})"
+        return (f"the readings have one digit {words}",) if step >= COARSE * size else ()
 
 
 def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) -> MountDecision:
@@ -200,7 +204,7 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         today = case.today.part(range(len(case.today.speeds)), None, chosen)
         elsewhere = worse_elsewhere(today, D, result.speeds)
         warnings = (*made.warnings, *(() if elsewhere else _over_limit(result, case.today, limits)))
-        return replace(made, warnings=warnings, notes=coarse(case.today), elsewhere=elsewhere)
+        return replace(made, warnings=warnings, notes=case.coarse, elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
         f"with the weights, expect rms {case.shown(whole.expected)} rather than {promised}; without them "
@@ -241,7 +245,7 @@ def remedies(case: Case) -> tuple[str, ...]:
             f"with 95 %, of {before}"
         )
     words += [_trial(case, p) for p in weak if case.trial_weight(p)]
-    if coarse(case.today):
+    if case.coarse:
         words.append("read the instrument in a range that shows more digits")
     if len(case.names) > 1 and not weak:
         planes = listing((repr(case.names[p]) for p in acting_alike(case.W)), "and")
@@ -263,7 +267,7 @@ def _trial(case: Case, p: int) -> str:
 def _causes(result: Correction, case: Case) -> list[str]:
     """What makes the weights uncertain: digits, trial weights, planes that act alike, or little to gain."""
     words, names, sizes = case.labels.weight_words, case.names, np.abs(result.weights)
-    causes = list(coarse(case.today))
+    causes = list(case.coarse)
     widths = result.half_widths()[0]
     for p in case.weak:
         trial = case.trial_weight(p)
@@ -284,11 +288,10 @@ def _causes(result: Correction, case: Case) -> list[str]:
 def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, str] | None:
     """A run within the limits that reads less than is promised (95 %), and than predicted or `GOOD`."""
     trials, limits = case.today.trials, result.limits
-    if trials is not None and trials.index is not None:  # these read the arbor, too
+    # with an index readings are of the arbor, too
+    if trials is None or trials.index is not None or not result.errors_known:
         return None
-    if not result.errors_known or trials is None or trials.mean.shape[1:] != result.before.shape:
-        return None
-    if trials.runs[-1] != result.mounted.run:
+    if trials.mean.shape[1:] != result.before.shape or trials.runs[-1] != result.mounted.run:
         return None
     largest = dict(zip(case.names, case.max_weight * _MORE, strict=True))
     read, weights = np.abs(trials.mean), np.abs(trials.weights)
@@ -309,20 +312,6 @@ def _better_run(result: Correction, case: Case, predicted: float) -> tuple[str, 
     if strange:
         return cause, f"The runs do not fit one linear machine: {strange}."
     return cause, "To promise less, add a run with other weights near these."
-
-
-def coarse(influence: Influence) -> tuple[str, ...]:
-    """Say that readings have hardly more than one digit."""
-    trials, labels = influence.trials, influence.labels
-    if trials is None or trials.steps is None:
-        return ()
-    step, size = float(np.nanmedian(trials.steps[0])), rms(trials.mean)
-    if step < COARSE * size:
-        return ()
-    steps, readings = (
-        f"{figures(x * labels.vibration_scale, 2)} {labels.vibration_in}".rstrip() for x in (step, size)
-    )
-    return (f"the readings have one digit (steps of {steps}, readings of {readings})",)
 
 
 def _contradicted(result: Correction) -> tuple[str, ...]:

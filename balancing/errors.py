@@ -337,11 +337,10 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
         moved, loads = (alike(m[:, None] * part) for part in (fitted, effect))
-        parts = [np.diag(share @ even), np.diag(share @ uneven), moved, loads]
-        parts.append(share.sum() * further.T @ further.conj())
+        own, unbalance = (np.diag(share @ part) for part in (even, uneven)), share.sum() * alike(further)
         fixed = np.diag(share @ variance) + alike(np.einsum("r,mrn->mn", m, others)) / 2
         keep = np.linalg.qr(free, mode="complete")[0][:, free.shape[1] :].conj().T
-        inside = keep @ np.array([*parts, fixed]) @ keep.conj().T
+        inside = keep @ np.array([*own, moved, loads, unbalance, fixed]) @ keep.conj().T
         return Block(not free.size, keep @ (m @ Y), inside[:5], inside[5])
 
     # combinations whose errors are independent
@@ -474,18 +473,12 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
     )
 
 
-def unseen(trials: Trials, run: RunErrors) -> tuple[str, ...]:
-    """Notes about what no run measures."""
-    notes: tuple[str, ...] = ()
-    if run.origin in ("assumed", "none"):
-        taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
-        notes += (
-            f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more "
-            "baseline run at the end, or one more trial run, would measure them; repeated readings do not",
-        )
-    if not any(trials.placement) and run.origin in ("none", "stated"):
-        notes += (
-            "the weights are taken to be mounted exactly: 3° or 3 % amiss, if likely, should be stated as "
-            "placement_deg and placement_percent",
-        )
-    return notes
+def unseen(run: RunErrors) -> tuple[str, ...]:
+    """A note about what no run measures."""
+    if run.origin not in ("assumed", "none"):
+        return ()
+    taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
+    return (
+        f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more baseline "
+        "run at the end, or one more trial run, would measure them; repeated readings do not",
+    )

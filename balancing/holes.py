@@ -2,7 +2,7 @@
 
 Angles count with the rotation, in rad; weights are kg (mass at the plane's radius) or kg·m (unbalance).
 A hole in which something is mounted cannot be used further. What is mounted is part of the readings already,
-therefore not of the correction D; it counts only where the plane's total is limited.
+therefore not of the correction D; it counts only where the plane's total is limited (`Limits.max_weight`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, FloatArray, IntArray
+from rotorid.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 
 SAME_ANGLE = float(np.radians(1e-3))
 """Holes nearer to each other than this are one place, and a hole this near to an arc's end is on it."""
@@ -43,8 +43,6 @@ class Holes:
         How many of each piece there are for the whole plane, shape (K,); None: enough.
     names
         Of the holes; "1", "2", … by default.
-    max_weight
-        Largest |Σ weights e^{iφ}| of the plane, what is taken included.
     """
 
     angles: FloatArray
@@ -54,7 +52,6 @@ class Holes:
     taken: FloatArray
     stock: IntArray | None
     names: tuple[str, ...]
-    max_weight: float
 
     @property
     def free(self) -> BoolArray:
@@ -70,11 +67,6 @@ class Holes:
     def mounted(self) -> complex:
         """Vector Σ taken e^{iφ} of what is there already."""
         return complex(self.taken @ np.exp(1j * self.angles))
-
-    def allows(self, vector: ArrayLike) -> BoolArray:
-        """Whether the plane's total stays within `max_weight` with these vectors added."""
-        total = np.abs(self.mounted + np.asarray(vector, dtype=complex))
-        return np.asarray(total <= self.max_weight * KEPT)
 
     def outside(self, arcs: Sequence[tuple[float, float]]) -> BoolArray:
         """Free holes that stand in none of the arcs (first angle, width; ends are allowed), shape (H,)."""
@@ -140,13 +132,12 @@ def from_list(
     taken: ArrayLike = (),
     stock: ArrayLike | None = None,
     names: Sequence[str] = (),
-    max_weight: float = np.inf,
 ) -> Holes:
     """Holes from plain lists, checked.
 
     Parameters
     ----------
-    angles, pieces, per_hole, step, taken, stock, names, max_weight
+    angles, pieces, per_hole, step, taken, stock, names
         The attributes of `Holes`; nothing is taken by default, and names are "1", "2", …
 
     Raises
@@ -171,9 +162,9 @@ def from_list(
         (not (np.abs(phi - np.pi) > 3 * np.pi * KEPT).any(), "angles of holes must be from −360° to 720°"),
         (not same, f"holes {' and '.join(same)} stand at the same angle: list each once"),
         (
-            min((*there, step, max_weight, *number)) >= 0 and (sizes > 0).all() and per_hole >= 1 and whole,
-            "pieces must weigh more than 0, their numbers be whole, one or more in a hole; what is mounted, "
-            "the smallest step and the largest weight must not be negative",
+            min((*there, step, *number)) >= 0 and (sizes > 0).all() and per_hole >= 1 and whole,
+            "pieces must weigh more than 0, their numbers be whole, one or more in a hole; what is mounted "
+            "and the smallest step must not be negative",
         ),
         (
             len(set(sizes)) == len(sizes) and number.shape == sizes.shape,
@@ -181,31 +172,32 @@ def from_list(
         ),
         (not (len(sizes) and step), "give either pieces or a smallest step of free amounts, not both"),
         (
-            max_weight > 0 and not (there > 0).all() and (number.any() or not len(sizes)),
-            "nothing can be mounted: something is mounted in every hole already, the stock is empty, or the "
-            "largest weight of the plane is 0",
+            not (there > 0).all() and (number.any() or not len(sizes)),
+            "nothing can be mounted: something is mounted in every hole already, or the stock is empty",
         ),
     )
     for right, words in rules:
         if not right:
             raise ValueError(words)
     left = None if stock is None else number.astype(np.int64)
-    return Holes(phi, sizes, int(per_hole), float(step), there, left, named, float(max_weight))
+    return Holes(phi, sizes, int(per_hole), float(step), there, left, named)
 
 
-def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike | None = None) -> Mounting:
-    """The mounting of `counts` (H, K) of the pieces or, where amounts are free, of `amounts` (H,)."""
-    shape = (len(holes.angles), len(holes.pieces))
-    number = np.zeros(shape, dtype=np.int64) if counts is None else np.asarray(counts, dtype=np.int64)
-    weight = number @ holes.pieces if amounts is None else np.asarray(amounts, dtype=np.float64)
-    return Mounting(number, weight, complex(weight @ np.exp(1j * holes.angles)))
+def mounting(holes: Holes, counts: AnyArray, sizes: FloatArray) -> Mounting:
+    """The mounting of `counts` (H, K) of pieces, or of amounts, of these sizes (K,)."""
+    amounts = counts @ sizes
+    return Mounting(counts[:, : len(holes.pieces)], amounts, complex(amounts @ np.exp(1j * holes.angles)))
 
 
-def content(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
-    """What goes into a hole, in units of 1 / scale: "2 × 150 + 50", or a free amount."""
-    each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
-    parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
-    return " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
+def contents(holes: Holes, mounting: Mounting, scale: float) -> list[tuple[int, complex, str]]:
+    """Every hole in use, its weight, and what goes into it in units of 1 / scale: "2 × 150 + 50"."""
+    used, weights = [], mounting.amounts * np.exp(1j * holes.angles)
+    for h in np.flatnonzero(mounting.amounts).tolist():
+        each = zip(mounting.counts[h], holes.pieces * scale, strict=False)
+        parts = [f"{n} × {size:.6g}" if n > 1 else f"{size:.6g}" for n, size in each if n]
+        words = " + ".join(parts) or f"{mounting.amounts[h] * scale:.6g}"
+        used.append((h, complex(weights[h]), words))
+    return used
 
 
 def lightest(holes: Holes, usable: BoolArray, z: complex, most: float) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -316,31 +316,66 @@ def local_runs(influence: Influence, trials: Trials) -> Trials:
     ValueError
         For sensors or speeds that they lack, and a weight in another plane.
     """
-    lacking = [name for name in influence.sensors if name not in trials.sensors]
-    if lacking:
-        raise ValueError(
-            f"the baseline run has no readings of sensor {', '.join(map(repr, lacking))}; it has those of "
-            f"{', '.join(map(repr, trials.sensors))}"
-        )
-    by_plane = {plane: trials.weights[:, p] for p, plane in enumerate(trials.planes)}
-    for plane, weights in by_plane.items():
+    for plane, weights in zip(trials.planes, trials.weights.T, strict=True):
         if plane not in influence.planes and weights.any():
             raise ValueError(
                 f"a weight is mounted in plane {plane!r}, for which there are no influence coefficients; "
                 f"there are some for {', '.join(map(repr, influence.planes))}"
             )
-    nothing = np.zeros(len(trials.runs))
-    speeds = match_speeds(influence.speeds, trials.speeds, "baseline readings")
-    at = np.ix_(speeds, [trials.sensors.index(name) for name in influence.sensors])
-    arrays = {name: getattr(trials.with_phases(), name) for name in ("readings", "steps", "covariance")}
-    return replace(
-        trials,
-        speeds=influence.speeds,
-        sensors=influence.sensors,
-        planes=influence.planes,
-        weights=np.array([by_plane.get(plane, nothing) for plane in influence.planes]).T,
-        **{name: array[..., *at] for name, array in arrays.items() if array is not None},
-    )
+    weights = in_order(trials.weights, trials.planes, influence.planes)
+    read = with_readings(trials.with_phases(), influence, "baseline readings")
+    return replace(read, planes=influence.planes, weights=weights)
+
+
+def with_readings(runs: Trials, of: Influence | Trials, what: str) -> Trials:
+    """Runs with the readings at the speeds and sensors of coefficients or of other runs alone.
+
+    Parameters
+    ----------
+    runs, of
+        The runs, and what has the wanted speeds and sensors.
+    what
+        As of `match_readings`.
+    """
+    at = np.ix_(*match_readings(of, runs, what))
+    return replace(runs, speeds=of.speeds, sensors=of.sensors, **picked(runs, at))
+
+
+def picked(runs: Trials, at: tuple[Any, ...]) -> dict[str, Any]:
+    """Arrays of readings, steps and covariances, as far as there are some, at indices of the last axes."""
+    arrays = {name: getattr(runs, name) for name in ("readings", "steps", "covariance")}
+    return {name: array[..., *at] for name, array in arrays.items() if array is not None}
+
+
+def in_order(weights: ComplexArray, planes: Sequence[str], wanted: Sequence[str]) -> ComplexArray:
+    """Weights (…, Q) of planes as those (…, P) of the wanted planes, 0 where these have none."""
+    same = [[plane == name for name in wanted] for plane in planes]
+    return np.asarray(weights @ np.array(same, dtype=float).reshape(len(planes), len(wanted)))
+
+
+def match_readings(
+    wanted: Influence | Trials, available: Influence | Trials, what: str = "coefficients"
+) -> tuple[list[int], list[int]]:
+    """Indices of the wanted speeds (within 0.5 %) and sensors among the available ones.
+
+    Parameters
+    ----------
+    wanted, available
+        Coefficients or runs.
+    what
+        What the available ones have, for the complaint.
+
+    Raises
+    ------
+    ValueError
+        For a speed or a sensor that is not among the available ones.
+    """
+    there = available.sensors
+    if lacking := [name for name in wanted.sensors if name not in there]:
+        some, every = (", ".join(map(repr, names)) for names in (lacking, there))
+        raise ValueError(f"there are no {what} of sensor {some}; there are some of {every}")
+    sensors = [there.index(name) for name in wanted.sensors]
+    return match_speeds(wanted.speeds, available.speeds, what), sensors
 
 
 def match_speeds(wanted: ArrayLike, available: FloatArray, what: str = "coefficients") -> list[int]:
@@ -468,7 +503,7 @@ def fit_runs(trials: Trials) -> Influence:
         baseline=theta[..., 0],
         errors=errors,
         labels=trials.labels,
-        remarks=Remarks(trials.warnings + reading.warnings + disagree, unseen(trials, run), disagree),
+        remarks=Remarks(trials.warnings + reading.warnings + disagree, unseen(run), disagree),
     )
 
 

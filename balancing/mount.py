@@ -21,9 +21,10 @@ from numpy.typing import ArrayLike
 from balancing.correction import Correction
 from balancing.decision import HARDLY_BELOW
 from balancing.groups import PIECES
-from balancing.holes import Holes, content, equal_together
-from balancing.influence import Influence, match_speeds
+from balancing.holes import Holes, contents, equal_together
+from balancing.influence import Influence, in_order, match_speeds
 from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
+from balancing.prediction import rms_change
 from balancing.regions import LEVEL
 from balancing.tables import (
     covariance_column,
@@ -33,7 +34,6 @@ from balancing.tables import (
     small,
     three_figures,
     vector_columns,
-    weight_columns,
 )
 from balancing.trials import Trials
 from balancing.verdict import largest
@@ -87,7 +87,7 @@ class Mounted(Answered):
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels
         covariance = c.after_covariance if c.errors_known else None
-        actions = Column("action", [_action(c, plane) for plane in c.planes])
+
         residuals = (
             *reading_columns(labels, c.speeds, c.sensors),
             *vector_columns(labels, "after", self.after),
@@ -95,17 +95,18 @@ class Mounted(Answered):
         )
         return plain(
             {
-                "planes": records((*weight_columns(labels, c.planes, self.weights), actions)),
+                "planes": records(c.work_columns(c.planes, self.weights)[:-1]),
                 "on_top_of": self.on_top_of,
                 "warnings": [],
                 "holes": records(_columns(self)),
                 "residuals": records(residuals),
-                **self._left(self.discrete, self.after),
+                **self._left(self.discrete),
             }
         )
 
-    def _left(self, discrete: Discrete, after: ComplexArray) -> dict[str, Any]:
+    def _left(self, discrete: Discrete) -> dict[str, Any]:
         """Number of pieces and the vibration that they leave, as JSON types."""
+        after = self.after + self.correction.influence.W @ (discrete.weights - self.weights)
         size = self.correction.labels.vibration(after)[0]
         return {"pieces": discrete.pieces, "rms_after": rms(size), "max_after": size.max()}
 
@@ -117,9 +118,8 @@ class Mounted(Answered):
     def answer(self) -> Answer:
         """What goes into which hole and what it leaves; then hole by hole."""
         c, labels = self.correction, self.correction.labels
-        unit = labels.vibration_in
-        old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
-        left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
+        unit, left = labels.vibration_in, rms_change(labels, c.before, self.after)
+        free = small(*(rms(readings) * labels.vibration_scale for readings in (c.after, c.before)))
         first = "Mount or remove these pieces:" if c.remove else "Mount these pieces:"
         if not c.sound or self.check_rms > HARDLY_BELOW * rms(c.before):
             first = "These pieces would leave"
@@ -127,16 +127,15 @@ class Mounted(Answered):
             most = figures(self.check_rms * labels.vibration_scale, 2)
             left += f"; a check run stays below {most} in 95 of 100"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
-        each = zip(c.planes, self.in_planes(), strict=True)
         lines = [
             f"Pieces in {labels.weight_in}{stays}:",
-            *(f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each),
+            *(f"  {line}" for line in self.in_planes()),
             f"{capital(labels.turning_in_words())}: {self._first_holes()}.",
             "",
             f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}",
-            f"Weights at any angle: {c.in_words()}; rms {small(rms(free), old.max())} {unit}".rstrip() + ".",
+            f"Weights at any angle: {c.in_words()}; rms {free} {unit}".rstrip() + ".",
         ]
-        fewer = (self._left(one, one.residual) for one in self.discrete.fewer)
+        fewer = map(self._left, self.discrete.fewer)
         less = [f"{one['pieces']} → {three_figures(one['rms_after'])}" for one in fewer]
         lines += [f"With fewer pieces, rms{unit and f' in {unit}'}: {', '.join(less)}."] if less else []
         if not self.discrete.enough:
@@ -165,22 +164,21 @@ class Mounted(Answered):
 
     def in_holes(self) -> str:
         """What is in which hole of each plane, in a line."""
-        each = zip(self.correction.planes, self.in_planes(), strict=True)
-        words = " · ".join(f"{plane}: {holes}" for plane, holes in each)
-        return f"{words}, in {self.correction.labels.weight_in}"
+        return f"{' · '.join(self.in_planes())}, in {self.correction.labels.weight_in}"
 
     def in_planes(self) -> list[str]:
         """What is in which hole of each plane, plane by plane."""
         lines, every = [], records(_columns(self))
         for plane in self.correction.planes:
-            here = [row for row in every if row["plane"] == plane]
-            words = [
-                f"{figures(row['mass'])} at {row['angle_deg']:.1f}°" for row in here if row["hole"] == _ANY
+            here = [
+                (row["pieces"] or figures(row["mass"]), row["hole"], f"{row['angle_deg']:.1f}°")
+                for row in every
+                if row["plane"] == plane
             ]
-            words += equal_together(
-                (row["pieces"] or figures(row["mass"]), row["hole"]) for row in here if row["hole"] != _ANY
-            )
-            lines.append("; ".join(words) or "nothing")
+            words = [f"{mass} at {angle}" for mass, hole, angle in here if hole == _ANY]
+            words += equal_together((mass, hole) for mass, hole, _ in here if hole != _ANY)
+            removed = " (remove)" if plane in self.correction.remove else ""
+            lines.append(f"{plane}{removed}: {'; '.join(words) or 'nothing'}")
         return lines
 
 
@@ -216,48 +214,42 @@ def mount(
     each = {plane: holes.get(plane) for plane in planes}
     if not any(each.values()):
         raise ValueError("no plane has holes: holes = N or holes_deg = [...] in [planes.NAME] of the job")
-    mounted = dict(zip(c.mounted.planes, c.mounted.weights.tolist(), strict=True))
-    W, Y, there = c.influence.W.reshape(-1, len(planes)), c.before, mounted if on_top else {}
-    unnamed = [p for p, h in each.items() if h and there.get(p) and not h.taken.any()]
+    W, Y = c.influence.W.reshape(-1, len(planes)), c.before
+    mounted = c.mounted.weights * on_top
+    there = in_order(mounted, c.mounted.planes, planes)
+    unnamed = [p for p, w in zip(planes, there, strict=True) if w and each[p] and not each[p].taken.any()]
     if unnamed:
         raise ValueError(
             f"the holes in which weights of run {c.mounted.run!r} stand are not named, and must stay "
             f'free: taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
         )
-    if there:
+    if mounted.any():
         today = influence if baseline is None else influence.rebased(baseline)
-        loads = np.array([there.get(plane, 0.0) for plane in today.planes])
+        loads = in_order(mounted, c.mounted.planes, today.planes)
         Y = Y + today.W[match_speeds(c.speeds, today.speeds)] @ loads
     counts = c.row_weights
     if c.method == "weighted" and c.errors_known:
         variance = np.trace(c.after_covariance, axis1=-2, axis2=-1).ravel()
         counts = (1.0 if counts is None else counts) / np.sqrt(variance.clip(1e-6 * variance.max()))
     bound, limits, rows = _bound(c), c.limits, (W, Y.ravel())
-    wanted = c.weights - [there.get(plane, 0.0) for plane in planes]
-    enough = predicted = _enough(c, Y, bound)
+    wanted = c.weights - there
     together = c.unknowns is not None and c.unknowns.constrained
     if together:
         rows, counts = (np.eye(len(planes), dtype=complex), -wanted), None
         limits = limits and replace(limits, residual=np.full((1, len(planes)), np.inf))
-
-        def enough(D: ComplexArray) -> bool:
-            return predicted(D) and bool(norm(D - wanted) <= PIECES * norm(wanted))
-
     discrete = solve_discrete(
         *rows,
         each,
-        enough,
+        _enough(c, Y, bound, PIECES * norm(wanted) if together else np.inf, wanted),
         wanted=wanted,
         method="minmax" if c.method == "minmax" and not together else "least-squares",
         row_weights=counts,
         limits=limits,
     )
-    fewer = tuple(replace(one, residual=Y.ravel() + W @ one.weights) for one in discrete.fewer)
-    discrete = replace(discrete, fewer=fewer)
     after = Y + (W @ discrete.weights).reshape(Y.shape)
     check_rms = bound(after) if c.errors_known else np.nan
     return Mounted(
-        c, tuple(each.values()), discrete, after, check_rms, c.mounted.run if any(there.values()) else None
+        c, tuple(each.values()), discrete, after, check_rms, c.mounted.run if mounted.any() else None
     )
 
 
@@ -269,9 +261,9 @@ def _bound(c: Correction) -> Callable[[ComplexArray], float]:
 
 
 def _enough(
-    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float]
+    c: Correction, Y: ComplexArray, bound: Callable[[ComplexArray], float], apart: float, wanted: ComplexArray
 ) -> Callable[[ComplexArray], bool]:
-    """Whether weights D (P,), added to what reads Y, leave little enough.
+    """Whether weights D (P,), added to what reads Y, leave little enough, not too far from those wanted.
 
     Limits that not even any weights are sure to keep ask for no more pieces.
     """
@@ -287,13 +279,9 @@ def _enough(
 
     def enough(D: ComplexArray) -> bool:
         left = Y + c.influence.W @ D
-        return kept(left) if judged else bound(left) <= most
+        return bool(norm(D - wanted) <= apart) and (kept(left) if judged else bound(left) <= most)
 
     return enough
-
-
-def _action(correction: Correction, plane: str) -> str:
-    return "remove" if plane in correction.remove else "add"
 
 
 def _columns(m: Mounted) -> tuple[Column, ...]:
@@ -305,19 +293,16 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         if holes is None or mounting is None:
             places.append((plane, _ANY, weight, ""))
             continue
-        vectors = mounting.amounts * np.exp(1j * holes.angles)
-        for h in np.flatnonzero(mounting.amounts > 0).tolist():
-            words = "" if holes.free_amounts else content(holes, mounting, h, labels.weight_scale)
-            places.append((plane, holes.names[h], vectors[h], words))
-    planes = [place[0] for place in places]
-    size, angle = labels.weight([place[2] for place in places])
-    gone = np.array([plane in c.remove for plane in planes])
+        for h, vector, words in contents(holes, mounting, labels.weight_scale):
+            places.append((plane, holes.names[h], vector, "" if holes.free_amounts else words))
+    planes, weights = ([place[k] for place in places] for k in (0, 2))
+    _, mass, unit, _, action, _ = c.work_columns(planes, weights)
     return (
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
-        Column("action", [_action(c, plane) for plane in planes], None),
+        replace(action, shown=None),
         Column("hole", [place[1] for place in places]),
-        Column("angle_deg", np.round(np.mod(angle + 180.0 * gone, 360), 9), "{:.1f}°".format, title="angle"),
-        Column("mass", size, figures, title=labels.weight_in),
-        Column("unit", [labels.weight_unit] * len(places), None),
+        Column("angle_deg", np.round(c.places(planes, weights), 9), "{:.1f}°".format, title="angle"),
+        mass,
+        unit,
         Column("pieces", [place[3] for place in places]),
     )

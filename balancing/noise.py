@@ -241,7 +241,3 @@ class Whitening:
         """Columns (S, C, n, k) with V⁻¹ = wᵀ w, (S C n, k)."""
         w = self._alone(columns)
         return np.asarray(w - self._basis @ (self._less[:, None] * (self._basis.T @ w)))
-
-    def chi_square(self, difference: ComplexArray) -> float:
-        """χ² of differences (S, C, R)."""
-        return float(np.sum(self.white(real_parts(difference)[..., None]) ** 2))

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, content, equal_together
+from balancing.holes import Holes, Mounting, contents, equal_together
 from balancing.pieces import solve_discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
@@ -65,7 +65,7 @@ class Split:
     @property
     def relative_error(self) -> float:
         """|error| by the size of the target (a target of 0: by what is mounted, or 0)."""
-        return _relative(self.mounting.vector, self.target)
+        return abs(self.error) / (abs(self.target) or abs(self.mounting.vector) or 1.0)
 
     @property
     def pieces(self) -> int:
@@ -75,22 +75,22 @@ class Split:
 
     def in_holes(self, labels: Labels) -> list[str]:
         """Equal contents together, such as "10 g in holes 7 (120°), 9 (150°)"."""
-        contents = []
-        for h in np.flatnonzero(self.mounting.amounts).tolist():
-            what = content(self.holes, self.mounting, h, labels.weight_scale)
-            (angle,) = labels.directions(self.holes.angles[[h]])
-            contents.append((f"{what} {labels.weight_in}", f"{self.holes.names[h]} ({angle:.6g}°)"))
-        return equal_together(contents)
+        names, angles = self.holes.names, labels.directions(self.holes.angles)
+        return equal_together(
+            (f"{words} {labels.weight_in}", f"{names[h]} ({angles[h]:.6g}°)")
+            for h, _, words in contents(self.holes, self.mounting, labels.weight_scale)
+        )
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types."""
         rows = []
-        for h in np.flatnonzero(self.mounting.amounts):
-            weight = labels.weight_entry(self.mounting.amounts[h] * np.exp(1j * self.holes.angles[h]))
+        for h, made, _ in contents(self.holes, self.mounting, labels.weight_scale):
             pieces = zip(self.mounting.counts[h], self.holes.pieces, strict=False)
             each = [{"count": int(n), "mass": labels.weight_entry(size)["mass"]} for n, size in pieces if n]
-            rows.append({"hole": self.holes.names[h], **weight, "pieces": each})
-        return _document("holes", self.target, labels, self.mounting.vector) | {
+            rows.append({"hole": self.holes.names[h], **labels.weight_entry(made), "pieces": each})
+        return _document("holes", self.target, labels) | {
+            "error": labels.weight_entry(self.error),
+            "relative_error": self.relative_error,
             "holes": rows,
             "mounted": labels.weight_entry(self.mounting.vector),
             "number_of_pieces": self.pieces,
@@ -374,18 +374,10 @@ def drill(target: complex, radius: float, diameter: float, density: float = STEE
 OneWeight = Split | TwoPlanes | TwoPositions | Removal
 
 
-def _document(method: str, target: complex, labels: Labels, made: complex | None = None) -> dict[str, Any]:
-    """Keys that every document has; with the error where a weight is made."""
+def _document(method: str, target: complex, labels: Labels) -> dict[str, Any]:
+    """Keys that every document has."""
     head = {"method": method, "unit": labels.weight_unit, "angles": labels.angles}
-    document: dict[str, Any] = {**head, "target": labels.weight_entry(target)}
-    if made is not None:
-        document["error"] = labels.weight_entry(made - target)
-        document["relative_error"] = _relative(made, target)
-    return document
-
-
-def _relative(made: complex, target: complex) -> float:
-    return abs(made - target) / (abs(target) or abs(made) or 1.0)
+    return {**head, "target": labels.weight_entry(target)}
 
 
 def _positive(*sizes: float) -> None:

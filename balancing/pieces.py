@@ -51,7 +51,6 @@ SAME = 1e-9
 _LONGEST, _PAIRS, _CONTENTS = 20_000, 1_000_000, 100_000
 _LISTED, _BEST, _BRANCHES = 1000, (300, 60), (40, 8)
 """Vectors of a plane for every number; choices of every number that are kept, and branches: last, before."""
-_MIX = np.random.default_rng(0).integers(1, 2**62, 100)
 
 
 class Vectors(NamedTuple):
@@ -83,7 +82,7 @@ class PlaneVectors:
     arcs
         First angle and width of arcs in which no hole is used.
     max_weight
-        Largest |mounted + d|, beside that of the holes.
+        Largest |mounted + d|.
     heavier
         More than two pieces weigh at most so many times the least sum that makes what is wanted; there are at
         most four more than that sum needs.
@@ -102,7 +101,7 @@ class PlaneVectors:
         max_weight: float = np.inf,
         heavier: float = np.inf,
     ) -> None:
-        self.holes, self.wanted, self.max_weight = holes, wanted, min(holes.max_weight, max_weight)
+        self.holes, self.wanted, self.max_weight = holes, wanted, max_weight
         self.usable, self.heaviest = holes.outside(arcs), np.inf
         where = np.flatnonzero(self.usable)
         if not len(where):
@@ -166,13 +165,11 @@ class PlaneVectors:
 
     def _distinct(self, sums: ComplexArray, used: FloatArray) -> IndexArray:
         """Of equal sums (that use the same of a stock) those of the fewest pieces, then the lightest."""
-        scarce = used[:, self.stock < self.most].T
-        # a hash of whole numbers: different ones are the same with a chance of 1e-7 in a list
-        parts = (*(np.rint(part / (SAME * self.reach)) for part in (sums.real, sums.imag)), *scarce)
-        mixed = np.add.reduce([part.astype(np.int64) * mix for part, mix in zip(parts, _MIX, strict=False)])
+        places = np.rint(np.array((sums.real, sums.imag)) / (SAME * self.reach))
+        keys = np.vstack((places, used[:, self.stock < self.most].T))
         cost = used @ (1 + 0.5 * self.sizes / self.reach)
-        order = np.lexsort((cost, mixed))
-        return np.asarray(order[np.diff(mixed[order], prepend=np.iinfo(np.int64).min) != 0])
+        order = np.lexsort((cost, *keys))
+        return np.asarray(order[(np.diff(keys[:, order], prepend=np.nan) != 0).any(axis=0)])
 
     def near(self, z: complex, count: int, number: int | None = None) -> Vectors:
         """About `count` vectors near z, the nearest first, of so many pieces or (None) of any number."""
@@ -181,8 +178,7 @@ class PlaneVectors:
         nearest = []
         most, everything = self.most if number is None else number, 2 * (abs(z) + self.reach)
         apart = 0.0 if number is None else 2 * everything  # another number is far away
-        for where, halves in zip(self.parts, self.halves, strict=True):
-            first, second = (_few(half, most) for half in halves)
+        for where, (first, second) in zip(self.parts, self.halves, strict=True):
             tree = cKDTree(_points(z - first.sums, (most - _number(first.used)) * apart))
             other = cKDTree(_points(second.sums, _number(second.used) * apart))
             # along the wanted weight both halves make so much at most
@@ -214,9 +210,6 @@ class PlaneVectors:
         ]
         return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
-    def mount(self, put: IntArray) -> Mounting:
-        """What goes where, (H, K) as `Vectors` have it."""
-        return mounting(self.holes, None if self.holes.free_amounts else put, put @ self.sizes)
 
     def listed(self, z: complex) -> Vectors:
         """Vectors near a point, of every number of pieces, for `around`."""
@@ -253,13 +246,8 @@ class PlaneVectors:
 
     def place(self, z: complex) -> Mounting:
         """Amounts of any size that make z."""
-        return mounting(self.holes, amounts=lightest(self.holes, self.usable, z, np.inf))
+        return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf)[:, None], np.ones(1))
 
-
-def _few(half: _Half, most: int) -> _Half:
-    """The sums of a half that take so many pieces at most."""
-    kept = _number(half.used) <= most
-    return _Half(half.sums[kept], half.used[kept], half.picks[kept])
 
 
 def _number(used: FloatArray) -> FloatArray:
@@ -397,9 +385,9 @@ def solve_discrete(
         weights = np.zeros(P, dtype=complex)
         weights[fixed], weights[free] = D[n], follow @ np.append(D[n], 1.0)
         each = zip(fixed, rows[n], lists, strict=True)
-        put = {p: one.mount(vectors.put[row]) for p, row, (one, vectors) in each}
-        put |= {p: sets[p].place(complex(weights[p])) for p in free if list(named.values())[p]}
-        mountings = tuple(map(put.get, range(P)))
+        made = {p: mounting(one.holes, vectors.put[row], one.sizes) for p, row, (one, vectors) in each}
+        made |= {p: sets[p].place(complex(weights[p])) for p in free if list(named.values())[p]}
+        mountings = tuple(map(made.get, range(P)))
         return Discrete(mountings, weights, Y + W @ weights, float(value[n]))
 
     each = [choice(n) for n in best]

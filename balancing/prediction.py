@@ -13,7 +13,7 @@ import numpy as np
 from balancing.conditioning import Conditioning
 from balancing.conventions import Labels
 from balancing.groups import Unknowns, mapped, static_and_couple
-from balancing.influence import Influence, Mounted
+from balancing.influence import Influence, Mounted, in_order
 from balancing.methods import Solution, method_words
 from balancing.regions import Region, half_width, reach
 from balancing.tables import (
@@ -21,6 +21,8 @@ from balancing.tables import (
     degrees,
     reading_columns,
     reading_names,
+    rms,
+    small,
     three_figures,
     vector_columns,
     weight_columns,
@@ -37,6 +39,17 @@ HARDLY_APART = 10.0
 """Above this condition number two planes do the same but for a fifth of their effect."""
 STATIC = 0.2
 """Difference of the effects of two planes, relative, below which their sum is called the static part."""
+
+
+def shown(labels: Labels, size: float, digits: int = 3) -> str:
+    """An amplitude, given in SI, with its unit."""
+    return f"{figures(size * labels.vibration_scale, digits)} {labels.vibration_in}".rstrip()
+
+
+def rms_change(labels: Labels, before: ComplexArray, after: ComplexArray) -> str:
+    """Root mean squares of readings before and after, in words; rounding is zero to a reader."""
+    old, new = (rms(readings) * labels.vibration_scale for readings in (before, after))
+    return f"rms {three_figures(old)} → {small(new, old)} {labels.vibration_in}".rstrip()
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +260,7 @@ class Prediction(Outlook):
     @property
     def to_add(self) -> ComplexArray:
         """What to add to the weights mounted now, one per plane of `mounted`."""
-        total = dict(zip(self.planes, self.weights, strict=True))
-        planes = [total.get(plane, 0.0) for plane in self.mounted.planes]
-        return np.array(planes, dtype=complex) - self.mounted.weights
+        return in_order(self.weights, self.planes, self.mounted.planes) - self.mounted.weights
 
     @property
     def active(self) -> tuple[str, ...]:

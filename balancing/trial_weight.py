@@ -33,26 +33,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.conventions import Labels
+from balancing.influence import Influence, plane_indices
 from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, frame, records
-from rotorid.base.text import Quantity as Quantity
 from rotorid.base.text import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from balancing.influence import Influence
-
-
 GRAVITY = 9.80665
 RISKY = 0.25
 """Of the load, for the force of a first trial weight."""
 
 _LAGS = {"below": (45.0, 45.0), "at": (90.0, 0.0), "above": (135.0, 45.0)}
-_LEAD = {"displacement": 0.0, "velocity": math.pi / 2, "acceleration": math.pi}
 
 
 @dataclass(frozen=True)
@@ -121,16 +116,16 @@ class TrialWeight(Answered):
         """Centrifugal force at the highest speed, N; None for masses without a radius."""
         if self.radius is None and not self.labels.unbalances:
             return None
-        return self.amount * (1.0 if self.radius is None else self.radius) * self.speed**2
+        return self.amount * (self.radius or 1.0) * self.speed**2
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        size, angle = self._size_and_angle()
         document = {
             "plane": self.plane,
             "mass": size,
             "unit": self.labels.weight_unit,
-            "angle_deg": None if self.angle is None else angle,
+            "angle_deg": angle,
             "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
             "basis": self.basis,
             "radius_m": self.radius,
@@ -155,10 +150,10 @@ class TrialWeight(Answered):
     def answer(self) -> Answer:
         """Amount and place, what for, and the readings expected with it."""
         labels, share = self.labels, self._share()
-        size, turned = labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        size, turned = self._size_and_angle()
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
-        if self.angle is not None:
+        if turned is not None:
             angle = f"at {turned:.0f}° {labels.angle_words}"
             angle += f" (± {math.degrees(self.angle_reach):.0f}°)" if self.angle_reach else ""
         lines = [f"Plane {self.plane}: {self.basis}"]
@@ -175,6 +170,11 @@ class TrialWeight(Answered):
             ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
             to_mount=True,
         )
+
+    def _size_and_angle(self) -> tuple[float, float | None]:
+        """As the job has them."""
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        return float(size), None if self.angle is None else float(angle)
 
     def _share(self) -> float | None:
         """Force in percent of the load; None where one of both is unknown."""
@@ -245,7 +245,7 @@ def trial_from_force(  # noqa: PLR0913
             "an angle needs both the phase of the initial reading and the lag: give the other one, too"
         )
     if phase is not None and lag is not None:
-        angle = opposing_angle(phase, lag.expected, sensor_angle=sensor_angle)
+        angle = opposing_angle(phase, lag.expected, sensor_angle)
         reach, degrees = lag.reach, math.degrees(lag.expected)
         words += f"; angle opposite to the heavy spot with a lag of {degrees:.3g}° ({lag.words})"
     warnings = _force_warning(fraction)
@@ -290,14 +290,10 @@ def trial_from_coefficients(
         For a plane that is not known or acts on no reading, and readings that are lacking or
         zero.
     """
-    if plane not in influence.planes:
-        raise ValueError(
-            f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
-        )
-    Y, w = influence.baseline, influence.W[..., influence.planes.index(plane)]
-    labels = influence.labels
+    [p] = plane_indices(influence, [plane])
+    Y, w, labels = influence.baseline, influence.W[..., p], influence.labels
     # masses at the trial radius per mass at the radius of the coefficients
-    at = radius if trial_radius is None else trial_radius
+    at = trial_radius or radius
     scale = 1.0 if radius is None or at is None else radius / at
     size = float(np.abs(Y).max())
     if not size > 0:
@@ -309,17 +305,17 @@ def trial_from_coefficients(
     warnings: list[str] = []
     positive("share of the largest reading", share)
     s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
-    amount = share * size / float(abs(w[s, c])) * scale
+    amount = share * size / float(abs(w[s, c]))
     reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
     basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
-    if amount > limit * scale:
-        amount, basis = limit * scale, "the largest weight of the plane"
+    if amount > limit:
+        amount, basis = limit, "the largest weight of the plane"
         warnings.append(
             f"a change by {100 * share:.3g} % of the largest reading would need more than the largest "
             f"weight of plane {plane!r}: that is proposed"
         )
     angle = float(np.angle(-np.vdot(w, Y))) % (2 * math.pi)
-    expected = Y + w * (amount / scale * np.exp(1j * angle))
+    expected = Y + w * (amount * np.exp(1j * angle))
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
@@ -328,7 +324,7 @@ def trial_from_coefficients(
         )
     weight = TrialWeight(
         plane=plane,
-        amount=float(amount),
+        amount=amount * scale,
         angle=angle,
         angle_reach=0.0,
         basis=f"{basis}; angle from the coefficients",
@@ -378,29 +374,19 @@ def expected_lag(
     return Lag(math.radians(degrees), 0.0, f"{degrees:g}°, as stated")
 
 
-def opposing_angle(
-    phase: float,
-    lag: float,
-    *,
-    sensor_angle: float = 0.0,
-    key_phasor: float = 0.0,
-    quantity: Quantity = "displacement",
-) -> float:
+def opposing_angle(phase: float, lag: float, sensor_angle: float = 0.0) -> float:
     """Angle opposite to the heavy spot, rad with the rotation, 0 ≤ angle < 2π (derived in the module).
 
     Parameters
     ----------
     phase
-        Of the reading, rad, positive = lead.
+        Of the reading as a displacement, rad, positive = lead.
     lag
         ψ, rad.
-    sensor_angle, key_phasor
-        α and κ, rad with the rotation, from any common origin.
-    quantity
-        What the sensor reads.
+    sensor_angle
+        α − κ, of the sensor from the key phasor, rad with the rotation.
     """
-    angle = phase - _LEAD[quantity] + sensor_angle - key_phasor + lag + math.pi
-    return angle % (2 * math.pi)
+    return (phase + sensor_angle + lag + math.pi) % (2 * math.pi)
 
 
 def positive(what: str, value: float) -> None:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from balancing.correction import Correction
-from balancing.influence import match_speeds
+from balancing.influence import in_order, match_readings
 from balancing.mount import Mounted
-from balancing.tables import reading_columns, rms, small, three_figures, vector_columns, weight_rows
+from balancing.prediction import rms_change, shown
+from balancing.tables import reading_columns, rms, vector_columns, weight_rows
 from balancing.trials import Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -82,7 +83,7 @@ class LeftToDo(Answered):
                 "word": self.word,
                 "why": self.why,
                 "run": self.run,
-                "mounted": weight_rows(self.correction.labels, self.planes, self.there),
+                "mounted": weight_rows(labels, self.planes, self.there),
                 "add": self.correction.work_rows(self.planes, self.trim),
                 "holes": [] if self.pieces is None else self.pieces.to_dict()["holes"],
                 "readings": records(readings) if self.word == "trim" else [],
@@ -104,11 +105,8 @@ class LeftToDo(Answered):
         ]
         lines = []
         if self.word == "trim" and self.pieces is not None:
-            each = zip(self.pieces.correction.planes, self.pieces.in_planes(), strict=True)
-            lines += ["", f"Trim with pieces, in {c.labels.weight_in}:"]
-            lines += [
-                f"  {plane}{' (remove)' if plane in c.remove else ''}: {words}" for plane, words in each
-            ]
+            lines = ["", f"Trim with pieces, in {c.labels.weight_in}:"]
+            lines += [f"  {line}" for line in self.pieces.in_planes()]
         elif self.word == "trim":
             places = c.places(self.planes, self.trim).tolist()
             add = zip(self.planes, self.trim.tolist(), places, strict=True)
@@ -152,15 +150,18 @@ def after_check_run(
     bare
         Vibration of the bare rotor at the speeds and sensors of the check, (S, C); None: the correction's.
     """
-    c, unit, scale = correction, correction.labels.vibration_in, correction.labels.vibration_scale
+    c, labels = correction, correction.labels
     run, planes, there = c.mounted
-    pick = np.ix_(match_speeds(check.speeds, c.speeds), [c.sensors.index(name) for name in check.sensors])
+    pick = np.ix_(*match_readings(check, c.influence))
     bare = c.before[pick] if bare is None else bare
     now, before = rms(check.mean[-1]), rms(bare)
-    trim, made = (c.to_add, c) if pieces is None else (_in_planes(pieces, planes), pieces)
+    trim, made = c.to_add, c
+    if pieces is not None:
+        trim, made = in_order(pieces.weights, pieces.correction.planes, planes), pieces
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
-    change = f"rms {three_figures(now * scale)} → {small(after * scale, now * scale)} {unit}".rstrip()
-    change += "" if bound is None else f", below {figures(bound * scale, 2)} in 95 of 100 check runs"
+    change = rms_change(labels, check.mean[-1], made.after[pick])
+    if bound is not None:
+        change += f", below {figures(bound * labels.vibration_scale, 2)} in 95 of 100 check runs"
     left = after if bound is None or judged == "fail" else bound
     worth = trim.any() and left < WORTH * now
     again = c.decision.cause if c.decision.word == "measure again" else ""
@@ -174,9 +175,9 @@ def after_check_run(
         word, why = "done", "every limit is kept"
     elif now >= before and explained is not True and there.any():
         word = "take off what is mounted"
-        why = f"the bare rotor had rms {three_figures(before * scale)} {unit}".rstrip()
-        why += f"; {stop or 'check what was mounted, and where'}"
-    elif settled and _within_its_error(c):
+        why = f"the bare rotor had rms {shown(labels, before)}; "
+        why += stop or "check what was mounted, and where"
+    elif settled and c.region_known and c.region().holds(in_order(there, planes, c.planes)):
         word = "done"
         why = f"a trim would be within its own error ({change})"
         why += f", and may be worth it: {', '.join(c.work_words(planes, trim))}" if worth else ""
@@ -202,15 +203,4 @@ def after_check_run(
     )
 
 
-def _within_its_error(c: Correction) -> bool:
-    """Whether what is mounted may be the right weights."""
-    if not c.region_known:
-        return False
-    there = dict(zip(*c.mounted[1:], strict=True))
-    return c.region().holds(np.array([there.get(plane, 0.0) for plane in c.planes], dtype=complex))
 
-
-def _in_planes(pieces: Mounted, planes: tuple[str, ...]) -> ComplexArray:
-    """Weights of pieces, (P,), in these planes."""
-    chosen = dict(zip(pieces.correction.planes, pieces.weights, strict=True))
-    return np.array([chosen.get(plane, 0.0) for plane in planes], dtype=complex)

@@ -211,44 +211,37 @@ def estimate_unbalance(
     rank = int(np.count_nonzero(s > RCOND * s[0]))
     left, s, right = left[:, :rank], s[:rank], right[:rank]
     G = (right.conj().T / s) @ left.conj().T / sigma
-    U = G @ y
-    result = Unbalance(
+    U, condition, warnings = G @ y, float(s[0] / s[-1]), list[str]()
+    residual, covariance, chi_square = y - A @ U, np.full((2 * Q, 2 * Q), np.nan), None
+    if condition > HOPELESS:
+        warnings.append(
+            f"small errors of the readings become large unbalances (condition number {condition:.2g}): use "
+            "fewer stations"
+        )
+    if len(drawn):
+        moved = drawn @ G.T
+        covariance = np.atleast_2d(np.cov(real_parts(moved).T))
+        chi_square, *others = np.sum(np.abs([residual, *(drawn - moved @ A.T)] / sigma) ** 2, axis=1).tolist()
+        if rank < N and chi_square > np.quantile(others, 0.99):
+            ratio = np.sqrt(chi_square / np.mean(others))
+            warnings.append(
+                "the readings differ from what unbalance at these stations causes by "
+                f"{ratio:.2g} times their errors: unbalance elsewhere, wrong coefficients or a nonlinear "
+                "rotor are likely reasons"
+            )
+    return Unbalance(
         stations=stations,
         unbalance=U,
-        residual=y - A @ U,
+        residual=residual,
         method="least-squares" if rank == Q else "minimum-norm",
         rank=rank,
         resolution=G @ A,
-        covariance=np.full((2 * Q, 2 * Q), np.nan),
-        chi_square=None,
-        condition_number=float(s[0] / s[-1]),
+        covariance=covariance,
+        chi_square=chi_square,
+        condition_number=condition,
         labels=labels or Labels(weight_unit="kg_m"),
+        warnings=tuple(warnings),
     )
-    if s[0] > HOPELESS * s[-1]:
-        words = (
-            f"small errors of the readings become large unbalances (condition number {s[0] / s[-1]:.2g}): "
-            "use fewer stations"
-        )
-        result = replace(result, warnings=(words,))
-    return _with_errors(result, G, A, drawn / sigma, sigma) if len(drawn) else result
-
-
-def _with_errors(
-    result: Unbalance, G: ComplexArray, A: ComplexArray, drawn: ComplexArray, sigma: FloatArray
-) -> Unbalance:
-    """The covariance that drawn errors over their sigma leave, and whether the readings contradict them."""
-    moved, warnings = (drawn * sigma) @ G.T, list(result.warnings)
-    chi_square = float(np.sum(np.abs(result.residual / sigma) ** 2))
-    others = np.sum(np.abs(drawn - moved @ A.T / sigma) ** 2, axis=1)
-    contradicted = result.rank < len(A) and chi_square > np.quantile(others, 0.99)
-    if contradicted:
-        ratio = np.sqrt(chi_square / float(np.mean(others)))
-        warnings.append(
-            f"the readings differ from what unbalance at these stations causes by {ratio:.2g} times their "
-            "errors: unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons"
-        )
-    covariance = np.atleast_2d(np.cov(real_parts(moved).T))
-    return replace(result, covariance=covariance, chi_square=chi_square, warnings=tuple(warnings))
 
 
 def unbalance_of_run(

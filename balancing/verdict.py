@@ -22,12 +22,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.check_run import index_of, last_run
+from balancing.check_run import last_run
 from balancing.conditioning import chance, check_planes
 from balancing.conventions import Labels
 from balancing.correct import fit_part
 from balancing.correction import Correction
-from balancing.influence import Influence, match_speeds, plane_indices
+from balancing.influence import Influence, match_readings, plane_indices
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
 from balancing.prediction import Outlook
@@ -36,6 +36,7 @@ from balancing.tables import INVISIBLE, reading_columns
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
 from rotorid.base.tables import Column, records, text
 from rotorid.base.text import capital, counted, rpm, vibration_unit_words, weight_unit_words
 
@@ -65,7 +66,7 @@ class Judgement:
     limit
         In the same unit.
     low, high
-        Least and largest size in the 95 % region; None where errors are unknown.
+        Least and largest size in the 95 % region; NaN where errors are unknown.
     """
 
     kind: Kind
@@ -73,8 +74,8 @@ class Judgement:
     speed: float | None
     value: complex
     limit: float
-    low: float | None = None
-    high: float | None = None
+    low: float = np.nan
+    high: float = np.nan
 
     @property
     def size(self) -> float:
@@ -84,8 +85,6 @@ class Judgement:
     @property
     def verdict(self) -> Word:
         """Pass, fail or not decidable."""
-        if self.low is None or self.high is None:
-            return "not decidable"
         if self.high <= self.limit:
             return "pass"
         return "fail" if self.low > self.limit else "not decidable"
@@ -122,12 +121,10 @@ class Verdict(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units (tolerance planes in g_mm); what is unknown is None."""
-        return {
-            "source": self.source,
-            "verdict": self.overall,
-            "rows": [self._row(row) for row in self.rows],
-            "warnings": list(self.warnings),
-        }
+        rows = [self._row(row) for row in self.rows]
+        return plain(
+            {"source": self.source, "verdict": self.overall, "rows": rows, "warnings": self.warnings}
+        )
 
     @property
     def answer(self) -> Answer:
@@ -155,9 +152,8 @@ class Verdict(Answered):
         cells = self._row(row)
         unit = (vibration_unit_words if row.kind == "sensor" else weight_unit_words)(cells["unit"])
         at = "" if row.speed is None else f" at {self.labels.speed_words(row.speed)}"
-        within = "errors unknown"
-        if row.low is not None:
-            within = f"{cells['low']:.3g} … {cells['high']:.3g} with 95 %"
+        within = f"{cells['low']:.3g} … {cells['high']:.3g} with 95 %"
+        within = within if np.isfinite(row.high) else "errors unknown"
         value = f"{cells['size'] if row.size > INVISIBLE * row.limit else 0.0:.4g} {unit}".rstrip()
         name = f"{row.kind} {row.name}{at}"
         return f"  {name}: {value} ({within}), limit {cells['limit']:.4g}: {row.verdict}"
@@ -176,8 +172,8 @@ class Verdict(Answered):
             "speed_rpm": None if row.speed is None else float(rpm(row.speed)),
             "size": row.size * scale,
             "angle_deg": float(angle) if amount else None,
-            "low": None if row.low is None else row.low * scale,
-            "high": None if row.high is None else row.high * scale,
+            "low": row.low * scale,
+            "high": row.high * scale,
             "limit": row.limit * scale,
             "unit": unit,
             "verdict": row.verdict,
@@ -322,14 +318,13 @@ def verdict_of_check(
     ValueError
         Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
     """
-    at = match_speeds(check.speeds, influence.speeds)
-    sensors = [index_of(name, influence.sensors, "sensor") for name in check.sensors]
+    where = match_readings(check, influence)
     bare = replace(last_run(check), planes=(), weights=np.zeros((1, 0), dtype=complex))
-    left = influence.part(at, sensors).rebased(bare)
+    left = influence.part(*where).rebased(bare)
     judged: list[Judgement] = []
     warnings = left.remarks.warnings
     if tolerance is not None:
-        part = left.part(range(len(at)), None, plane_indices(left, tolerance.planes))
+        part = left.part(range(len(left.speeds)), None, plane_indices(left, tolerance.planes))
         S, C, P = part.W.shape
         check_planes(part.W.reshape(-1, P), part.planes)
         fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
@@ -344,7 +339,7 @@ def verdict_of_check(
             )
     if limits is not None:
         covariance = left.channels()[..., :2, :2] if left.known_errors else np.full((2, 2), np.nan)
-        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(at, sensors)])
+        judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(*where)])
     return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -44,24 +44,28 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     """
     labels, Q = estimate.labels, len(estimate.stations)
     sizes, angles = labels.weight(estimate.unbalance)
-    edges = np.repeat(estimate.unbalance[:, None], 91, axis=1)
-    for q in np.flatnonzero(estimate.determined & np.isfinite(estimate.covariance).all()):
-        block = estimate.covariance[2 * q : 2 * q + 2, 2 * q : 2 * q + 2]
-        edges[q] = region_edge(estimate.unbalance[q], block, 91)
+    each = np.arange(Q)
+    alone = np.nan_to_num(estimate.covariance).reshape(Q, 2, Q, 2)[each, :, each]
+    edges = region_edge(estimate.unbalance, alone * estimate.determined[:, None, None], 91)
     tips, edges = (on_paper(labels, each * labels.weight_scale) for each in (estimate.unbalance, edges))
     longest = np.abs(edges).max() or 1.0
     places = np.arange(Q) * 2.6 * longest * min(1.0, 8 / Q)
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
     ax.axhline(0, color="0.8", lw=4, zorder=0)
     colors = np.where(estimate.determined, BLUE, "0.6")
-    look: dict[str, Any] = {
-        "angles": "xy",
-        "scale_units": "xy",
-        "scale": 1,
-        "width": 0.009,
-        "edgecolor": "black",
-    }
-    ax.quiver(places, 0 * places, tips.real, tips.imag, color=colors, linewidth=0.8, **look)
+    ax.quiver(
+        places,
+        0 * places,
+        tips.real,
+        tips.imag,
+        color=colors,
+        linewidth=0.8,
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        width=0.009,
+        edgecolor="black",
+    )
     ax.plot(places + edges.real.T, edges.imag.T, color="black", lw=1)
     ax.set_title("blue: determined, with 95 % regions; grey: not determined by the readings", fontsize=TEXT)
     plain(ax)
@@ -69,8 +73,10 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     ax.set(aspect="equal", xlim=ends, ylim=(-1.15 * longest, 1.15 * longest))
     ax.set_ylabel(f"unbalance, {labels.weight_in}")
     ax.set_xlabel(f"stations in their order, {labels.weight_in}; {turning(labels)}", fontsize=TEXT)
-    each = zip(estimate.stations, sizes, angles, strict=True)
     between = "\n" if Q <= 8 else "  "
-    words = [between.join((name, figures(size, 3), f"{angle:.0f}°")) for name, size, angle in each]
+    words = [
+        between.join((name, figures(size, 3), f"{angle:.0f}°"))
+        for name, size, angle in zip(estimate.stations, sizes, angles, strict=True)
+    ]
     ax.set_xticks(places, words, rotation=90 * (Q > 8))
     return ax

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.patches import Circle, Wedge
 
 from balancing.conventions import Labels
-from balancing.holes import Holes, Mounting, content
+from balancing.holes import Holes, Mounting, contents
 from balancing.plots.polar import on_paper, turn_sign
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.plot_style import TEXT, new_figure
@@ -77,9 +77,9 @@ def draw_disc(  # noqa: PLR0913
     weights, taken = [*loose], np.zeros(1) if holes is None else holes.taken
     texts = [f"{minus}{labels.weight_words(abs(w))}\n{labels.weight(sign * w)[1]:.1f}°" for w in loose]
     if holes is not None and mounting is not None:
-        for h in np.flatnonzero(mounting.amounts).tolist():
-            weights.append(complex(mounting.amounts[h] * np.exp(1j * holes.angles[h])))
-            texts.append(f"{holes.names[h]}: {minus}{content(holes, mounting, h, labels.weight_scale)}")
+        for h, made, words in contents(holes, mounting, labels.weight_scale):
+            weights.append(made)
+            texts.append(f"{holes.names[h]}: {minus}{words}")
     at = sign * zero * on_paper(labels, weights)
     scale = min(0.1, _HOLES * np.pi / len(taken)) / np.sqrt(max([*np.abs(at), *taken]) or 1.0)
     what = f"{'take away' if remove else 'add'}, {labels.weight_in}"
@@ -112,7 +112,7 @@ def draw_disc(  # noqa: PLR0913
     lines = [f"{turn_sign(labels)} rotation", *lines]
     bottom = -_EDGE - _LINE * len(lines)
     ax.set_ylim(bottom, _EDGE)
-    ax.text(0, bottom, "\n".join(lines), ha="center", va="bottom", fontsize=TEXT)
+    _write(ax, 1j * bottom, "\n".join(lines), va="bottom")
     return ax
 
 
@@ -146,12 +146,18 @@ def draw_plane(
         loose = mounted.weights[p] if mounting is None else 0.0
         if mounted.on_top_of is not None:
             wanted = c.to_add[c.mounted.planes.index(plane)]
-    look: dict[str, Any] = {"remove": plane in c.remove, "weight": complex(wanted), "zero": zero}
-    look |= {
-        "loose": [complex(loose)] if loose else [],
-        "forbidden": c.limits.forbidden[p] if c.limits else (),
-    }
-    return draw_disc(ax, plane, holes, mounting, c.labels, **look)
+    return draw_disc(
+        ax,
+        plane,
+        holes,
+        mounting,
+        c.labels,
+        remove=plane in c.remove,
+        weight=complex(wanted),
+        loose=[complex(loose)] if loose else [],
+        forbidden=c.limits.forbidden[p] if c.limits else (),
+        zero=zero,
+    )
 
 
 def weight_figure(
@@ -191,6 +197,13 @@ def _circle(ax: Axes, centre: complex, radius: float, **look: Any) -> None:  # n
     ax.add_patch(Circle((centre.real, centre.imag), radius, ec="black", **look))
 
 
+def _write(ax: Axes, at: complex, text: str, **look: Any) -> None:  # noqa: ANN401
+    """Text at a place of the picture, around it unless told otherwise."""
+    ax.text(
+        at.real, at.imag, text, **{"ha": "center", "va": "center", **look}, fontsize=TEXT, parse_math=False
+    )
+
+
 def _draw_holes(ax: Axes, holes: Holes, ways: ComplexArray, scale: float) -> None:
     """Circles, some numbered; hatched, radius scale × √weight, where something is mounted already."""
     count = len(ways)
@@ -199,16 +212,7 @@ def _draw_holes(ax: Axes, holes: Holes, ways: ComplexArray, scale: float) -> Non
         if taken:
             _circle(ax, _HOLES * way, scale * np.sqrt(taken), fc="0.85", hatch="////")
         if h % (count // (_NUMBERED + 1) + 1) == 0:
-            inside = _NUMBERS * way
-            ax.text(
-                inside.real,
-                inside.imag,
-                holes.names[h],
-                ha="center",
-                va="center",
-                fontsize=TEXT,
-                parse_math=False,
-            )
+            _write(ax, _NUMBERS * way, holes.names[h])
 
 
 def _write_around(ax: Axes, at: ComplexArray, texts: Sequence[str], labels: Labels, zero: complex) -> None:
@@ -218,13 +222,11 @@ def _write_around(ax: Axes, at: ComplexArray, texts: Sequence[str], labels: Labe
     for sector in range(12):
         text = "\n".join(texts[k] for k in np.flatnonzero(sectors == sector).tolist())
         way = _TEXTS * np.exp(1j * np.pi * sector / 6)
-        ax.text(
-            way.real,
-            way.imag,
+        _write(
+            ax,
+            way,
             text or f"{30 * (sector - first) * labels.angles_on_paper % 360}°",
             ha=("right", "center", "left")[round(way.real) + 1],
             va=("top", "center", "bottom")[round(way.imag) + 1],
-            fontsize=TEXT,
             fontweight="bold" if text else "normal",
-            parse_math=False,
         )

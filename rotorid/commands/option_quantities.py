@@ -249,8 +249,7 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
         most[plane] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
-    holes = {plane: replace(its, max_weight=most[plane]) for plane, its in job.holes.items()}
-    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden), holes=holes)
+    return replace(job, limits=Limits(np.array([*most.values()]), residual, old.forbidden))
 
 
 def _amplitudes(trials: Trials, given: Amplitudes) -> dict[str, Quantity]:

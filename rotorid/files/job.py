@@ -285,7 +285,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     limits = make_limits(settings, planes, trials, problems)
     zones = make_zones(settings, trials, problems)
     weights = row_weights(settings, trials, problems)
-    holes = make_holes(planes, trials.labels, limits, problems)
+    holes = make_holes(planes, trials.labels, problems)
     check, mounted = None, tables.get("check_weights")
     if "check" in tables:
         from rotorid.files.check_and_slow_roll import check_runs

@@ -233,12 +233,10 @@ def _at_speeds(
     return np.array([near.get(k, numbers.get("", default)) for k in range(len(trials.speeds))])
 
 
-def make_holes(
-    planes: Mapping[str, Plane], labels: Labels, limits: Limits | None, problems: Problems
-) -> dict[str, Holes]:
+def make_holes(planes: Mapping[str, Plane], labels: Labels, problems: Problems) -> dict[str, Holes]:
     """Of each plane that has some; those inside a forbidden arc are left out."""
     out = dict[str, Holes]()
-    for k, (plane_name, plane) in enumerate(planes.items()):
+    for plane_name, plane in planes.items():
         before, turn, angles = len(problems), 180.0 if plane.remove else 0.0, plane.open_holes()
         pieces, step = (_sizes(plane, field, labels, problems) for field in ("available", "step"))
         if not plane.hole_angles() or len(problems) > before:
@@ -252,7 +250,6 @@ def make_holes(
                 taken=[plane.taken.get(name, 0.0) / labels.weight_scale for name in angles],
                 stock=None if plane.stock is None else np.array(plane.stock),
                 names=[*angles],
-                max_weight=np.inf if limits is None else float(limits.max_weight[k]),
             )
         except ValueError as error:
             field = "holes_at" if plane.holes is None else "holes"

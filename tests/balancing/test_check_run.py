@@ -115,7 +115,7 @@ def test_some_sensors_and_speeds_are_enough():
     for check, words in (
         (replace(part, sensors=("s3", "x")), "no coefficients of sensor 'x'"),
         (replace(part, speeds=np.array([300.0, 250.0])), "there are no coefficients at 2387"),
-        (runs_of(whole.achieved, [[GRAM]], planes=("Z",)), "no coefficients of plane 'Z'"),
+        (runs_of(whole.achieved, [[GRAM]], planes=("Z",)), "in plane 'Z', for which there are no"),
     ):
         with pytest.raises(ValueError, match=words):
             compare_check(correction, check, influence)

@@ -46,7 +46,6 @@ def test_defaults_and_order():
         ([0.0], {"pieces": [1.0, 2.0], "stock": [1]}, "for each of the 2 pieces"),
         ([0.0], {"pieces": [1.0], "stock": [-1]}, "numbers be whole"),
         ([0.0], {"pieces": [1.0], "stock": [0]}, "the stock is empty"),
-        ([0.0], {"max_weight": 0.0}, "largest weight of the plane is 0"),
         ([0.0, 1.0], {"names": ["A", "A"]}, "with a name of its own"),
     ],
 )

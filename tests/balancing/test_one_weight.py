@@ -9,12 +9,14 @@ from scipy.integrate import quad
 from balancing.conventions import Labels
 from balancing.holes import equal_holes, from_list
 from balancing.one_weight import STEEL, combine, drill, split, two_positions
+from balancing.pieces import solve_discrete
+from balancing.trials import Limits
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 
 
 def problem(seed):
-    """Small enough to try everything: odd and regular holes, stock, taken holes, limits."""
+    """Small enough to try everything: odd and regular holes, stock, taken holes."""
     rng = np.random.default_rng(seed)
     H, K, per_hole = int(rng.integers(2, 6)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
     taken = np.where(rng.random(H) < 0.2, 0.004, 0.0)
@@ -25,7 +27,6 @@ def problem(seed):
         per_hole=per_hole,
         stock=rng.integers(1, 4, K) if seed % 3 == 0 else None,
         taken=taken,
-        max_weight=float(rng.uniform(0.008, 0.02)) if seed % 4 == 0 else np.inf,
     )
     target = complex(rng.normal(), rng.normal()) * 0.01
     return target, holes
@@ -77,7 +78,7 @@ def test_free_amounts_in_steps_equal_trying_everything(seed):
     step, H = 0.5, int(rng.integers(2, 7))
     angles = np.sort(rng.uniform(0, 2 * np.pi, H))
     limit = float(rng.uniform(2, 5)) if seed % 2 else np.inf
-    holes = from_list(angles, step=step, max_weight=limit)
+    limits = Limits(np.array([limit]), np.full((1, 1), np.inf), ((),))
     target = complex(rng.normal(), rng.normal()) * 3
     multiples, best = np.arange(0, 61) * step, np.inf
     for g, h in [(k, (k + 1) % H) for k in range(H)]:
@@ -85,8 +86,9 @@ def test_free_amounts_in_steps_equal_trying_everything(seed):
             vectors = multiples[:, None] * np.exp(1j * angles[g]) + multiples * np.exp(1j * angles[h])
         else:
             vectors = multiples[:, None] * np.exp(1j * angles[[g, h]])
-        best = min(best, np.abs(vectors[holes.allows(vectors)] - target).min())
-    assert abs(split(target, holes).error) == pytest.approx(best, abs=1e-9)
+        best = min(best, np.abs(vectors[np.abs(vectors) <= limit] - target).min())
+    nearest = solve_discrete([[1.0]], [-target], [from_list(angles, step=step)], limits=limits)
+    assert nearest.objective == pytest.approx(best, abs=1e-9)
 
 
 @each_of(
@@ -100,18 +102,21 @@ def test_free_amounts_in_steps_equal_trying_everything(seed):
     ],
 )
 def test_free_amounts_fill_the_sector_between_neighbours(target, degrees, most, vector):
-    found = split(target, from_list(np.radians(degrees), max_weight=most))
-    assert found.mounting.vector == pytest.approx(vector, abs=0.02)
-    assert abs(found.mounting.vector) <= most
+    limits = Limits(np.array([most]), np.full((1, 1), np.inf), ((),))
+    nearest = solve_discrete([[1.0]], [-target], [from_list(np.radians(degrees))], limits=limits)
+    assert nearest.weights[0] == pytest.approx(vector, abs=0.02)
+    assert abs(nearest.weights[0]) <= most
 
 
 def test_what_is_mounted_counts_for_the_largest_weight():
     # 20 g are there at 0°, the plane may have 15: only something opposite makes it admissible
-    holes = from_list(np.radians([0, 120, 180, 240]), [0.005], taken=[0.02, 0, 0, 0], max_weight=0.015)
-    assert split(0.01, holes).in_holes(GRAMS) == ["5 g in hole 3 (180°)"]
+    limits = Limits(np.array([0.015]), np.full((1, 1), np.inf), ((),))
+    holes = from_list(np.radians([0, 120, 180, 240]), [0.005], taken=[0.02, 0, 0, 0])
+    [mounting] = solve_discrete([[1.0]], [-0.01], [holes], limits=limits).mountings
+    assert mounting.amounts.tolist() == [0.0, 0.0, 0.005, 0.0]
     for options in ({"pieces": [0.005], "taken": [0.02, 0]}, {"step": 0.005, "taken": [0.02, 0]}):
         with pytest.raises(ValueError, match="no admissible weight at all"):
-            split(0.01, from_list(np.radians([0, 10]), max_weight=0.015, **options))
+            solve_discrete([[1.0]], [-0.01], [from_list(np.radians([0, 10]), **options)], limits=limits)
 
 
 @pytest.mark.parametrize("diameter", [0.004, 0.008, 0.012])

@@ -19,8 +19,8 @@ def case(seed):
     N = int(rng.integers(P, 9))
     W = complex_normal(rng, (N, P))
     Y = complex_normal(rng, N) * 10 ** rng.uniform(-0.3, 1)
-    planes = []
-    for _ in range(P):
+    planes, most = [], np.full(P, np.inf)
+    for p in range(P):
         H, K = int(rng.integers(2, 6 if P < 3 else 4)), int(rng.integers(1, 3))
         angles = int(rng.choice([-1, 1])) * equal_holes(H, rng.uniform(0, 6))
         if rng.random() < 0.4:
@@ -34,10 +34,11 @@ def case(seed):
                 per_hole=int(rng.integers(1, 3)) if H < 4 else 1,
                 taken=taken,
                 stock=rng.integers(1, 3, K) if rng.random() < 0.3 else None,
-                max_weight=1.2 if rng.random() < 0.3 else np.inf,
             )
         )
-    return W, Y, planes, rng.uniform(0.2, 2, N) if rng.random() < 0.5 else np.ones(N)
+        most[p] = 1.2 if rng.random() < 0.3 else np.inf
+    limits = Limits(most, np.full((1, N), np.inf), ((),) * P)
+    return W, Y, planes, rng.uniform(0.2, 2, N) if rng.random() < 0.5 else np.ones(N), limits
 
 
 def objectives(method, W, Y, w, D):
@@ -49,39 +50,45 @@ def grid(parts):
     return np.stack([g.ravel() for g in np.meshgrid(*parts, indexing="ij")], axis=1)
 
 
-def kept(planes, found):
+def every(planes, limits):
+    """Vectors of all planes together."""
+    return grid([everything(*part)[0] for part in zip(planes, limits.max_weight, strict=True)])
+
+
+def kept(planes, limits, found):
     """What is mounted is possible, and adds up to the weights."""
-    for holes, mounting, weight in zip(planes, found.mountings, found.weights, strict=True):
+    each = zip(planes, limits.max_weight, found.mountings, found.weights, strict=True)
+    for holes, most, mounting, weight in each:
         assert mounting.vector == pytest.approx(weight, abs=1e-12)
         assert (mounting.counts.sum(axis=1) <= holes.per_hole).all()
         assert not mounting.amounts[~holes.free].any()
-        assert holes.allows(mounting.vector)
+        assert abs(holes.mounted + mounting.vector) <= most * (1 + 1e-9)
         assert holes.stock is None or (mounting.counts.sum(axis=0) <= holes.stock).all()
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(10))
 def test_equals_exhaustive_enumeration(seed, method):
-    W, Y, planes, w = case(seed)
-    D = grid([everything(holes)[0] for holes in planes])
-    found = solve_discrete(W, Y, planes, method=method, row_weights=w)
+    W, Y, planes, w, limits = case(seed)
+    D = every(planes, limits)
+    found = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=limits)
     least = objectives(method, W, Y, w, D).min()
     if (seed, method) == (4, "minmax"):  # the one that is not the least of all
         assert least * (1 + 1e-6) < found.objective <= 1.02 * least
     else:
         assert found.objective == pytest.approx(least, rel=1e-8)
-    kept(planes, found)
+    kept(planes, limits, found)
     assert np.allclose(found.residual, Y + W @ found.weights, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(10))
 def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
-    W, Y, planes, w = case(3000 + seed)
+    W, Y, planes, w, limits = case(3000 + seed)
     wanted = -np.linalg.lstsq(W, Y, rcond=None)[0]
     parts = []
-    for holes, z in zip(planes, wanted, strict=True):
-        d, number, weight = everything(holes)
+    for holes, most, z in zip(planes, limits.max_weight, wanted, strict=True):
+        d, number, weight = everything(holes, most)
         least = lightest(holes, holes.free, complex(z), holes.per_hole * holes.pieces.max()).sum()
         fits = (weight <= HEAVIER * least * (1 + 1e-9)) | (number <= 2)
         parts.append((d[fits], number[fits]))
@@ -92,17 +99,18 @@ def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
     def enough(weights):
         return objectives(method, W, Y, w, weights[None])[0] <= level
 
-    found = solve_discrete(W, Y, planes, enough, wanted=wanted, method=method, row_weights=w)
+    options = {"wanted": wanted, "method": method, "row_weights": w, "limits": limits}
+    found = solve_discrete(W, Y, planes, enough, **options)
     pieces = number[size <= level].min()
     assert found.enough
     assert (found.pieces, found.objective) == (pieces, pytest.approx(size[number <= pieces].min(), rel=1e-8))
-    kept(planes, found)
+    kept(planes, limits, found)
     ladder = [one.pieces for one in found.fewer]
     assert ladder == sorted(set(ladder))
     for one in found.fewer:  # the best of so many, each better than the one before
         assert one.objective == pytest.approx(size[number <= one.pieces].min(), rel=1e-8)
         assert not enough(one.weights)
-    never = solve_discrete(W, Y, planes, lambda _: False, wanted=wanted, method=method, row_weights=w)
+    never = solve_discrete(W, Y, planes, lambda _: False, **options)
     assert not never.enough
     assert never.objective <= 1.2 * size.min() * (1 + 1e-9)
 
@@ -110,14 +118,14 @@ def test_the_fewest_pieces_that_are_enough_equal_enumeration(seed, method):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(5))
 def test_limits_of_amplitudes_equal_enumeration(seed, method):
-    W, Y, planes, w = case(1000 + seed)
-    D = grid([everything(holes)[0] for holes in planes])
+    W, Y, planes, w, limits = case(1000 + seed)
+    D = every(planes, limits)
     sizes = np.abs(Y + D @ W.T)
     residual = np.full((1, len(Y)), np.inf)
-    free = solve_discrete(W, Y, planes, method=method, row_weights=w)
+    free = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=limits)
     worst = int(np.argmax(np.abs(free.residual) - sizes.min(axis=0)))
     residual[0, worst] = 0.5 * (sizes[:, worst].min() + abs(free.residual[worst])) * (1 + 1e-6)
-    limits = Limits(np.full(W.shape[1], np.inf), residual, ((),) * W.shape[1])
+    limits = Limits(limits.max_weight, residual, limits.forbidden)
     good = (sizes <= residual[0]).all(axis=1)
     found = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=limits)
     assert abs(found.residual[worst]) <= residual[0, worst] * (1 + 1e-8)
@@ -194,8 +202,8 @@ FOUR = from_list(equal_holes(4), [1.0])
         ([1, 1], {"DE": from_list([0.5], [1.0])}, ALMOST_ALL, "plane DE: every hole is taken"),
         (
             [1, 1],
-            [from_list([0.0, 0.2], [0.005], taken=[0.02, 0], max_weight=0.015)],
-            None,
+            [from_list([0.0, 0.2], [0.005], taken=[0.02, 0])],
+            Limits(np.array([0.015]), np.full((1, 2), np.inf), ((),)),
             "no admissible weight at all",
         ),
     ],

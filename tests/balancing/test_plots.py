@@ -22,7 +22,7 @@ AGAINST = replace(GRAMS, angles="against rotation")
 HOLES = from_list(equal_holes(8), [0.01, 0.04], taken=[0.02, *[0.0] * 7])
 COUNTS = np.zeros((8, 2), dtype=int)
 COUNTS[2, 0] = COUNTS[5, 1] = 1
-MOUNTED = mounting(HOLES, COUNTS)
+MOUNTED = mounting(HOLES, COUNTS, HOLES.pieces)
 
 
 def disc(*of, **options):

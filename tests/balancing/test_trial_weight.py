@@ -46,7 +46,7 @@ def test_impossible_forces(speed, radius, load, fraction, words):
         trial_from_force("A", speed, radius, load, fraction=fraction)
 
 
-def simulated_phase(heavy, eta, zeta, sensor, key, quantity):
+def simulated_phase(heavy, eta, zeta, sensor, key):
     """Phase lead of what an instrument reads: one mode, both directions alike, sampled in time."""
     omega = 2.0
     response = eta**2 / (1 - eta**2 + 2j * zeta * eta)
@@ -54,20 +54,16 @@ def simulated_phase(heavy, eta, zeta, sensor, key, quantity):
     mark = key + omega * t
     place = response * np.exp(1j * (mark + heavy))  # x + i y of the shaft
     read = (place * np.exp(-1j * sensor)).real
-    derivatives = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
-    for _ in range(derivatives):
-        read = (np.roll(read, -1) - np.roll(read, 1)) / (2 * (t[1] - t[0]))
     return np.angle(np.sum(read * np.exp(-1j * omega * t)))
 
 
-@pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
 @pytest.mark.parametrize("eta", [0.4, 1.0, 1.7])
-def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(quantity, eta):
+def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(eta):
     rng = np.random.default_rng(3)
     for heavy, sensor, key in rng.uniform(-pi, pi, (5, 3)):
-        phase = simulated_phase(heavy, eta, 0.08, sensor, key, quantity)
+        phase = simulated_phase(heavy, eta, 0.08, sensor, key)
         lag = np.arctan2(2 * 0.08 * eta, 1 - eta**2)
-        angle = opposing_angle(phase, lag, sensor_angle=sensor, key_phasor=key, quantity=quantity)
+        angle = opposing_angle(phase, lag, sensor - key)
         assert 0 <= angle < 2 * pi
         assert abs(np.exp(1j * angle) + np.exp(1j * heavy)) < 1e-9
 
@@ -101,7 +97,7 @@ def test_angle_by_the_model_and_by_the_lag_agree_below_the_critical_speed(angle,
     assert degrees(found.angle) == pytest.approx(310)
     assert found.amount == pytest.approx(1.0)  # half of the unbalance halves the reading
     assert found.expected == pytest.approx(Y / 2)
-    guessed = opposing_angle(np.angle(Y[0, 0]), 0.0, sensor_angle=radians(angle), key_phasor=radians(key))
+    guessed = opposing_angle(np.angle(Y[0, 0]), 0.0, radians(angle - key))
     assert degrees(guessed) == pytest.approx(310)
 
 

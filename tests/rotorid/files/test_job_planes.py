@@ -85,11 +85,12 @@ def test_trial_weights_at_another_radius(plane, folder):
 
 def test_holes_with_pieces_or_a_step(plane):
     lines = 'per_hole = 2\nstock = [3, 8]\ntaken = { "3" = 10, "7" = 0.5 }\nmax_mass_g = 60'
-    holes = plane(EQUAL + lines).holes["1"]
+    read = plane(EQUAL + lines)
+    holes = read.holes["1"]
     np.testing.assert_allclose(holes.angles, np.deg2rad(np.arange(8) * 45 + 10), rtol=1e-14)
     np.testing.assert_allclose(holes.pieces, [5e-3, 2.5e-3], rtol=1e-14)
     np.testing.assert_allclose(holes.taken, [0, 0, 0.01, 0, 0, 0, 5e-4, 0], rtol=1e-14)
-    assert (holes.per_hole, holes.step, holes.max_weight) == (2, 0.0, 0.06)
+    assert (holes.per_hole, holes.step, read.limits.max_weight[0]) == (2, 0.0, 0.06)
     assert (holes.stock.tolist(), holes.names) == ([3, 8], tuple("12345678"))
     holes = plane('holes_deg = [-90, 0]\nstep_g = 0.5\nhole_names = ["A", "B"]\ntaken = { B = 1 }').holes["1"]
     np.testing.assert_allclose(np.rad2deg(holes.angles), [270, 0], rtol=1e-14)
@@ -140,7 +141,7 @@ def test_limits_of_the_command_line(job, two_speeds):
     each = limited(job(), "1=0.01lb,2=3000mg", ["20", "A=10um"])
     np.testing.assert_allclose(each.limits.max_weight, [0.0045359237, 0.003])
     np.testing.assert_allclose(each.limits.residual, [[10e-6, 10e-6], [10e-6, 10e-6]])
-    assert limited(job("[planes.1]\nmax_mass_g = 6\n" + EQUAL), "8g", []).holes["1"].max_weight == 8e-3
+    assert limited(job("[planes.1]\nmax_mass_g = 6\n" + EQUAL), "8g", []).limits.max_weight[0] == 8e-3
     for mass, limits, words in (
         ("five", [], "a number, such as 5g"),
         ("3=5g", [], "no plane '3'"),
