@@ -51,32 +51,19 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     longest = np.abs(edges).max() or 1.0
     places = np.arange(Q) * 2.6 * longest * min(1.0, 8 / Q)
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
-    ax.axhline(0, color="0.8", lw=4, zorder=0)
-    colors = np.where(estimate.determined, BLUE, "0.6")
-    ax.quiver(
-        places,
-        0 * places,
-        tips.real,
-        tips.imag,
-        color=colors,
-        linewidth=0.8,
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        width=0.009,
-        edgecolor="black",
-    )
-    ax.plot(places + edges.real.T, edges.imag.T, color="black", lw=1)
-    ax.set_title("blue: determined, with 95 % regions; grey: not determined by the readings", fontsize=TEXT)
+    for place, tip, edge, determined in zip(places, tips, edges, estimate.determined, strict=True):
+        color = BLUE if determined else "0.6"
+        ax.plot([place, place + tip.real], [0, tip.imag], "o-", color=color, lw=2, ms=4, markevery=[1])
+        ax.plot(place + edge.real, edge.imag, color="black", lw=1)
+    words = "blue: determined, within the 95 % regions; grey: not determined by the readings"
+    ax.set_title(words, fontsize=TEXT)
     plain(ax)
     ends = -1.3 * longest, places[-1] + 1.3 * longest
     ax.set(aspect="equal", xlim=ends, ylim=(-1.15 * longest, 1.15 * longest))
     ax.set_ylabel(f"unbalance, {labels.weight_in}")
-    ax.set_xlabel(f"stations in their order, {labels.weight_in}; {turning(labels)}", fontsize=TEXT)
+    ax.set_xlabel(f"station, {labels.weight_in}, angle; {turning(labels)}", fontsize=TEXT)
+    each = zip(estimate.stations, sizes, angles, strict=True)
     between = "\n" if Q <= 8 else "  "
-    words = [
-        between.join((name, figures(size, 3), f"{angle:.0f}°"))
-        for name, size, angle in zip(estimate.stations, sizes, angles, strict=True)
-    ]
+    words = [between.join((name, figures(size, 3), f"{angle:.0f}°")) for name, size, angle in each]
     ax.set_xticks(places, words, rotation=90 * (Q > 8))
     return ax

@@ -120,7 +120,7 @@ def weights(c: Correction, ax: Axes | None = None, left: LeftToDo | None = None)
             look = {"lw": thick, "color": of_plane(p)["color"], "alpha": 0.6}
             draw_line(polar, shown, line, style, label=words, **look)
     # a region far larger than the weights would hide them: it may leave the picture
-    from_zero(polar, shown, vectors, 4 * largest * labels.weight_scale or 1.0)
+    from_zero(polar, shown, vectors, 5 * largest * labels.weight_scale or 1.0)
     return polar
 
 

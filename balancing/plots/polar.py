@@ -66,7 +66,7 @@ def from_zero(polar: PolarAxes, shown: Shown, vectors: ArrayLike, most: float = 
     """Radii from 0 (to `most` at most), their numbers farthest from the vectors."""
     angles = np.sort(shown(np.atleast_1d(vectors))[1])
     gaps = np.diff([*angles, angles[0] + 360.0])
-    polar.set_rlabel_position(float(angles[gaps.argmax()] + gaps.max() / 2))
+    polar.set_rlabel_position(float(angles[gaps.argmax()] + 0.45 * gaps.max()))  # beside the grid's lines
     polar.set_rlim(0, min(1.05 * polar.get_rmax(), most), auto=True)
 
 
@@ -108,7 +108,8 @@ def solutions_figure(result: WithoutPhase) -> Figure:
         polar.plot(np.deg2rad(angle), size, "o", mfc="white", color="black", label="weights of the runs")
         every = np.array([*tried, *(one.weights[p] for one in result.solutions)])
         from_zero(polar, labels.weight, every, 2.5 * np.abs(tried).max() * labels.weight_scale)
-    legend_below(figure, figure.axes)
+    words = f"dots: where the errors of the readings may put it\n{turning(labels)}"
+    legend_below(figure, figure.axes, title=words)
     return figure
 
 

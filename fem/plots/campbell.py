@@ -81,7 +81,7 @@ def draw_campbell(
     _draw_curves(ax, campbell, frequencies)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(ylim=(-0.08 * top, top), xlabel="speed, rpm", ylabel="whirl frequency, rpm")
-    note(ax, "1×", (0.93 * end, 0.93 * end), (4, -4), va="top")
+    note(ax, "1×", (end, end), (0, 4), ha="right", fontweight="bold")
     _mark_criticals(ax, campbell.criticals, top)
     for way in np.unique(campbell.direction[np.isfinite(frequencies)]):
         ax.plot([], [], color=QUIET, label=f"{DIRECTION_NAMES[way]} whirl", **_STYLES[way])
@@ -153,9 +153,9 @@ def _draw_curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
             part = slice(start, stop + 1)  # reaches to the next stretch: the curve has no gaps
             ax.plot(speeds[part], curve[part], color=color, linewidth=1.8, alpha=alpha[start],
                     markevery=(3 * k % step, step), **_STYLES[way[start]])  # fmt: skip
-        note(ax, str(k + 1), (last, curve[-1]), (5 + 9 * (k % 4), 0), va="center", color=color,
+        note(ax, str(k + 1), (last, curve[-1]), (4 + 8 * (k % 6), 0), va="center", color=color,
              fontweight="bold", annotation_clip=True)  # fmt: skip
-    ax.set_xlim(0.0, 1.12 * last or 1.0)
+    ax.set_xlim(0.0, 1.16 * last or 1.0)
 
 
 def _mark_criticals(ax: Axes, criticals: Sequence[tuple[float, float]], top: float) -> None:
@@ -168,14 +168,14 @@ def _mark_criticals(ax: Axes, criticals: Sequence[tuple[float, float]], top: flo
             face = "none" if heavy else "#F0E442"
             ax.plot(these, these, "o", color="black", mfc=face, ms=9, zorder=6, label=label)
     middle, gap, white = np.mean(ax.get_xlim()), 0.05 * top, [withStroke(linewidth=2.5, foreground="white")]
+    marked = {f"{speed * RPM:.0f} rpm, δ = {delta:z.2g}": speed * RPM for speed, delta in criticals}
     for side, ha, va in ((-1, "left", "top"), (1, "right", "bottom")):
         used: list[float] = []
-        for own, delta in sorted(((side * RPM * speed, delta) for speed, delta in criticals), reverse=True):
+        for own, words in sorted(((side * speed, words) for words, speed in marked.items()), reverse=True):
             if own >= side * middle:
                 height = own
                 while any(abs(other - height) < gap for other in used):
                     height += gap / 4  # clear of the curves of other modes, and of other words
                 used += [own, height]
-                words = f"{side * own:.0f} rpm, δ = {delta:z.2g}"
                 at = side * own, side * height
                 note(ax, words, at, (-9 * side, 5 * side), ha=ha, va=va, zorder=7, path_effects=white)

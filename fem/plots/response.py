@@ -251,7 +251,7 @@ def _over_speed(
         ax.plot(omega * RPM, curve, label=name, linewidth=1.6, **look(k, omega.size))
     shade_unstable(ax, [(window.first, window.last) for window in windows])
     ax.set_xlabel("speed, rpm")
-    ax.margins(x=0.01)
+    ax.margins(0.03, 0.1)  # whole marks at the ends
     plain(ax)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,11 +104,15 @@ class BearingEquilibria:
         return Table("every speed", columns)
 
     def figure(self) -> Figure:
-        """Paths of the journals in their clearance circles."""
+        """Paths of the journals in their clearance circles, below where they lose stability."""
         from rotorid.base.plot_style import on_figure
         from rotorid.motion.plots import draw_journals
 
-        return on_figure(lambda ax: draw_journals(self.equilibria, self.labels, ax), height=4.6)
+        figure = on_figure(lambda ax: draw_journals(self.equilibria, self.labels, ax), height=4.6)
+        if self.stability:
+            words = textwrap.fill(sentence(self.stability.sentence()), 76)
+            figure.suptitle(words, fontsize="medium", fontweight="bold")
+        return figure
 
     def linear_files(self, path: Path) -> Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables.

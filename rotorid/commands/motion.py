@@ -232,7 +232,7 @@ def _tables(motion: MotionRun, end: SteadyEnd | None, bearings: Sequence[str]) -
 def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Outcome:
     """Motion in time at a constant speed, through a run-up or a run-down.
 
-    Example: rotorid motion sample_data/motion/rotor.toml --speed 4000rpm --time 2s --plot motion.png
+    Example: rotorid motion sample_data/motion/unbalanced.toml --speed 4000rpm --time 2s --plot motion.png
 
     Example: rotorid motion sample_data/motion/unbalanced.toml --run-up 1000:9000rpm --time 10 --plot bode.png
     --view bode

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.plot_style import (
+    BOX,
     COLORS,
     DARK,
     MARKERS,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rotorid.base.arrays import FloatArray
+    from rotorid.base.arrays import ComplexArray, FloatArray
     from rotorid.motion.branches import Branch
     from rotorid.motion.equilibrium import Equilibrium
 
@@ -62,6 +63,7 @@ def motion_figure(motion: MotionRun) -> Figure:
             plain(ax)
             if np.abs(ax.get_ylim()).max() < _NOTHING:
                 ax.set_ylim(-1.0 if ax is row[0] else 0.0, 1.0)
+                note(ax, "no motion", (0.5, 0.5), xycoords="axes fraction", ha="center", bbox=BOX)
     against = f"{'cycles a turn' if turn else 'Hz'}, backward < 0"
     for ax, label in zip(axes[-1], ("time, s", against), strict=False):
         ax.set_xlabel(label)
@@ -85,11 +87,16 @@ def orbits_figure(motion: MotionRun) -> Figure:
         if marks.size:
             at = np.interp(marks, angle[k:], z)
             ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
-        if i in walls:
-            ax.plot(*walls[i] * CIRCLE, color=DARK, label="clearance")
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
+        ax.locator_params(nbins=6)
         plain(ax)
+        if i in walls:
+            part = ax
+            if 5 * np.abs(z - z[0]).max() < walls[i]:  # else it would be a dot in its clearance
+                part = _whole_clearance(ax, (0.72, 0.66, 0.26, 0.26), z)
+                ax.margins(0.5)
+            part.plot(*walls[i] * CIRCLE, color=DARK, label="clearance")
     legend_below(figure, figure.axes, title=_left_out(motion))
     return figure
 
@@ -150,6 +157,16 @@ def _left_out(motion: MotionRun) -> str | None:
     return f"{_PANELS} of {count} nodes, those of bearings first" if count > _PANELS else None
 
 
+def _whole_clearance(ax: Axes, place: tuple[float, float, float, float], *paths: ComplexArray) -> Axes:
+    """Small axes for a whole clearance circle, with where the paths are in it."""
+    whole = ax.inset_axes(place, aspect="equal")
+    for k, path in enumerate(paths):
+        whole.plot(path.real, path.imag, marker=".", markersize=2, **look(k))
+    whole.set_title("clearance", fontsize=TEXT)
+    whole.axis("off")
+    return whole
+
+
 def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> None:
     """Draw the path of each journal in its clearance circle over speed, with load and rotation.
 
@@ -164,20 +181,16 @@ def draw_journals(resting: Sequence[Equilibrium], labels: Sequence[str], ax: Axe
     """
     Z = np.array([at.position / [one.wall for one in at.bearings] for at in resting])
     marked = np.unique(np.linspace(0, len(resting) - 1, 5).round().astype(int)).tolist()
-    whole = ax.inset_axes((1.05, 0.5, 0.4, 0.4), aspect="equal")
-    whole.set_title("the whole clearance", fontsize=TEXT)
+    whole = _whole_clearance(ax, (1.05, 0.5, 0.4, 0.4), *Z.T)
     for k, (path, label) in enumerate(zip(Z.T, labels, strict=True)):
-        whole.plot(path.real, path.imag, marker=".", markersize=2, **look(k))
         ax.plot(path.real, path.imag, marker="o", label=label, markersize=4, markevery=marked, **look(k))
     for part in (ax, whole):
         part.plot(*CIRCLE, color=DARK)
-    whole.axis("off")
     x, y = ((part.min() + part.max()) / 2 for part in (Z.real, Z.imag))
     reach = 0.7 * max(np.ptp(Z.real), np.ptp(Z.imag), 0.1)  # the paths fill the axes, not the circle
     ax.set(aspect="equal", xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
-    for end, shift, side in ((0, 7.0, "left"), (-1, -7.0, "right")):
-        at = (Z[end, 0].real, Z[end, 0].imag)
-        note(ax, rpm_text(resting[end].speed), at, (shift, 0.0), ha=side, va="center")
+    for i in marked:
+        note(ax, rpm_text(resting[i].speed), (Z[i, 0].real, Z[i, 0].imag), (9.0, 0.0), va="center")
     load = resting[-1].load.sum()
     where = f"load towards {np.degrees(np.angle(load)):.0f}° from x" if load else "no load"
     ax.set(xlabel="x by clearance", ylabel="y by clearance")
