@@ -7,20 +7,25 @@ no other site can set. A page of another origin, or of another name for this add
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import json
-from collections.abc import Awaitable, Callable, Mapping
-from importlib.resources import files as resources
+import multiprocessing
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Executor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any
 
-from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
 
-from rotorid.worksheet.page import ACTIONS, View
-from rotorid.worksheet.session import Session
-from rotorid.worksheet.text_table import Conflict
+from rotorid.base.worker_processes import worker_pool
+from rotorid.worksheet.calculation import Results, answered
+from rotorid.worksheet.job_files import JobFiles
+from rotorid.worksheet.job_text import Conflict
+from rotorid.worksheet.page import page
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {
@@ -37,89 +42,121 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
 }
-Given = Mapping[str, Any]
+LOOK, LOOKS = 0.1, 10
+"""Seconds between two looks at the files; how many a window waits for news."""
+GRACE = 0.3
+"""Seconds that a computation may go on when nobody wants it: a new process takes longer to start."""
 
 
-async def state(session: Session, given: Given) -> dict[str, Any]:
-    """The page, as soon as it is newer than the version that a window has."""
-    return await session.after(int(given.get("after", 0)))
+class Session:
+    """A job that all windows share, and a process that computes in its folder, one request at a time."""
+
+    def __init__(self, files: JobFiles) -> None:
+        self._files, self._results = files, Results()
+        self._notice = ""
+        self._version = 0  # grows with every change that a window should see
+        self._computing: asyncio.Task[None] | None = None
+        self._lock = asyncio.Lock()
+        self._pool: Executor | None = None
+
+    async def answer(self, path: str, given: Mapping[str, Any]) -> dict[str, Any] | str:
+        """What a window asks for: JSON, or HTML; ValueError where that is impossible."""
+        match path:
+            case "/state":
+                return await self._state(int(given.get("after", 0)))
+            case "/edit":
+                self._files.apply(given["edits"])
+            case "/undo":
+                self._files.undo()
+            case "/trial":
+                return str(await self._ask("trial", self._files.job.name, {**given}))
+            case "/picture" | "/sheet" if "asked" in self._results:
+                return str(await self._ask("drawn", path[1:], *self._results["asked"]))
+            case _:
+                raise ValueError(f"there is no {path[1:]} yet")
+        self._changed()
+        return {}
+
+    def stop(self) -> None:
+        """End the process that computes."""
+        self._pool = None
+        for process in multiprocessing.active_children():
+            process.terminate()
+
+    async def _state(self, after: int) -> dict[str, Any]:
+        """The page, as soon as it is newer than the version that a window has, or after a second."""
+        for _ in range(LOOKS):
+            names = self._files.look()
+            if names or not self._version:
+                self._changed(names)
+            if self._version > after:
+                break
+            await asyncio.sleep(LOOK)
+        busy = "" if self._computing is None or self._computing.done() else "computing"
+        html = page(self._files, self._results, self._notice, busy)
+        return {"version": self._version, "html": html}
+
+    def _changed(self, names: Iterable[str] = ()) -> None:
+        """Compute files anew, of which other programs changed some; what is being computed is given up."""
+        if self._computing is not None:
+            self._computing.cancel()
+        self._notice = "; ".join(f"{name} was changed by another program" for name in names)
+        self._version += 1
+        self._computing = asyncio.ensure_future(self._compute())
+
+    async def _compute(self) -> None:
+        """The answer in place of what was there."""
+        seen = Results()
+        if self._files.now.text is not None:
+            try:
+                seen = await self._ask("whole_job", self._files.job.name, self._version)
+            except ValueError as error:
+                seen = {"refused": str(error)}
+        self._results = seen
+        self._version += 1
+
+    async def _ask(self, do: str, *given: object) -> Any:  # noqa: ANN401 - what the request gives
+        """What a request of `calculation` gives, or a ValueError; ended when nobody waits for it any more."""
+        async with self._lock:
+            self._pool = self._pool or worker_pool(1)
+            request = self._pool.submit(answered, str(self._files.job.parent), do, *given)
+            asked = asyncio.wrap_future(request)
+            asked.add_done_callback(lambda one: one.cancelled() or one.exception())  # nobody may wait
+            try:
+                await asyncio.wait({asked})
+            except asyncio.CancelledError:
+                if not (await asyncio.wait({asked}, timeout=GRACE))[0]:
+                    self.stop()
+                raise
+            if isinstance(asked.exception(), BrokenProcessPool):
+                self.stop()
+                raise ValueError("the calculation ended unexpectedly: try again")
+        answer = asked.result()
+        self._files.watch(answer["read"])
+        if "refused" in answer:
+            raise ValueError(answer["refused"])
+        return answer["value"]
 
 
-async def edit(session: Session, given: Given) -> dict[str, Any]:
-    """Change cells and settings, all or none."""
-    session.files.apply(given["edits"])
-    session.changed()
-    return {}
+def application(session: Session, token: str, address: str) -> ASGIApp:
+    """The page of one job, for requests with a token to an address and port, as browsers send them."""
 
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        request = Request(scope, receive)
+        why, status = _refusal(request, token, address), 403
+        if not why:
+            try:
+                answer = await _answer(session, request)
+            except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
+                why, status = f"the page asked for what there is not: {wrong}", 400
+            except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
+                why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
+        if why:
+            answer = JSONResponse({"error": why}, status)
+        answer.headers.update(HEADERS)
+        await answer(scope, receive, send)
 
-async def do(session: Session, given: Given) -> dict[str, Any]:
-    """What a button does."""
-    if given["do"] == "undo":
-        session.files.undo()
-    else:
-        session.files.apply(ACTIONS[given["do"]](View(session.files, session.results), given))
-    session.changed()
-    return {}
-
-
-async def trial(session: Session, given: Given) -> str:
-    """A proposed trial weight."""
-    if "with_job" in given:
-        return str(await session.worker.ask("trial", session.files.job.name, {}))
-    options: dict[str, Any] = {}
-    for name, text in given.items():
-        if text:
-            key, _, unit = name.partition(" ")
-            number = text.replace(",", ".")
-            options[key] = float(number) if unit == "deg" else f"{number}{unit}"
-    return str(await session.worker.ask("trial", None, options))
-
-
-ROUTES: Mapping[str, Callable[[Session, Given], Awaitable[dict[str, Any] | str]]] = {
-    **{f"/{one.__name__}": one for one in (state, edit, do, trial)},
-    "/picture": lambda session, given: session.drawn("picture"),
-    "/sheet": lambda session, given: session.drawn("sheet"),
-}
-
-
-def application(session: Session, token: str, address: str, ready: Callable[[], object]) -> Starlette:
-    """The page of one job.
-
-    Parameters
-    ----------
-    session
-        The job.
-    token
-        That a request must have.
-    address
-        Address and port, as browsers send them.
-    ready
-        Is called when requests can be answered.
-    """
-
-    async def answer(request: Request) -> Response:
-        """A file of the page, or what is asked for; everything that is wrong as one sentence."""
-        path, kind, status = request.url.path, "text/html", 400
-        if why := _refusal(request, token, address):
-            return JSONResponse({"error": why}, 403, HEADERS)
-        if path in PAGE:
-            name, kind = PAGE[path]
-            content = (resources("rotorid.worksheet") / "page" / name).read_bytes()
-            return Response(content, media_type=kind, headers=HEADERS)
-        try:
-            made = await ROUTES[path](session, await _given(request))
-            if isinstance(made, dict):
-                return JSONResponse(made, headers=HEADERS)
-            kind = "image/svg+xml" if made.startswith("<svg") else kind
-            return Response(made, media_type=kind, headers=HEADERS)
-        except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
-            why = f"the page asked for what there is not: {wrong}"
-        except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
-            why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
-        return JSONResponse({"error": why}, status, HEADERS)
-
-    routes = [Route(path, answer, methods=["GET", "POST"]) for path in (*PAGE, *ROUTES)]
-    return Starlette(routes=routes, lifespan=lambda _: session.running(ready))
+    return app
 
 
 def _refusal(request: Request, token: str, address: str) -> str:
@@ -134,14 +171,21 @@ def _refusal(request: Request, token: str, address: str) -> str:
     return ""
 
 
-async def _given(request: Request) -> Given:
-    """The query, or the body, of which no more is kept than may be."""
-    if request.method == "GET":
-        return request.query_params
-    body = bytearray()
-    async for part in request.stream():  # a body in chunks does not say its size before
-        body += part
-        if len(body) > _LARGEST:
-            raise ValueError(f"at most {_LARGEST // 10**6} MB")
-    given: Given = json.loads(body)
-    return given
+async def _answer(session: Session, request: Request) -> Response:
+    """A file of the page, or what is asked for by the query or the body."""
+    path = request.url.path
+    if path in PAGE:
+        name, kind = PAGE[path]
+        return Response(Path(__file__).with_name("page").joinpath(name).read_bytes(), media_type=kind)
+    given: Mapping[str, Any] = request.query_params
+    if request.method != "GET":
+        body = bytearray()
+        async for part in request.stream():  # a body in chunks does not say its size before
+            body += part
+            if len(body) > _LARGEST:
+                raise ValueError(f"at most {_LARGEST // 10**6} MB")
+        given = json.loads(body)
+    made = await session.answer(path, given)
+    if isinstance(made, dict):
+        return JSONResponse(made)
+    return Response(made, media_type="image/svg+xml" if made.startswith("<svg") else "text/html")

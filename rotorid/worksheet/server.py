@@ -19,37 +19,25 @@ FIRST_PORT, PORTS = 49152, 16384
 
 
 def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
-    """Serve the page of a job until it is interrupted.
+    """Serve the page of a job, or of a folder for one, until it is interrupted.
 
-    Parameters
-    ----------
-    job
-        A job, or a folder for one.
-    port
-        Of 127.0.0.1; 0: that of the job, or any that is free.
-    show
-        Gets the address as soon as it can be opened.
-
-    Raises
-    ------
-    ValueError
-        For what is no job, where the port is taken, and without the extra `rotorid[worksheet]`.
+    The port is one of 127.0.0.1; 0: that of the job, or any that is free. `show` gets the address. ValueError
+    for what is no job, where the port is taken, and without the extra `rotorid[worksheet]`.
     """
     try:
         import tomlkit  # noqa: F401
         import uvicorn
 
-        from rotorid.worksheet.app import application
+        from rotorid.worksheet.app import Session, application
     except ImportError as error:
         needed = "starlette uvicorn tomlkit"
         raise ValueError(f"the worksheet needs {error.name}: pip install {needed}") from error
     from rotorid.worksheet.job_files import JobFiles
-    from rotorid.worksheet.session import Session
 
     if hasattr(signal, "SIGPIPE"):  # a process that was ended reads no more; Windows has none
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-    session = Session(JobFiles(job))
-    digest = hmac.new(_secret(), str(session.files.job).encode(), hashlib.sha256)
+    files = JobFiles(job)
+    digest = hmac.new(_secret(), str(files.job).encode(), hashlib.sha256)
     token = digest.hexdigest()[:32]
     usual = FIRST_PORT + int.from_bytes(digest.digest()[16:20]) % PORTS
 
@@ -64,11 +52,16 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
             listening.bind((HOST, 0))
         listening.listen()
         address = f"{HOST}:{listening.getsockname()[1]}"
-        app = application(session, token, address, lambda: show(f"http://{address}/#{token}"))
         # a worker that Ctrl+C finds half started may be reaped by two; the program ends it anyway
         logging.getLogger("asyncio").setLevel(logging.ERROR)
-        config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=2)
-        uvicorn.Server(config).run(sockets=[listening])
+        session = Session(files)
+        options = {"log_level": "warning", "access_log": False, "lifespan": "off", "ws": "none"}
+        config = uvicorn.Config(application(session, token, address), timeout_graceful_shutdown=2, **options)
+        show(f"http://{address}/#{token}")  # who opens it now waits for an answer
+        try:
+            uvicorn.Server(config).run(sockets=[listening])
+        finally:
+            session.stop()
 
 
 def _secret() -> bytes:

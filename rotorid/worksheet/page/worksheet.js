@@ -1,5 +1,5 @@
-/* It shows the HTML of the server, and sends every cell that changes, by its id; buttons have `data-edits`
-or what they `data-do`; what has `data-keep` is filled here. */
+/* It shows the HTML of the server, and sends every cell that changes, by its id; buttons and forms have
+`data-edits`, or the rows that are then `data-gone`; what has `data-keep` is filled here. */
 const $ = (id) => document.getElementById(id);
 const typed = new Map(); // id of a cell → its change, until the page has it; with `why` if it was refused
 let last = Promise.resolve(); // of what is still to be sent, in order
@@ -8,6 +8,19 @@ const token = location.hash.slice(1);
 let version = -1;
 let online = true;
 let savedWords = "all is saved";
+
+/* A message in words of the page, not of files and options. */
+const WORDS = {
+  amplitude_percent: "reading, %",
+  phase_deg: "phase, °",
+  run_percent: "run to run, %",
+  placement_deg: "place of a weight, °",
+  placement_percent: "weight, %",
+  "[errors]": "errors",
+  check_weights: "weights of the check run",
+  max_weight: "largest",
+};
+const inWords = (text) => Object.entries(WORDS).reduce((all, [key, words]) => all.replaceAll(key, `“${words}”`), text);
 
 /* Make elements as they come from the server; focus stays, and what is being typed. */
 function morph(old, now) {
@@ -57,7 +70,11 @@ async function refresh(after) {
   if (online && news.version < version) return; // the other request was faster
   const first = version < 0;
   [online, version] = [true, news.version];
-  morphChildren(document.body, new DOMParser().parseFromString(news.html, "text/html").body);
+  const { body } = new DOMParser().parseFromString(news.html, "text/html");
+  for (const one of body.querySelectorAll("#result li, #result li *, #result p, #result p *")) {
+    if (!one.children.length) one.textContent = inWords(one.textContent);
+  }
+  morphChildren(document.body, body);
   if (first) restoreTrial();
   showSaved();
   showConflicts();
@@ -123,7 +140,7 @@ function showConflicts() {
   for (const { id, text, why, status } of [...typed.values()].filter((one) => one.why)) {
     const theirs = $(id)?.defaultValue ?? "";
     const words = `another window (or program) wrote “${theirs}” here; you typed “${text}”. `;
-    const line = add(box, "p", `${$(id)?.ariaLabel ?? id}: ${status === 409 ? words : why} `);
+    const line = add(box, "p", `${$(id)?.ariaLabel ?? id}: ${status === 409 ? words : inWords(why)} `);
     add(line, "button", `Keep “${theirs}”`, { theirs: id });
     add(line, "button", `Write “${text}”`, { mine: id });
     $(id)?.setAttribute("aria-invalid", "true");
@@ -133,7 +150,7 @@ function showConflicts() {
 
 function tell(text) {
   $("message").replaceChildren();
-  if (text) add($("message"), "p", text);
+  if (text) add($("message"), "p", inWords(text));
 }
 
 function showSaved() {
@@ -153,12 +170,34 @@ async function draw() {
   if (!svg) slot.drawn = null; // the next state asks again
 }
 
+/* Edits of a form, where {form_field} stands for what is typed there: its own, its rows, those of its ticked boxes. */
+function editsOf(form, fields) {
+  const typedIn = (_, value) => (value?.form_field ? fields[value.form_field].trim() : value);
+  const read = ({ dataset }) => JSON.parse(dataset.edits ?? "[]", typedIn);
+  const rows = JSON.parse(form.dataset.rows, typedIn);
+  const boxes = [...form.querySelectorAll("input:checked[data-edits]")];
+  return [...read(form), ...rowsOf(rows, fields), ...boxes.flatMap(read)];
+}
+
+/* Rows of runs at the places of other rows, or at each speed and sensor that is typed; the first make a table. */
+function rowsOf({ table, columns, runs, like }, fields) {
+  const { run, speed, sensor } = columns ?? { run: "run", speed: fields.speed, sensor: "sensor" };
+  const each = (name) => fields[name].split(/[,;]/).map((word) => word.trim()).filter(Boolean);
+  const places = like
+    ? like.filter((row) => row.place === row.speed).map((row) => [row.speed, row.sensor])
+    : each("speeds").flatMap((at) => each("sensors").map((name) => [at, name]));
+  const cells = runs.flatMap((name) => places.map(([at, where]) => ({ [run]: name, [speed]: at, [sensor]: where })));
+  const header = [run, speed, sensor, fields.amplitude, ...(fields.no_phase ? [] : ["phase_deg"])];
+  return [...(columns ? [] : [{ create: table, header }]), ...cells.map((row) => ({ table, cells: row }))];
+}
+
 /* What a person does. */
 document.addEventListener("click", ({ target }) => {
   const button = target.closest("button");
-  const { edits, go, theirs, mine } = button?.dataset ?? {};
+  const { edits, gone, go, theirs, mine } = button?.dataset ?? {};
   if (edits) act("/edit", { edits: JSON.parse(edits) });
-  if (button?.dataset.do) act("/do", { ...button.dataset });
+  if (gone) act("/edit", { edits: JSON.parse(gone).map((row) => ({ delete: row })) });
+  if (button?.dataset.do) act(`/${button.dataset.do}`, {});
   if (go) $(go)?.focus();
   if (button?.id === "print") print();
   const { changes, drop } = typed.get(theirs ?? mine) ?? {};
@@ -170,7 +209,7 @@ document.addEventListener("submit", async (event) => {
   const form = event.target;
   const fields = Object.fromEntries(new FormData(form, event.submitter));
   if (form.id === "trial") return propose(fields);
-  if (!(await act("/do", { do: form.dataset.do, ...fields }))) return;
+  if (!(await act("/edit", { edits: editsOf(form, fields) }))) return;
   form.reset();
   $("setup").open = false;
 });
@@ -206,7 +245,7 @@ function restoreTrial() {
 async function propose(fields) {
   const [box, answer] = [$("trial-answer"), ask("/trial", fields)];
   box.innerHTML = await answer.then((one) => one.text(), () => "");
-  await answer.catch(({ message }) => add(box, "p", message));
+  await answer.catch(({ message }) => add(box, "p", inWords(message)));
 }
 
 async function print() {

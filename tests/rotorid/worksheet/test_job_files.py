@@ -15,7 +15,8 @@ from rotorid.files import disk
 from rotorid.files.columns import read_grid
 from rotorid.files.job import read_job
 from rotorid.files.problems import InputError, Problems
-from rotorid.worksheet.job_files import Conflict, JobFiles
+from rotorid.worksheet.job_files import JobFiles
+from rotorid.worksheet.job_text import Conflict
 
 pytest.importorskip("tomlkit", reason="without the extra rotorid[worksheet]")
 
@@ -43,7 +44,7 @@ def tables_of(job):
 
 
 def rows(job, table="runs"):
-    return [{"id": one.id, "cells": [*one.cells]} for one in job.now.tables[table].rows()]
+    return [{"id": one.id, "cells": [*one.cells.values()]} for one in job.now.tables[table].rows()]
 
 
 def cell(job, place=0, column="phase_deg", new="90", table="runs"):
