@@ -21,7 +21,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact golden-mutations book lint house sure docs pages format bench bench-all build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact book lint house sure docs pages format bench bench-all build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -76,10 +76,6 @@ PARENT ?= HEAD~1
 CASES ?= stored
 golden-near: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden near $(PARENT) $(CASES)
-
-# Eight wrong formulas: does the comparison with the unmutated tree, and with what is stored, see each?
-golden-mutations: $(VENV)/.dev
-	PYTHONPATH=tests $(BIN)/python -m golden mutations
 
 # All that every command prints and writes, byte for byte with another commit: make golden-exact PARENT=main
 golden-exact: $(VENV)/.dev
