@@ -55,8 +55,7 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
         color = BLUE if determined else "0.6"
         ax.plot([place, place + tip.real], [0, tip.imag], "o-", color=color, lw=2, ms=4, markevery=[1])
         ax.plot(place + edge.real, edge.imag, color="black", lw=1)
-    words = "blue: determined, within the 95 % regions; grey: not determined by the readings"
-    ax.set_title(words, fontsize=TEXT)
+    ax.set_title("blue: determined, within 95 % regions; grey: not determined", fontsize=TEXT)
     plain(ax)
     ends = -1.3 * longest, places[-1] + 1.3 * longest
     ax.set(aspect="equal", xlim=ends, ylim=(-1.15 * longest, 1.15 * longest))

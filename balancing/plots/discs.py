@@ -109,7 +109,7 @@ def draw_disc(  # noqa: PLR0913
         del vectors["made"]
     like = "like adding, " if remove else ""
     lines = [f"{like}{name}: {labels.weight_at(vector)}" for name, vector in vectors.items() if vector]
-    lines = [f"{turn_sign(labels)} rotation", *lines, *["hatched: there already"] * bool(taken.any())]
+    lines = [f"{turn_sign(labels)} rotation", *lines, *["grey: there already"] * bool(taken.any())]
     bottom = -_EDGE - _LINE * len(lines)
     ax.set_ylim(bottom, _EDGE)
     _write(ax, 1j * bottom, "\n".join(lines), va="bottom")

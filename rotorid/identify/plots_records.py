@@ -36,7 +36,7 @@ MANY = 8
 def figure_fit(result: Fit) -> Figure:
     """All about a fit: each signal with the model and its residuals, the inputs, the parameters."""
     outputs, inputs = result.model.outputs, tuple(result.records[0].inputs)
-    heights = [1.4, 0.8] * len(outputs) + [0.9] * len(inputs)
+    heights = [1.3, 0.9] * len(outputs) + [0.9] * len(inputs)
     parts = 0.9 + sum(heights), 0.8 + 0.26 * len(result.parameters)
     figure = new_figure(sum(parts))
     above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
@@ -92,6 +92,7 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
         axes.plot(t, r, **_styles(result, k)[0])
     axes.axhline(0.0, color=QUIET, lw=0.8)
     _finish(axes, "residual")
+    axes.margins(y=0.1)
 
 
 def draw_parameters(result: Fit, axes: Axes) -> None:
@@ -109,7 +110,6 @@ def draw_parameters(result: Fit, axes: Axes) -> None:
     axes.set_yticks(range(n), names)
     widest = 1.15 * max(filter(np.isfinite, shares), default=1.0)
     axes.set(xlim=(-widest, widest), ylim=(n - 0.4, -0.6), xlabel="95 % interval, % of the value")
-    axes.locator_params(axis="x", nbins=6)
     plain(axes)
     state = "converged" if result.converged else "not converged"
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
