@@ -11,7 +11,7 @@ import asyncio
 import hmac
 import json
 import multiprocessing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -22,7 +22,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from rotorid.base.worker_processes import worker_pool
-from rotorid.worksheet.calculation import Results, answered
+from rotorid.worksheet.calculation import Results, answered, drawn, trial, whole_job
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.job_text import Conflict
 from rotorid.worksheet.page import page
@@ -109,9 +109,9 @@ class Worksheet:
             case "/state":
                 return JSONResponse(await self._state(int(given.get("after", 0))))
             case "/trial":
-                return HTMLResponse(await self._ask("trial", self._files.job.name, {**given}))
+                return HTMLResponse(await self._ask(trial, self._files.job.name, {**given}))
             case "/picture" | "/sheet" if asked:
-                return HTMLResponse(await self._ask("drawn", path[1:], *asked))
+                return HTMLResponse(await self._ask(drawn, path[1:], *asked))
             case "/edit":
                 self._files.apply(given["edits"])
             case "/undo":
@@ -147,14 +147,14 @@ class Worksheet:
         seen = Results()
         if self._files.now.text is not None:
             try:
-                seen = await self._ask("whole_job", self._files.job.name, self._version)
+                seen = await self._ask(whole_job, self._files.job.name, self._version)
             except ValueError as error:
                 seen = {"refused": str(error)}
         self._results = seen
         self._version += 1
 
-    async def _ask(self, do: str, *given: object) -> Any:  # noqa: ANN401 - what the request gives
-        """What a request of `calculation` gives, or a ValueError; ended when nobody waits for it any more."""
+    async def _ask(self, do: Callable[..., Any], *given: object) -> Any:  # noqa: ANN401  what it gives
+        """What a function of `calculation` gives, or ValueError; ended when nobody waits for it any more."""
         async with self._lock:
             self._pool = self._pool or worker_pool(1)
             request = self._pool.submit(answered, str(self._files.job.parent), do, *given)

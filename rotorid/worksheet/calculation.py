@@ -25,7 +25,7 @@ Results = dict[str, Any]
 the `problems` of files, as `Problem` with their `text`, or why it is `refused`."""
 
 
-def answered(folder: str, do: str, *given: Any) -> dict[str, Any]:  # noqa: ANN401
+def answered(folder: str, do: Callable[..., Any], *given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Do what is asked for in a folder: its `value`, or why it is `refused`; stamps of what was `read`."""
     from rotorid.files.disk import reading
 
@@ -40,7 +40,7 @@ def answered(folder: str, do: str, *given: Any) -> dict[str, Any]:  # noqa: ANN4
     reading.set(note)
     try:
         os.chdir(folder)  # each time: another one may have been put in its place
-        answer["value"] = REQUESTS[do](*given)
+        answer["value"] = do(*given)
     except (ValueError, OSError, ArithmeticError) as error:
         answer["refused"] = str(error)
     except Exception as error:  # a defect of the program, of which the page must not wait for ever
@@ -124,6 +124,7 @@ def balanced(job: str, version: int, checked: bool) -> dict[str, Any]:
     return {
         **shown,
         "tables": [*to_do(document, made.result, read, boxes=False).values()],
+        "unit": labels.weight_in,
         "parts": [] if trim else document["parts"],
         "conventions": f"{refer}Angles count {labels.angles}, phase {labels.phase}.",
         "to_mount": document["mounting"]["holes"] if "mounting" in document else document["corrections"],
@@ -152,6 +153,3 @@ def trial(job: str, fields: Mapping[str, str]) -> str:
     answer = made.answer
     lines = [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]
     return "".join(f"<p>{escape(line)}</p>" for line in lines if line)
-
-
-REQUESTS: Mapping[str, Callable[..., Any]] = {one.__name__: one for one in (whole_job, drawn, trial)}

@@ -179,11 +179,10 @@ def is_inside(path: Path, folder: Path | str) -> bool:
 
 def stamp(path: Path) -> Stamp:
     """What tells that a file is as it was; empty: there is none."""
-    try:
+    with suppress(OSError):
         at = path.stat()
-    except OSError:
-        return ()
-    return at.st_mtime_ns, at.st_ctime_ns, at.st_size, at.st_ino
+        return at.st_mtime_ns, at.st_ctime_ns, at.st_size, at.st_ino
+    return ()
 
 
 def _job_in(given: Path) -> Path:

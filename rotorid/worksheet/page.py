@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
-from rotorid.base.text import vibration_unit_words, weight_unit_words
+from rotorid.base.text import figures, vibration_unit_words, weight_unit_words
 from rotorid.files.problems import quote
 from rotorid.worksheet.calculation import Results
 from rotorid.worksheet.job_files import JobFiles
@@ -17,6 +17,7 @@ from rotorid.worksheet.job_text import Table, content, text_of
 _PAGES = Environment(
     loader=PackageLoader("rotorid.worksheet", "page"), autoescape=True, trim_blocks=True, lstrip_blocks=True
 )
+_PAGES.filters["figures"] = figures
 Row = dict[str, str]
 """Cells of a table by what they hold, and of the row its `id`, where it is `at`, and its `place`."""
 

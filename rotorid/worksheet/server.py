@@ -29,8 +29,9 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
 
         from rotorid.worksheet.app import Worksheet
     except ImportError as error:
-        needed = "starlette uvicorn tomlkit"
-        raise ValueError(f"the worksheet needs {error.name}: pip install {needed}") from error
+        raise ValueError(
+            f"the worksheet needs {error.name}: pip install starlette uvicorn tomlkit"
+        ) from error
     from rotorid.worksheet.job_files import JobFiles
 
     if hasattr(signal, "SIGPIPE"):  # a process that was ended reads no more; Windows has none
