@@ -27,7 +27,7 @@ from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.influence import in_order
 from balancing.prediction import shown
-from balancing.tables import rms
+from balancing.tables import reading_names, rms
 from balancing.what_if import worse_elsewhere
 from rotorid.base.text import capital, listing
 from rotorid.regression import solution
@@ -57,7 +57,6 @@ _MORE = 1 + 1e-6
 """Above a limit by more than rounding."""
 
 
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """What a correction is made of: its coefficients, those of all speeds and planes, what it must keep to.
@@ -83,7 +82,7 @@ class Case:
     @property
     def W(self) -> ComplexArray:
         """Coefficients, (N, P)."""
-        return np.asarray(self.part.W.reshape(-1, len(self.names)))
+        return self.part.W.reshape(-1, len(self.names))
 
     @cached_property
     def forms(self) -> tuple[ComplexArray, ComplexArray]:
@@ -104,7 +103,7 @@ class Case:
     @property
     def effect(self) -> FloatArray:
         """Root mean square effect of a unit weight in each plane, (P,)."""
-        return np.asarray(np.sqrt(np.diag(self.forms[0]).real[1:]))
+        return np.sqrt(np.diag(self.forms[0]).real[1:])
 
     @property
     def clearness(self) -> FloatArray:
@@ -327,14 +326,13 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
 
 
 def _over_limit(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
-    """The reading that passes its limit by most at speeds that were left out."""
-    planes = [today.planes.index(plane) for plane in result.planes]
-    new = np.abs(today.baseline + today.W[..., planes] @ result.weights)
-    most = np.inf if limits is None else limits.residual * _MORE
-    over = np.where(np.isin(today.speeds, result.speeds)[:, None], 0.0, new - most)
-    s, c = divmod(int(np.argmax(over)), len(today.sensors))
-    if over[s, c] <= 0:
+    """The largest reading that passes its limit at speeds that were left out."""
+    if limits is None:
         return ()
-    name, size = f"sensor {today.sensors[c]!r}", today.labels.amplitude_words(new[s, c])
-    at = today.labels.speed_words(today.speeds[s])
-    return (f"the vibration of {name} at {at} is predicted to pass its limit: {size}",)
+    new = np.abs(today.baseline + today.W @ in_order(result.weights, result.planes, today.planes))
+    left_out = ~np.isin(today.speeds, result.speeds)[:, None]
+    over = (left_out * (new > limits.residual * _MORE) * new).ravel()
+    worst, names = int(np.argmax(over)), reading_names(today.labels, today.sensors, today.speeds)
+    size = today.labels.amplitude_words(over[worst])
+    words = f"the vibration of {names[worst]} is predicted to pass its limit: {size}"
+    return (words,) if over.any() else ()

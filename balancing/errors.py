@@ -236,7 +236,7 @@ class RunErrors:
         """One set of sizes (4,): variances averaged by their precision, so that large ones do not decide."""
         total = np.sum(self.sizes**2, axis=1)
         if not total.all():
-            return np.asarray(np.sqrt(self.probability @ self.sizes**2))
+            return np.sqrt(self.probability @ self.sizes**2)
         precision = self.probability / total
         return np.asarray(np.sqrt(precision @ self.sizes**2 / precision.sum()))
 
@@ -252,7 +252,7 @@ def rms(values: ArrayLike) -> float:
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
     """Readings by one unbalance in each plane, of equal effect, together of mean square size², (S, C, P)."""
     mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
-    return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
+    return W * (size / np.where(mean > 0, mean, np.inf))
 
 
 def own_variance(readings: ComplexArray, evenly: float) -> FloatArray:
@@ -332,7 +332,7 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
     even, uneven, variance = (part.reshape(R, N)[:, at] for part in variances)
 
     def alike(rows: ComplexArray) -> ComplexArray:
-        return np.asarray(rows.T @ rows.conj())
+        return rows.T @ rows.conj()
 
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2

@@ -210,7 +210,6 @@ class PlaneVectors:
         ]
         return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
-
     def listed(self, z: complex) -> Vectors:
         """Vectors near a point, of every number of pieces, for `around`."""
         from scipy.spatial import cKDTree
@@ -249,9 +248,8 @@ class PlaneVectors:
         return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf)[:, None], np.ones(1))
 
 
-
 def _number(used: FloatArray) -> FloatArray:
-    return np.asarray(used @ np.ones(used.shape[1]))
+    return used @ np.ones(used.shape[1])
 
 
 def _points(d: ComplexArray, height: FloatArray) -> FloatArray:

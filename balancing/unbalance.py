@@ -85,7 +85,7 @@ class Unbalance(Answered):
     @property
     def own_share(self) -> FloatArray:
         """How much of a station's estimate is its own unbalance, Re R_qq, shape (Q,); 1: all."""
-        return np.asarray(np.diag(self.resolution).real)
+        return np.diag(self.resolution).real
 
     @property
     def determined(self) -> BoolArray:
