@@ -325,11 +325,11 @@ def verdict_of_check(
     warnings = left.remarks.warnings
     if tolerance is not None:
         part = left.part(range(len(left.speeds)), None, plane_indices(left, tolerance.planes))
-        S, C, P = part.W.shape
-        check_planes(part.W.reshape(-1, P), part.planes)
-        fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
-        solved = [fitted.resolve(W.reshape(-1, S * C, P), Y.reshape(-1, S * C)) for Y, W in part.draws()]
-        draws = np.concatenate([np.zeros((0, P), dtype=complex), *solved])
+        W, Y = part.W.reshape(-1, len(part.planes)), part.baseline.ravel()
+        check_planes(W, part.planes)
+        fitted = solve(W, Y)
+        solved = [fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws()]
+        draws = np.concatenate([0 * fitted.weights[None][:0], *solved])
         judged += judge_unbalance(-fitted.weights, -draws, tolerance, part.planes, radii=radii)
         by_errors, _ = fit_part(part)
         if by_errors.dof and chance(by_errors.chi_square or 0.0, by_errors.dof) < POOR:
