@@ -199,10 +199,9 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         cause = result.combination or unclear.removesuffix(REMEDY)
         if cause and some:
             made = replace(made, word="determined in part", cause=cause, instead=remedies(case))
-        chosen = [case.today.planes.index(plane) for plane in case.names]
-        today = case.today.part(range(len(case.today.speeds)), None, chosen)
-        elsewhere = worse_elsewhere(today, D, result.speeds)
-        warnings = (*made.warnings, *(() if elsewhere else _over_limit(result, case.today, limits)))
+        there = case.today, in_order(D, case.names, case.today.planes), result.speeds
+        elsewhere = worse_elsewhere(*there)
+        warnings = (*made.warnings, *(() if elsewhere else _over_limit(*there, limits)))
         return replace(made, warnings=warnings, notes=case.coarse, elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
@@ -216,8 +215,8 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
             cause="; ".join((*contradictions, outlook)),
             instead=("Instead: mend the table, or measure these runs again until they agree.",),
         )
-    causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
-    causes = causes if sound else _causes(result, case)
+    certain = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
+    causes = certain if sound else _causes(result, case)
     determined = [f"{capital(result.combination)}."] if result.combination else []
     instead = (*determined, *remedies(case))
     return replace(made, word="do not mount", cause="; ".join((*causes, outlook)), instead=instead)
@@ -325,12 +324,14 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
     )
 
 
-def _over_limit(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
-    """The largest reading that passes its limit at speeds that were left out."""
+def _over_limit(
+    today: Influence, weights: ComplexArray, used: FloatArray, limits: Limits | None
+) -> tuple[str, ...]:
+    """The largest reading that passes its limit with weights (P,) at speeds that were left out."""
     if limits is None:
         return ()
-    new = np.abs(today.baseline + today.W @ in_order(result.weights, result.planes, today.planes))
-    left_out = ~np.isin(today.speeds, result.speeds)[:, None]
+    new = np.abs(today.baseline + today.W @ weights)
+    left_out = ~np.isin(today.speeds, used)[:, None]
     over = (left_out * (new > limits.residual * _MORE) * new).ravel()
     worst, names = int(np.argmax(over)), reading_names(today.labels, today.sensors, today.speeds)
     size = today.labels.amplitude_words(over[worst])

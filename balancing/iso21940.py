@@ -217,7 +217,7 @@ def tolerance(
     '3979 g·mm, 7.96 µm'
     """
     named = dict(planes or {})
-    given = np.array([np.nan if z is None else z for z in named.values()], dtype=np.float64)
+    given = np.array([*named.values()], dtype=np.float64)  # None becomes NaN
     positions = given[np.isfinite(given)]
     placed, two = len(positions) == len(named) > 0, len(positions) == 2
     ends = np.array(positions if bearings is None and two else bearings or (), dtype=np.float64)

@@ -247,7 +247,7 @@ def judge_unbalance(
 
     each = zip(planes, np.eye(len(planes)), tolerance.limits[order] / radius, strict=True)
     judged = [one("plane", name, row, limit) for name, row, limit in each]
-    if tolerance.transfer is not None and tolerance.bearing_limits is not None:
+    if tolerance.transfer is not None:
         ends = zip(("A", "B"), tolerance.transfer[:, order] * radius, tolerance.bearing_limits, strict=True)
         judged += [one("bearing", name, row, float(limit)) for name, row, limit in ends]
     return tuple(judged)
