@@ -240,7 +240,6 @@ class PlaneVectors:
         there = rows < self.tree.n
         return rows[there], np.broadcast_to(of[:, None], rows.shape)[there]
 
-
     def place(self, z: complex) -> Mounting:
         """Amounts of any size that make z."""
         return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf)[:, None], np.ones(1))
