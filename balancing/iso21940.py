@@ -239,12 +239,9 @@ def tolerance(
             "with the positions of the bearings, give those of the planes, too",
         ),
         (
-            centre is None or len(ends),
-            "the position of the centre of mass says nothing without those of bearings or two planes",
-        ),
-        (
-            centre is not None or not len(ends),
-            "the share of each plane needs the position of the centre of mass: give that, too",
+            (centre is None) == (not len(ends)),
+            "the share of each plane needs the position of the centre of mass, and that the positions of the "
+            "bearings or of two planes: give both, or neither",
         ),
     ):
         if not right:
