@@ -443,9 +443,10 @@ def zones_of(
     if outlook.errors_known:
         most = largest(predicted, outlook.after_covariance)
     read = np.full(most.shape, np.nan)
-    for speed, readings in () if check is None else zip(check.speeds, np.abs(check.mean[-1]), strict=True):
-        for name, size in zip(check.sensors, readings, strict=True) if check else ():
-            read[np.ix_(outlook.speeds == speed, np.array(outlook.sensors) == name)] = size
+    if check is not None:
+        for (s, c), size in np.ndenumerate(np.abs(check.mean[-1])):
+            here = np.ix_(outlook.speeds == check.speeds[s], np.array(outlook.sensors) == check.sensors[c])
+            read[here] = size
     names = [name for name in outlook.sensors if name in boundaries]
     limits = np.array([boundaries[name] for name in names])
 
