@@ -57,8 +57,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("bearings*", "*log_decrement", "0 where the mode begins to grow", absolute=1e-10),
     Tolerance("motion*", "position_error", "the difference of two integrations", absolute=1e-9),
     Tolerance("motion*", "reduction.frequency_error*", "rounding of frequencies", absolute=1e-10),
-    Tolerance("bk*", "*chi_square*", _NOTHING, absolute=1e-20),
-    Tolerance("static-couple", "*chi_square*", _NOTHING, absolute=1e-20),
+    *(Tolerance(case, "*chi_square*", _NOTHING, absolute=1e-20) for case in ("bk*", "static*", "index")),
     Tolerance("no-phase", "*after", _NOTHING, absolute=1e-12),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
