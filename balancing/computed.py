@@ -141,13 +141,10 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
     far = np.asarray(lack, dtype=np.float64)
     if not (np.isfinite(far) & (far >= 0)).all():
         raise ValueError("the relative errors that the lack of fit leaves must be finite numbers ≥ 0")
-    S, C, P = influence.W.shape
-    F = np.asarray(columns, dtype=complex)
-    independent = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    at = np.arange(2, 2 * P + 2)
-    std = np.broadcast_to(far, (S, C))[..., None] * np.abs(influence.W)
-    independent[..., at, at] = np.repeat(std**2, 2, axis=-1)
-    common = np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1)
+    variance = np.insert((far[..., None] * np.abs(influence.W)) ** 2, 0, 0.0, axis=-1)
+    each = np.repeat(variance, 2, axis=-1)
+    common = np.insert(np.asarray(columns, dtype=complex), 0, 0.0, axis=-1)
+    independent = each[..., None] * np.eye(each.shape[-1])
     return replace(influence, errors=Gaussian(independent, common, *influence.errors[1:4]))
 
 

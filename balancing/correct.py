@@ -26,7 +26,7 @@ from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
-from balancing.what_if import DRAWS, check_run_spread
+from balancing.what_if import DRAWS, check_run_spread, todays
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 EMPTY = 1e-7
@@ -93,12 +93,7 @@ def correct(  # noqa: PLR0913
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
-    if not today.has_baseline:
-        raise ValueError(
-            "these influence coefficients are stored ones without a vibration to correct: "
-            "give the readings of a baseline run"
-        )
+    today = todays(influence, baseline)
     grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
     chosen = plane_indices(today, planes if grouped is None else grouped.planes)
     used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)

@@ -51,7 +51,7 @@ from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
-from rotorid.regression import covariance_root, solution, stretch, unstretch
+from rotorid.regression import covariance_root, gain, solution, stretch, unstretch
 
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
@@ -234,7 +234,11 @@ def solve(  # noqa: PLR0913
                 f"a ridge has a strength above 0, such as 0.05 (got {strength!r}), and goes with least "
                 "squares without limits only"
             )
-        return job.fitted(_normal(K, y, w, strength), lambda W, _: np.nan * W[:, 0])
+        A = w[:, None] * K
+        size = norm(A, axis=0) + TINY
+        short = strength * norm(A / size, 2) * np.diag(size)
+        D = -solution(np.vstack((A, short)), np.append(w * y, np.zeros(P)))
+        return job.fitted(D, lambda W, _: np.nan * W[:, 0])
     if () in bounds.sectors:
         raise ValueError(f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out")
     try:
@@ -261,24 +265,13 @@ def _fit_plain(job: Job) -> Solution:
         return nearest(bounds, target, root, left, tolerance)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
-        return _within_limits(job.bounds, W, Y, _normal(W, Y, job.w), again, always=minmax)
+        drawn = -(gain(job.w[:, None] * W) @ (job.w * Y)[..., None])[..., 0]
+        return _within_limits(job.bounds, W, Y, drawn, again, always=minmax)
 
     if not minmax and within(job.bounds, best):
         return job.fitted(best, resolve)
     optimum = again(job.bounds, best, TOLERANCE)
     return job.fitted(optimum.weights, resolve, gap=optimum.gap)
-
-
-def _normal(W: ComplexArray, Y: ComplexArray, w: FloatArray, strength: float = 0.0) -> ComplexArray:
-    """Least squares or ridge of W (…, N, P) and Y (…, N) by normal equations of scaled columns."""
-    A = w[:, None] * W
-    size = np.maximum(np.linalg.norm(A, axis=-2, keepdims=True), TINY)
-    A = A / size
-    adjoint = np.conj(np.swapaxes(A, -1, -2))
-    square = adjoint @ A
-    if strength:
-        square = square + strength**2 * np.linalg.norm(square, 2) * np.eye(len(square))
-    return np.asarray(-np.linalg.solve(square, adjoint @ (w * Y)[..., None])[..., 0] / size[..., 0, :])
 
 
 def _within_limits(

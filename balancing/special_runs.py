@@ -222,8 +222,7 @@ class RelativeCorrection(Correction):
     def _what(self) -> str:
         if len(self.planes) > 1:
             return super()._what()
-        (angle,), times = self.places(self.planes, self.weights), three_figures(abs(self.weights[0]))
-        place = self._place(angle, self.labels.angle_sign)
+        (place,), times = self._places(self), three_figures(abs(self.weights[0]))
         if self.relative.angle and not self.remove:
             return f"Move the trial weight by {place} and take {times} times as much"
         start = " from its place" if self.relative.angle else ""
@@ -238,11 +237,11 @@ class RelativeCorrection(Correction):
         times = Column("times", np.abs(self.weights), three_figures)
         return (times,) if np.isnan(self._masses()).all() else (times, masses)
 
-    def _place(self, angle: float, sign: int) -> str:
+    def _places(self, of: Correction) -> list[str]:
         if not self.relative.angle:
-            return super()._place(angle, sign)
-        turn = sign * ((angle + 180) % 360 - 180)
-        return f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation"
+            return super()._places(of)
+        turns = of.labels.with_rotation(_turns(of)).tolist()
+        return [f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation" for turn in turns]
 
     @property
     def _counting(self) -> str:
@@ -253,7 +252,7 @@ class RelativeCorrection(Correction):
         nothing = np.full(len(self.planes), np.nan)
         turn = Column("turn_deg", nothing)
         if self.relative.angle:
-            turn = replace(turn, values=(self.places(self.planes, self.weights) + 180) % 360 - 180)
+            turn = replace(turn, values=_turns(self))
             angle, at = (replace(column, values=nothing) for column in (angle, at))
         masses = self._masses()
         return (
@@ -274,6 +273,11 @@ class RelativeCorrection(Correction):
         """As JSON types; what only a known trial weight would tell is None."""
         relative = ["mass", "angle"] if self.relative.angle else ["mass"]
         return super().to_dict() | {"relative_to_trial_weight": relative}
+
+
+def _turns(of: Correction) -> FloatArray:
+    """How far to move trial weights, degrees as the job counts them, -180 … 180, (P,)."""
+    return (of.places(of.planes, of.weights) + 180) % 360 - 180
 
 
 def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:

@@ -160,9 +160,7 @@ def what_if(
     ValueError
         For an unknown plane or speed, and a missing or unfit baseline.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
-    if not today.has_baseline:
-        raise ValueError("there is no vibration that the weights could change: give the baseline run")
+    today = todays(influence, baseline)
     D = np.zeros(len(today.planes), dtype=complex)
     if weights:
         D[plane_indices(today, list(weights))] = list(weights.values())
@@ -177,6 +175,14 @@ def what_if(
     return WhatIf(
         part, D, covariance, bound, width, "not judged" if np.isnan(bound) else word, worse, remove=removed
     )
+
+
+def todays(influence: Influence, baseline: Trials | ArrayLike | None) -> Influence:
+    """Coefficients with the vibration to correct, that of a baseline or their own."""
+    today = influence if baseline is None else influence.rebased(baseline)
+    if not today.has_baseline:
+        raise ValueError("there is no vibration to correct: give the readings of a baseline run")
+    return today
 
 
 def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:

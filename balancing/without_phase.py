@@ -311,6 +311,7 @@ def balance_without_phase(
     _check(trials)
     a, (errors, scatter) = np.abs(trials.mean).reshape(len(trials.runs), -1), _errors(trials)
     N, P = a.shape[1], len(trials.planes)
+    limits = limits or Limits.none(1, N, P)
     first = trials.weights[np.argmax(trials.weights != 0, axis=0), np.arange(P)]
     size, top = np.abs(trials.weights).max(axis=0) * first / np.abs(first), a.max(axis=0)
     T, a, errors = trials.weights / size, a / top, errors / top  # around 1, the first weight at 0°
@@ -323,7 +324,7 @@ def balance_without_phase(
     limit, rng = scatter.limit(2 * P, POSSIBLE), np.random.default_rng(0)
     minima = [fit.minima(rng, limit, scatter.estimated) for fit in fits]
     weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
-    largest = np.full(P, np.inf) if limits is None else limits.max_weight / np.abs(size)
+    largest = limits.max_weight / np.abs(size)
     solutions = list[AmplitudeSolution]()
     for choice in choices(minima, weights, limit):
         x = np.array([one.parameters for one in choice])
@@ -388,8 +389,8 @@ def _widest_gap(weights: ComplexArray) -> tuple[float, complex]:
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
     """One standard deviation of each amplitude (R, N), stated or assumed."""
     a, n, reading, run = np.abs(trials.mean), trials.repeats, trials.errors, trials.run_errors
-    size, floor = (0.0, 0.0) if reading is None else (reading.amplitude, reading.floor)
-    between, lowest = (0.0, 0.0) if run is None else run
+    size, floor = (reading.amplitude, reading.floor) if reading else (0.0, 0.0)
+    between, lowest = run or (0.0, 0.0)
     stated = any((size, floor, between, lowest))
     if not stated:
         between = ASSUMED
@@ -422,7 +423,7 @@ def _decide(
     trials: Trials,
     solutions: Sequence[AmplitudeSolution],
     scatter: Scatter,
-    limits: Limits | None,
+    limits: Limits,
     run: tuple[str, complex],
     *,
     weak: bool,
@@ -430,8 +431,8 @@ def _decide(
     """Mount what leaves less than 0.9 of the present vibration by every solution, where it may stand."""
     labels, before, weights = trials.labels, rms(solutions[0].before), solutions[0].weights
     expected, cause, instead = before * max(one.left for one in solutions), "", ""
-    arcs = () if limits is None else zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
-    forbidden = [repr(plane) for plane, D, each in arcs if not stands_in(D, allowed_sectors(each))]
+    each = zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
+    forbidden = [repr(plane) for plane, D, arcs in each if not stands_in(D, allowed_sectors(arcs))]
     word: Literal["mount", "do not mount", "measure again"] = "do not mount"
     if scatter.origin != "estimated" and chance(scatter.chi_square, scatter.dof) < CONTRADICTION:
         word, cause = "measure again", _contradiction(trials, scatter)
