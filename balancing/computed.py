@@ -40,8 +40,7 @@ from balancing.influence import (
 )
 from balancing.noise import Gaussian
 from balancing.regions import mean_variances
-from rotorid.base.text import Quantity as Quantity
-from rotorid.base.text import rpm_text
+from rotorid.base.text import Quantity, rpm_text
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
@@ -189,9 +188,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
     first, second = (np.isin(planes, side.planes) for side in (measured, computed))
-    one, other = (
-        mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed)
-    )
+    one, other = (mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed))
     v, u = (mean_variances(side.channels())[..., 1:] for side in (one, other))
     both, total = first & second, np.maximum(v + u, 1e-300)
     share = np.where(both, u / total, first)

@@ -150,7 +150,7 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
     """Whether a weight is zero or stands in one of the sectors (None: anywhere)."""
     if weight == 0 or sectors is None:
         return True
-    return any(abs(project(weight, sector) - weight) <= 1e-9 * abs(weight) for sector in sectors)
+    return any((np.angle(weight) - start + 1e-9) % TURN <= width + 2e-9 for start, width in sectors)
 
 
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
@@ -383,7 +383,7 @@ def _program(
 
 def explain(
     bounds: Bounds,
-    planes: Sequence[str] = (),
+    planes: Sequence[str],
     readings: Sequence[str] = (),
     amplitude: Words = PLAIN,
     weight: Words = PLAIN,
@@ -395,12 +395,11 @@ def explain(
     bounds
         Limits that no weights meet, some of them of amplitudes.
     planes, readings
-        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "1", … and "reading 1", ….
+        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "reading 1", ….
     amplitude, weight
         Write a number with its unit.
     """
     L, M = bounds.residual, bounds.max_weight
-    planes = planes or [str(p + 1) for p in range(len(M))]
     readings = readings or [f"reading {i + 1}" for i in range(len(L))]
     relaxed = smallest_maximum(bounds._replace(residual=L + np.inf), 1 / L)
     factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W @ relaxed.weights)

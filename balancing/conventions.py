@@ -14,13 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.arrays import polar as polar
-from rotorid.base.text import SPEEDS, vibration_unit_words, weight_unit_words
-from rotorid.base.text import Angles as Angles
-from rotorid.base.text import Phase as Phase
-from rotorid.base.text import Rotation as Rotation
-from rotorid.base.text import View as View
+from rotorid.base.arrays import ComplexArray, FloatArray, polar
+from rotorid.base.text import SPEEDS, Angles, Phase, Rotation, View, vibration_unit_words, weight_unit_words
 
 PHASES = ("lead", "lag")
 ANGLES = ("with rotation", "against rotation")

@@ -189,28 +189,26 @@ def fit_part(
     strength: float | None = None,
 ) -> tuple[Solution, str]:
     """Weights, and the method that they follow from; least squares where errors are assumed or hardly any."""
-    errors = part.known_errors
-    asked = method or ("weighted" if errors and strength is None else "least-squares")
+    asked = method or ("weighted" if part.known_errors and strength is None else "least-squares")
 
     labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
     by = partial(
         solve,
         part.W.reshape(part.baseline.size, -1),
         part.baseline.ravel(),
-        channels=part.channels() if errors else None,
-        columns=part.columns() if errors else None,
+        channels=part.channels(),
+        columns=part.columns(),
         row_weights=rows,
         limits=limits,
         strength=strength,
         names=part.planes,
         conflict=partial(
             explain,
-            planes=part.planes,
             readings=readings,
             amplitude=labels.amplitude_words,
             weight=labels.weight_words,
         ),
-        explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
+        explained=partial(_explained, part) if rows is None or rows.all() else None,
     )
     try:
         return by(asked), asked

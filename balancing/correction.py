@@ -240,7 +240,9 @@ class Correction(Prediction, Answered):
         if not self.remove:
             return frame((plane, mass, unit, angle, *numbers))
         work = replace(angle, values=self.places(self.planes, self.weights))
-        return frame((plane, action, mass, unit, work, *numbers, replace(angle, heading="equivalent_added_deg")))
+        return frame(
+            (plane, action, mass, unit, work, *numbers, replace(angle, heading="equivalent_added_deg"))
+        )
 
     def _rows_if(self, words: str) -> list[dict[str, Any]]:
         """Weights under other conventions; in words, what is otherwise."""

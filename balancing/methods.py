@@ -167,7 +167,7 @@ def solve(  # noqa: PLR0913
     channels: FloatArray | None = None,
     columns: ComplexArray | None = None,
     names: Sequence[str] | None = None,
-    conflict: Callable[[Bounds], str] = explain,
+    conflict: Callable[[Bounds, Sequence[str]], str] = explain,
     explained: Explained | None = None,
 ) -> Solution:
     """Weights D that make Y + W D small, within limits, and how to solve the same problem for redrawn data.
@@ -240,11 +240,13 @@ def solve(  # noqa: PLR0913
         D = -solution(np.vstack((A, short)), np.append(w * y, np.zeros(P)))
         return job.fitted(D, lambda W, _: np.nan * W[:, 0])
     if () in bounds.sectors:
-        raise ValueError(f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out")
+        raise ValueError(
+            f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out"
+        )
     try:
         return function(job)
     except InfeasibleError:
-        raise InfeasibleError(conflict(bounds)) from None
+        raise InfeasibleError(conflict(bounds, planes)) from None
 
 
 def _closed_form(job: Job) -> ComplexArray:
@@ -432,14 +434,14 @@ def _fit_weighted(job: Job) -> Solution:
     root = np.linalg.cholesky(np.linalg.inv(inverse)).T
     rows = at.rows.reshape(len(at.white), 2, -1)
     gradient = np.moveaxis(wide.w[:, None, None] * (np.swapaxes(at.white, 1, 2) @ rows), -1, 0)
-    gain = inverse @ gradient.reshape(len(inverse), -1)
+    response = inverse @ gradient.reshape(len(inverse), -1)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
-        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ gain.T
+        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ response.T
         others = np.roll(step - step.mean(axis=0), 1, axis=0)[..., None]
         others *= norm(D) / np.fmax(norm(others, axis=1, keepdims=True), norm(D))
-        drawn = D + unstretch(step - (gain @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
+        drawn = D + unstretch(step - (response @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 

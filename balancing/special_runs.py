@@ -35,7 +35,7 @@ from balancing.noise import Gaussian
 from balancing.tables import three_figures
 from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
 from rotorid.base.answer import COLUMNS
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records
 from rotorid.base.text import figures, weight_unit_words
@@ -94,14 +94,6 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             "weights, at indices such as 0° and 180°, and one with a trial weight for each plane do"
         ) from None
     fitted = fit_runs(runs)
-    if stored is None:
-        rotor_alone = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
-        check_effects(
-            replace(runs, planes=runs.planes[1:], weights=runs.weights[:, 1:]),
-            rotor_alone.W,
-            rotor_alone.channels(known=True),
-            fitted.remarks.contradictions,
-        )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
     P, labels = len(planes), (stored or fitted).labels
     shares = np.eye(len(runs.planes), 1 + P)[:, 1:].astype(complex)
@@ -116,6 +108,8 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         return replace(of, W=W, errors=errors, labels=labels)
 
     rotor, arbor = part(0.0, 1.0), part(1.0, -1.0)
+    if stored is None:
+        check_effects(trials, W, rotor.channels(known=True), fitted.remarks.contradictions)
     if not arbor.baseline.any():  # a correction of nothing at all is refused
         arbor = replace(arbor, baseline=arbor.baseline + 1e-12 * np.abs(rotor.baseline).max())
     return RotorAndArbor(rotor, arbor)
@@ -152,17 +146,11 @@ class ArborCorrection(Correction):
 
     Attributes
     ----------
-    rotor_and_arbor
-        What would correct the rotor, and its arbor, free of limits: opposite to their unbalances.
+    unbalances
+        Weights that do what the rotor does, and what its arbor does, with their draws.
     """
 
-    rotor_and_arbor: tuple[Correction, ...] = ()
-
-    @property
-    def unbalances(self) -> tuple[Correction, ...]:
-        """Weights that do what the rotor does, and what its arbor does, with their draws."""
-        both = self.rotor_and_arbor
-        return tuple(replace(c, remove=(), weights=-c.weights, draws=-c.draws) for c in both)
+    unbalances: tuple[Correction, ...] = ()
 
     def _what(self) -> str:
         return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
@@ -199,8 +187,9 @@ def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
         Whose JSON has rotor_unbalance and arbor_unbalance.
     """
     at = result.planes, result.speeds
-    corrections = tuple(correct(part, None, *at, refuse=False) for part in both)
-    return ArborCorrection.of(result, rotor_and_arbor=corrections)
+    opposite = (correct(part, None, *at, refuse=False) for part in both)
+    unbalances = tuple(replace(c, weights=-c.weights, draws=-c.draws) for c in opposite)
+    return ArborCorrection.of(result, unbalances=unbalances)
 
 
 @dataclass(frozen=True, eq=False)

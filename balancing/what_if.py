@@ -194,7 +194,7 @@ def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
 
 
 def check_run_spread(influence: Influence, weights: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN where errors are unknown."""
+    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN: errors are unknown."""
     off = check_readings(influence, weights)
     off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
     read, parts = influence.baseline + influence.W @ weights + off, real_parts(off[..., None])

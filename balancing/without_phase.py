@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -101,11 +100,6 @@ class AmplitudeSolution:
     draws: ComplexArray
     left: float
 
-    @cached_property
-    def region(self) -> Region:
-        """Where the weights are with 95 %, all planes jointly."""
-        return Region.of(self.draws, self.weights)
-
 
 @dataclass(frozen=True, eq=False)
 class WithoutPhase(Answered):
@@ -160,7 +154,7 @@ class WithoutPhase(Answered):
 
         For one plane also where one that leaves nothing misfits by no more than 95 % allow.
         """
-        if any(one.region.holds(weights) for one in self.solutions):
+        if any(Region.of(one.draws, one.weights).holds(weights) for one in self.solutions):
             return True
         if len(self.planes) > 1:
             return False
@@ -343,9 +337,9 @@ def balance_without_phase(
                 float(np.quantile(left, (1 + LEVEL) / 2)),
             )
         )
-    gaps = [_widest_gap(of) for of in trials.weights.T]
-    p = int(np.argmax([width for width, _ in gaps]))
-    run = trials.planes[p], gaps[p][1]
+    gaps = map(_widest_gap, trials.weights.T)
+    plane, (_, weight) = max(zip(trials.planes, gaps, strict=True), key=lambda one: one[1][0])
+    run = plane, weight
     weak = chance(float((((a - a.mean(axis=0)) / errors) ** 2).sum()), a.size - N) > 1 - LEVEL
     decision = _decide(trials, solutions, scatter, limits, run, weak=weak)
     return WithoutPhase(trials, tuple(solutions), scatter, errors * top, decision, run, tuple(remove))
