@@ -192,7 +192,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     v, u = (mean_variances(side.channels())[..., 1:] for side in (one, other))
     both, total = first & second, np.maximum(v + u, 1e-300)
     share = np.where(both, u / total, first)
-    parts = np.eye(len(planes) + 1) * np.insert(share, 0, 1.0, axis=-1)[..., None]
+    parts = np.eye(len(planes) + 1, dtype=complex) * np.insert(share, 0, 1.0, axis=-1)[..., None]
     chi = both * np.abs(one.W - other.W) ** 2 / total
     warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))

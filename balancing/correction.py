@@ -352,8 +352,8 @@ class Correction(Prediction, Answered):
         lines = [f"{capital(self._counting)}; phases as {labels.phase}{taken}; weights for the bare rotor."]
         if self.mounted.weights.any():
             run, planes, _ = self.mounted
-            sizes, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
-            each = zip(planes, sizes, places, strict=True)
+            masses, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
+            each = zip(planes, masses, places, strict=True)
             stays = {name: f"{figures(size)} at {place}" for name, size, place in each if size}
             cells = [stays.pop(name, "nothing") for name in self.planes]
             word = "remove" if all(removed) else "add"
