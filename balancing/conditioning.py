@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.regions import mean_variances
+from balancing.regions import LEVEL, mean_variances
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import listing
@@ -27,8 +27,8 @@ HOPELESS = 1e3
 """No instrument supports planes that act alike up to so large a condition number."""
 CLEAR = 5.0
 """Effect of a good trial weight in units of its errors."""
-LEVEL, SINGLE_LEVEL = 0.95, 0.99
-"""Of the tests whether there is an effect: in all readings together, and in one of them."""
+SINGLE_LEVEL = 0.99
+"""Of the test whether there is an effect in one of the readings."""
 REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 

@@ -235,15 +235,16 @@ class Labels:
 
     def conventions(self) -> dict[str, Any]:
         """The conventions in the words of the job file; rotation and view only where they are stated."""
-        stated = {"rotation": self.rotation, "view": self.view}
-        return {
+        words = {
             "phase": self.phase,
             "angles": self.angle_words,
             "vibration_unit": self.vibration_unit,
             "weight_unit": self.weight_unit,
             "assumed": list(self.assumed),
-            **{name: words for name, words in stated.items() if words is not None},
+            "rotation": self.rotation,
+            "view": self.view,
         }
+        return {name: each for name, each in words.items() if each is not None}
 
 
 def opposite(rotation: Rotation) -> Rotation:

@@ -191,7 +191,9 @@ class Correction(Prediction, Answered):
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
         scale = self.labels.vibration_scale
         old = np.abs(self.before) * scale
-        residuals = self._residual_columns()
+        covariance = self.after_covariance if self.errors_known else None
+        last = covariance_column(self.labels, "after_covariance", covariance, old.size)
+        residuals = (*self.vibration_columns(ROUNDING), last)
         new = np.array(residuals[4].values)
         run, planes, weights = self.mounted
         there = bool(weights.any())
@@ -262,11 +264,6 @@ class Correction(Prediction, Answered):
             action,
             at,
         )
-
-    def _residual_columns(self) -> tuple[Column, ...]:
-        covariance = self.after_covariance if self.errors_known else None
-        last = covariance_column(self.labels, "after_covariance", covariance, self.before.size)
-        return (*self.vibration_columns(ROUNDING), last)
 
     def sentence(self) -> str:
         """Whether to mount what, what is determined, and what a check run will read."""

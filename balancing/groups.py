@@ -112,9 +112,10 @@ class Unknowns(NamedTuple):
         planes = tuple(dict.fromkeys((*self.planes, *trials.planes)))
         weights = np.zeros((len(trials.runs), len(planes)), dtype=complex)
         weights[:, [planes.index(plane) for plane in trials.planes]] = trials.weights
-        q = weights[:, : len(self.planes)] @ self.inverse.T
-        made = np.pad(q @ self.shares.T, ((0, 0), (0, len(planes) - len(self.planes))))
-        beside = float(norm(weights - made) / (norm(weights) or 1.0))
+        inside = weights[:, : len(self.planes)]
+        q = inside @ self.inverse.T
+        inside -= q @ self.shares.T
+        beside = float(norm(weights) / (norm(trials.weights) or 1.0))
         if beside > max(allowed, ROUNDING):
             raise ValueError(
                 f"{percent(beside)} % of what is mounted is beside {listing(map(repr, self.names), 'and')}, "

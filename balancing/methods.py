@@ -46,7 +46,7 @@ from balancing.cones import (
     smallest_maximum,
     within,
 )
-from balancing.regions import real_parts
+from balancing.regions import LEVEL, real_parts
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
@@ -56,8 +56,6 @@ from rotorid.regression import covariance_root, gain, solution, stretch, unstret
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
 
-UNEXPLAINED = 0.95
-"""Level of the χ² test beyond which the residuals are larger than the errors explain."""
 FLOOR = 1e-4
 """Every residual of the weighted fit gets a further error of this share of the rms error of all."""
 LEAST_INFORMATION = 0.2
@@ -416,7 +414,7 @@ def _fit_weighted(job: Job) -> Solution:
         return wider(share).chi_square(D, common)
 
     chi, share = least(0.0), 0.0
-    explained = job.explained or (lambda _: chance(chi, dof) >= 1 - UNEXPLAINED)
+    explained = job.explained or (lambda _: chance(chi, dof) >= 1 - LEVEL)
     if chi > dof > 0 and not explained(D):
         D = start
         before, share = 0.0, chi / dof - 1

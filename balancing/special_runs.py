@@ -41,7 +41,6 @@ from rotorid.base.tables import Column, records
 from rotorid.base.text import figures, weight_unit_words
 
 _SAME = 1e-6
-_NOTHING = Mounted("", (), np.zeros(0, dtype=complex))
 
 
 class RotorAndArbor(NamedTuple):
@@ -130,11 +129,8 @@ def machine_influence(trials: Trials) -> Influence:
     """
     S, C = trials.mean.shape[1:]
     one = np.broadcast_to(np.eye(C, dtype=complex), (S, C, C))
-    labels = replace(
-        trials.labels,
-        weight_unit=trials.labels.vibration_unit,
-        weight_scale=trials.labels.vibration_scale,
-    )
+    labels = trials.labels
+    labels = replace(labels, weight_unit=labels.vibration_unit, weight_scale=labels.vibration_scale)
     nothing = np.full((S, C), np.nan + 0j)
     errors = Gaussian.none(S, C, C)
     return Influence(trials.speeds, trials.sensors, trials.sensors, one, nothing, errors, labels)
@@ -284,4 +280,5 @@ def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
     RelativeCorrection
         Whose JSON has times_trial and turn_deg of every plane.
     """
-    return RelativeCorrection.of(result, relative=relative, mounted=_NOTHING)
+    nothing = Mounted("", (), np.zeros(0, dtype=complex))
+    return RelativeCorrection.of(result, relative=relative, mounted=nothing)
