@@ -133,10 +133,10 @@ def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
         As of `unknowns`.
     """
     try:
-        of = unknowns(groups, names) if set(names) & set(groups) else None
-    except ValueError:  # more than the planes need
+        of = unknowns(groups, names)
+    except ValueError:  # none, or more than the planes need
         return None
-    return of if of is not None and of.constrained else None
+    return of if of.constrained else None
 
 
 def members(groups: Groups, names: Sequence[str]) -> tuple[str, ...]:
@@ -189,7 +189,7 @@ def unknowns(groups: Groups, names: Sequence[str], planes: Sequence[str] | None 
         raise ValueError(f"there is no plane {lost!r}, {what}; the planes are {', '.join(map(repr, there))}")
     order = tuple(plane for plane in there if plane in inside)
     shares = _shares(groups, names, order)
-    if len(set(names)) < len(names) or np.linalg.matrix_rank(shares) < len(names):
+    if np.linalg.matrix_rank(shares) < len(names):
         several = listing(map(repr, names), "and")
         raise ValueError(f"{several} are too many for planes {', '.join(map(repr, order))}: leave one out")
     return Unknowns(tuple(names), order, shares)
