@@ -67,8 +67,8 @@ MUTATIONS = (
         "stacking of speeds",
         "turbo combined",
         "balancing/correct.py",
-        "            part.baseline.ravel(),\n            name,",
-        "            part.baseline[::-1].ravel(),\n            name,",
+        "        part.baseline.ravel(),\n        channels=",
+        "        part.baseline[::-1].ravel(),\n        channels=",
     ),
     Mutation(
         "one entry of the gyroscopic matrix",
