@@ -36,7 +36,7 @@ AT_LIMIT = 2e-3
 """A limit is reached where less than this share of it is left: solvers stay a little inside."""
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
-FIRST, MORE = 3, 3
+MORE = 3
 """Discs a plane that a program starts from, and that are added to it."""
 STEPS = 4
 """Of reweighting before min–max."""
@@ -95,7 +95,7 @@ def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
             f"there are {N} and {P}"
         )
-    sectors = tuple(allowed_sectors(arcs) for arcs in limits.forbidden)
+    sectors = tuple(map(allowed_sectors, limits.forbidden))
     return Bounds(W, Y, limits.residual.reshape(N), limits.max_weight, sectors)
 
 
@@ -299,7 +299,7 @@ def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, toleran
             return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
         rows, sides, T = scale * rows, scale * sides, scale * T
     active = excess > 0
-    active[np.argsort(-np.abs(centres[rises]))[: FIRST * P]] = True
+    active[np.argsort(-np.abs(centres[rises]))[: MORE * P]] = True
     for tighter in TIGHTER:
         inner = head * (1 - tighter * tolerance)
         while True:

@@ -190,7 +190,9 @@ class Labels:
         """How angles count, in the word of the job: "with rotation", or "clockwise" seen from `view`."""
         if not self.clock or self.rotation is None:
             return self.angles
-        return self.rotation if self.angle_sign > 0 else opposite(self.rotation)
+        if self.angle_sign > 0:
+            return self.rotation
+        return "counter-clockwise" if self.rotation == "clockwise" else "clockwise"
 
     @property
     def side(self) -> str:
@@ -245,11 +247,6 @@ class Labels:
             "view": self.view,
         }
         return {name: each for name, each in words.items() if each is not None}
-
-
-def opposite(rotation: Rotation) -> Rotation:
-    """The direction of the same rotation seen from the other end."""
-    return "counter-clockwise" if rotation == "clockwise" else "clockwise"
 
 
 def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:

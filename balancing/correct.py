@@ -26,7 +26,7 @@ from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
-from balancing.what_if import DRAWS, check_run_spread, todays
+from balancing.what_if import check_run_spread, todays
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 EMPTY = 1e-7
@@ -139,9 +139,11 @@ def correct(  # noqa: PLR0913
     D = fitted.weights
     if kept is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
-    after_covariance, sizes = check_run_spread(part, D)
-    drawn = (fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws(DRAWS))
-    draws = np.concatenate([np.zeros((0, len(D)), dtype=complex), *drawn])
+    drawn = [np.zeros((0, len(D)), dtype=complex)]
+    after_covariance, sizes = check_run_spread(
+        part, D, lambda y, w: drawn.append(fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))))
+    )
+    draws = np.concatenate(drawn)
     result = Correction(
         influence=part,
         weights=D,

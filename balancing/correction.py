@@ -272,8 +272,7 @@ class Correction(Prediction, Answered):
             first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
             first += self.decision.lines()
             if self.decision.word == "determined in part":
-                first.insert(len(self.contradictions) + 1, f"With these weights: {self._left()}.")
-                first += self.decision.elsewhere
+                first += [f"With these weights: {self._left()}.", *self.decision.elsewhere]
             return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."

@@ -51,7 +51,7 @@ from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
-from rotorid.regression import covariance_root, gain, solution, stretch, unstretch
+from rotorid.regression import covariance_root, solution, stretch, unstretch
 
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
@@ -265,8 +265,10 @@ def _fit_plain(job: Job) -> Solution:
         return nearest(bounds, target, root, left, tolerance)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
-        drawn = -(gain(job.w[:, None] * W) @ (job.w * Y)[..., None])[..., 0]
-        return _within_limits(job.bounds, W, Y, drawn, again, always=minmax)
+        A = job.w[:, None] * W
+        adjoint = np.conj(np.swapaxes(A, -1, -2))
+        drawn = -np.linalg.solve(adjoint @ A, adjoint @ (job.w * Y)[..., None])[..., 0]
+        return _within_limits(job.bounds, W, Y, np.asarray(drawn, dtype=complex), again, always=minmax)
 
     if not minmax and within(job.bounds, best):
         return job.fitted(best, resolve)

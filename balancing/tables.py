@@ -135,7 +135,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
             f"{np.degrees(e.phase):.3g}°": e.phase,
             labels.amplitude_words(e.floor): e.floor,
         }
-    between = {f"{100 * whole:.2g} %": whole if whole > 5e-4 else 0.0}
+    between = {f"{100 * whole:.2g} %": whole * (whole > 5e-4)}
     if run.origin == "stated":  # as it was, whatever share of it is common
         relative, floor = whole * np.sqrt(1 - run.evenly), whole * np.sqrt(run.evenly) * run.level
         between = {f"{100 * relative:.2g} %": relative, labels.amplitude_words(floor): floor}
