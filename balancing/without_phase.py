@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -101,11 +100,6 @@ class AmplitudeSolution:
     draws: ComplexArray
     left: float
 
-    @cached_property
-    def region(self) -> Region:
-        """Where the weights are with 95 %, all planes jointly."""
-        return Region.of(self.draws, self.weights)
-
 
 @dataclass(frozen=True, eq=False)
 class WithoutPhase(Answered):
@@ -160,7 +154,7 @@ class WithoutPhase(Answered):
 
         For one plane also where one that leaves nothing misfits by no more than 95 % allow.
         """
-        if any(one.region.holds(weights) for one in self.solutions):
+        if any(Region.of(one.draws, one.weights).holds(weights) for one in self.solutions):
             return True
         if len(self.planes) > 1:
             return False
@@ -311,6 +305,7 @@ def balance_without_phase(
     _check(trials)
     a, (errors, scatter) = np.abs(trials.mean).reshape(len(trials.runs), -1), _errors(trials)
     N, P = a.shape[1], len(trials.planes)
+    limits = limits or Limits.none(1, N, P)
     first = trials.weights[np.argmax(trials.weights != 0, axis=0), np.arange(P)]
     size, top = np.abs(trials.weights).max(axis=0) * first / np.abs(first), a.max(axis=0)
     T, a, errors = trials.weights / size, a / top, errors / top  # around 1, the first weight at 0°
@@ -323,7 +318,7 @@ def balance_without_phase(
     limit, rng = scatter.limit(2 * P, POSSIBLE), np.random.default_rng(0)
     minima = [fit.minima(rng, limit, scatter.estimated) for fit in fits]
     weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
-    largest = np.full(P, np.inf) if limits is None else limits.max_weight / np.abs(size)
+    largest = limits.max_weight / np.abs(size)
     solutions = list[AmplitudeSolution]()
     for choice in choices(minima, weights, limit):
         x = np.array([one.parameters for one in choice])
@@ -342,9 +337,9 @@ def balance_without_phase(
                 float(np.quantile(left, (1 + LEVEL) / 2)),
             )
         )
-    gaps = [_widest_gap(of) for of in trials.weights.T]
-    p = int(np.argmax([width for width, _ in gaps]))
-    run = trials.planes[p], gaps[p][1]
+    gaps = map(_widest_gap, trials.weights.T)
+    plane, (_, weight) = max(zip(trials.planes, gaps, strict=True), key=lambda one: one[1][0])
+    run = plane, weight
     weak = chance(float((((a - a.mean(axis=0)) / errors) ** 2).sum()), a.size - N) > 1 - LEVEL
     decision = _decide(trials, solutions, scatter, limits, run, weak=weak)
     return WithoutPhase(trials, tuple(solutions), scatter, errors * top, decision, run, tuple(remove))
@@ -388,8 +383,8 @@ def _widest_gap(weights: ComplexArray) -> tuple[float, complex]:
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
     """One standard deviation of each amplitude (R, N), stated or assumed."""
     a, n, reading, run = np.abs(trials.mean), trials.repeats, trials.errors, trials.run_errors
-    size, floor = (0.0, 0.0) if reading is None else (reading.amplitude, reading.floor)
-    between, lowest = (0.0, 0.0) if run is None else run
+    size, floor = (reading.amplitude, reading.floor) if reading else (0.0, 0.0)
+    between, lowest = run or (0.0, 0.0)
     stated = any((size, floor, between, lowest))
     if not stated:
         between = ASSUMED
@@ -422,7 +417,7 @@ def _decide(
     trials: Trials,
     solutions: Sequence[AmplitudeSolution],
     scatter: Scatter,
-    limits: Limits | None,
+    limits: Limits,
     run: tuple[str, complex],
     *,
     weak: bool,
@@ -430,8 +425,8 @@ def _decide(
     """Mount what leaves less than 0.9 of the present vibration by every solution, where it may stand."""
     labels, before, weights = trials.labels, rms(solutions[0].before), solutions[0].weights
     expected, cause, instead = before * max(one.left for one in solutions), "", ""
-    arcs = () if limits is None else zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
-    forbidden = [repr(plane) for plane, D, each in arcs if not stands_in(D, allowed_sectors(each))]
+    each = zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
+    forbidden = [repr(plane) for plane, D, arcs in each if not stands_in(D, allowed_sectors(arcs))]
     word: Literal["mount", "do not mount", "measure again"] = "do not mount"
     if scatter.origin != "estimated" and chance(scatter.chi_square, scatter.dof) < CONTRADICTION:
         word, cause = "measure again", _contradiction(trials, scatter)

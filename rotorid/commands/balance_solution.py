@@ -311,7 +311,7 @@ def with_other_conventions(
             same.append(words)
         elif not _alike(result, correction):
             others.append(([words], correction))
-    readings = tuple(one.otherwise(listing(words)) for words, one in others)
+    readings = tuple((listing(words), one) for words, one in others)
     return replace(result, convention_test=test, others=readings)
 
 
