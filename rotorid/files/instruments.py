@@ -75,9 +75,10 @@ def read_samples(path: Path) -> Sampled:
     """
     with _reading(path):
         first_bytes(path, 1)
-        if path.suffix.lower() not in READERS:
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
             raise refusal(path, f"waveforms in a file {listing(READERS)}")
-        sampled = READERS[path.suffix.lower()](path)
+        sampled = reader(path)
     lengths = {name: len(channel) for name, channel in sampled.channels.items()}
     if len({*lengths.values()}) != 1 or min(lengths.values()) < 2:
         shown = listing((f"{name} {length}" for name, length in lengths.items()), "and") or "none"

@@ -39,7 +39,7 @@ from rotorid.base.choices import did_you_mean, suggest
 from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
-from rotorid.files.disk import read_bytes
+from rotorid.files.disk import file_content
 from rotorid.files.problems import InputError, Problem, Problems, refusal
 from rotorid.files.units import Quantity, Unit
 
@@ -209,8 +209,9 @@ class Settings(BaseModel):
 
     def problem(self, field: str, expected: str) -> Problem:
         """A problem with a field: file, row, key as written, its value, what is expected."""
-        value = self._table.data.get(self.written(field))
-        return self._table.problem(self.written(field), expected, None if isinstance(value, dict) else value)
+        key = self.written(field)
+        value = self._table.data.get(key)
+        return self._table.problem(key, expected, None if isinstance(value, dict) else value)
 
     def complain(self, problems: Problems, field: str, expected: str) -> None:
         """Note a problem with a field."""
@@ -440,7 +441,7 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The content of a TOML file without its `schema_version`; InputError where it is none."""
-    data, problems = read_bytes(path), Problems()
+    data, problems = file_content(path), Problems()
     try:
         if len(data) > MOST_BYTES:
             raise ValueError(f"at most {MOST_BYTES // 10**6} MB")
