@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         read_modes,
         read_unbalance,
     )
-    from rotorid.files.problems import InputError, Problem, TableWarning
+    from rotorid.files.problems import InputError, TableWarning
     from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
     from rotorid.files.runs import read_trials
     from rotorid.files.small_model import read_small_model
@@ -32,7 +32,7 @@ _NAMES = {
     "measurements": "read_measurements read_record",
     "model": "HarmonicFile read_harmonic_model read_ode_model",
     "node_tables": "read_bow read_compliance read_modes read_unbalance",
-    "problems": "InputError Problem TableWarning",
+    "problems": "InputError TableWarning",
     "rotor": "read_rotor rotor_files write_rotor",
     "runs": "read_trials",
     "small_model": "read_small_model",
@@ -41,7 +41,6 @@ __all__ = [
     "HarmonicFile",
     "InputError",
     "Job",
-    "Problem",
     "TableWarning",
     "job_from_files",
     "read_bow",

@@ -154,8 +154,8 @@ def _read_text(path: Path) -> Sampled:
     if bad := [name for name in names if not name or names.count(name) > 1]:
         expected = "a column a channel, a row a sample, and above them a name for each column, each once"
         raise refusal(path, expected, above or 1, None, bad[0])
-    body = text.split("\n", above)[-1]
-    stream = io.StringIO(body if separator == "," else body.replace(",", "."))
+    body = text.split("\n", above)[-1].encode()
+    stream = io.BytesIO(body if separator == "," else body.replace(b",", b"."))
     try:
         frame = pd.read_csv(stream, sep=separator, header=None, skip_blank_lines=False, skipinitialspace=True)
     except ValueError as error:  # a ParserError too

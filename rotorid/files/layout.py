@@ -48,8 +48,6 @@ _BLANK = {"", "n.a.", "n/a", "na", "-", "--", "?", "none"}
 """Cells of a column of phases that nobody knows."""
 MOUNTED = "note of weights: "
 """Begins the name of a column of weights, which belong into a weights table."""
-_OF_READING = ("run", "speed", "repeat")
-_NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
@@ -269,7 +267,9 @@ def long_rows(
         speed = conventions.speed
         common.append(_Column(Heading(0, grid.header[0]), "speed", speed.unit.name, [speed.value] * n))
     if key == "sensor" and "sensor" not in stems and len(sensors.get("", ())) == 2:
-        readings = [*zip(*(map(show, c.cells) for c in common if c.stem in _OF_READING), strict=True)]
+        readings = [
+            *zip(*(map(show, c.cells) for c in common if c.stem in ("run", "speed", "repeat")), strict=True)
+        ]
         if len({*readings}) == len(readings):  # no run has two readings of one speed
             sensors = {"1": sensors[""]}
     groups = []
@@ -382,7 +382,7 @@ def _by_name(
     """Both columns of each sensor or plane; the name is empty where a column has the names."""
     sensors: dict[str, dict[str, _Column]] = defaultdict(dict)
     listed = any(column.stem == key for column in columns)
-    for column in (column for column in columns if column.stem not in _NO_DATA):
+    for column in (column for column in columns if column.stem not in ("", "note", "mounted")):
         heading, stem = column.heading, column.stem
         sensor = heading.sensor if stem in pair and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:

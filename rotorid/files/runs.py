@@ -195,7 +195,7 @@ def read_runs(
         place = run_at[run[i]], index[i], sensor_at[sensor[i]]
         places.append((readings[place], *place))
         readings[place] += 1
-    if len(problems) == start:  # with unclear speeds all the rest would be noise
+    if len(problems) == start and len(readings) < len(rows):  # with unclear speeds the rest would be noise
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)

@@ -47,7 +47,6 @@ MOST_BYTES = 2_000_000
 _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
 """A key of so many parts; the time that tomllib takes grows with their square."""
 MOST_NAMES = 1_000
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Place = tuple[str, int, str]
 """Sheet, row and column of a setting of a workbook."""
 _Model = TypeVar("_Model", bound="Settings")
@@ -436,7 +435,7 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
         "const": SCHEMA_VERSION,
         "description": "of the keys of this file; unstated: this one",
     }
-    return {"$schema": DRAFT, **schema, "title": title}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": title}
 
 
 def read_toml(path: Path) -> dict[str, Any]:
