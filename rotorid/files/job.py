@@ -291,9 +291,8 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         from rotorid.files.check_and_slow_roll import check_runs
 
         sources = tables["check"], mounted
-        stated_errors = settings.errors
         check = check_runs(
-            sources, trials, [*planes], groups, conventions, stated_errors, slow_roll, problems
+            sources, trials, [*planes], groups, conventions, settings.errors, slow_roll, problems
         )
         if check is not None and mounted is not None:
             holes = with_taken(holes, mounted, check, conventions)
@@ -366,15 +365,14 @@ def _readings(
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
-    phase, angles = settings.phase or stated_phase(runs), settings.angles
-    stated = dict[str, Any]()
+    phase, stated = settings.phase or stated_phase(runs), dict[str, Any]()
     settings = settings.model_copy(update={"phase": phase})
     if source is not None:
         from rotorid.files.influence import fit_to_readings, load_influence
 
-        resolved = None if angles is None else resolve_angles(angles, settings.rotation)
+        angles = resolve_angles(settings.angles, settings.rotation)
         try:
-            influence, stated = load_influence(source, phase, resolved)
+            influence, stated = load_influence(source, phase, angles)
         except InputError as error:
             problems.extend(error.problems)
     conventions = conventions_of(settings, stated)
@@ -419,25 +417,24 @@ def _on_conventions(conventions: Conventions, labels: Labels, name: str) -> list
     return [note] if adopted else []
 
 
-def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = None) -> Conventions:
+def conventions_of(settings: JobSettings, stored: Mapping[str, Any]) -> Conventions:
     """What the numbers of the tables mean: as the job says, or the stored coefficients."""
-    usual: Mapping[str, Any] = stored or {}
     rotation, planes = settings.rotation, settings.planes.items()
     labels = Labels(
-        phase=settings.phase or usual.get("phase", "lead"),
-        angles=resolve_angles(settings.angles or usual.get("angles", "with rotation"), rotation),
+        phase=settings.phase or stored.get("phase", "lead"),
+        angles=resolve_angles(settings.angles or stored.get("angles", "with rotation"), rotation),
         rotation=rotation,
         view=settings.view if rotation else None,
         clock=settings.angles in ROTATIONS,
     )
-    speed, limits = settings.speed, [one.limit or one.zones for one in settings.sensors.values()]
+    limits = [one.limit or one.zones for one in settings.sensors.values()]
     limits += [] if settings.zones is None else [settings.zones.boundaries]
     return Conventions(
         labels,
         settings.speed_tolerance_percent,
         tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
         settings.exchanged,
-        None if speed is None else (speed.unit.name, speed.value),
+        settings.speed,
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
         any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),

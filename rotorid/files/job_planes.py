@@ -226,7 +226,7 @@ def _at_speeds(
             speed = unit.to_si(parse_number(word, comma="," in word))
             k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
         if k is None or k in near:
-            there = show_speeds(trials.speeds, unit)
+            there = show_speeds(trials.speeds, trials.labels)
             expected = f"speeds of the runs table, each once, not {word}: there are {there}"
             part.complain(problems, field, expected)
         near[k] = numbers[word]

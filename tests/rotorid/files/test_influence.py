@@ -18,7 +18,8 @@ from balancing import (
     correct,
     estimate_influence,
 )
-from rotorid.files import influence_frame, job_from_files, read_influence, read_trials, write_influence
+from rotorid.files import job_from_files, read_influence, read_trials, write_influence
+from rotorid.files.influence import influence_table
 from rotorid.regression import stretch
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
@@ -54,7 +55,7 @@ def test_meaning(stored):
     assert (influence.has_baseline, influence.known_errors) == (False, False)
     np.testing.assert_array_equal(stored(phase="lag").W, influence.W.conj())
     np.testing.assert_array_equal(stored(angles="against rotation").W, influence.W)
-    assert list(influence_frame(influence).columns) == [*HEADER[:4], "phase_lead_deg"]
+    assert influence_table(influence).headings == [*HEADER[:4], "phase_lead_deg"]
 
 
 @each_of("suffix, phase, angles", [(".csv", "lag", "against rotation"), (".xlsx", "lag", "with rotation")])
