@@ -31,6 +31,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fem.elements import DENSE as DENSE
 from fem.elements import dense as dense
 from fem.elements import multiply as multiply
 from fem.elements import shaft_bands, strains
@@ -39,6 +40,7 @@ from fem.result import holding_arrays
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
+EPSILON = float(np.finfo(float).eps)
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
 _TURN = np.kron(FROM_XY, TO_XY.T).T
@@ -134,7 +136,7 @@ def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = No
     if energy is None:
         energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
     scatter = (np.abs(X) * multiply(np.abs(band), np.abs(X))).sum(axis=0)
-    return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
+    return np.asarray(EPSILON * scatter / np.maximum(energy, 1e-300))
 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
@@ -150,21 +152,11 @@ def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     )
 
 
-def static_stiffness(support: Support, speed: float) -> FloatArray:
-    """Symmetric part of a support's stiffness without its pedestal, N/m, shape (2, 2).
-
-    The antisymmetric part (kxy − kyx)/2 does work over an orbit, as damping does: it belongs to no
-    conservative rotor.
-    """
-    k = support.at(speed)[0]
-    return (k + k.T) / 2
-
-
 def _internal(rotor: Rotor) -> list[InternalDamping]:
     return [force for force in rotor.forces if isinstance(force, InternalDamping)]
 
 
-def _turned(D: AnyArray) -> ComplexArray:
+def on_waves(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
     # As one product: many products of 2 × 2 matrices take ten times as long.
     return np.asarray(D.reshape(-1, 4) @ _TURN).reshape(D.shape)
@@ -192,7 +184,7 @@ class Supported:
     @property
     def springs(self) -> dict[int, float]:
         """Real spring nearest to D at each node, N/m; 0 for what is mostly negative."""
-        middle = np.median(self.stiffness[..., 0, 0].real, axis=0)
+        middle = np.sort(self.stiffness[..., 0, 0].real, axis=0)[len(self.stiffness) // 2]
         return dict(zip(self.nodes, np.maximum(middle, 0.0).tolist(), strict=True))
 
 
@@ -211,7 +203,7 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
     for support in rotor.supports:
-        stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
+        stiffness[:, nodes.index(support.node)] += on_waves(support.dynamic_stiffness(speeds))
     for damper in dampers:
         stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
     return Supported(nodes, stiffness, 1 if rotor.symmetric else 2)
@@ -224,10 +216,10 @@ def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArr
     """
     (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
     if S is None or beneath is None:
-        return _turned(B - other)
+        return on_waves(B - other)
     more_B, more_S, B, S = B - other, S - beneath, (B + other) / 2, (S + beneath) / 2
     G = np.linalg.inv(B + S)
-    return _turned(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
+    return on_waves(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
 
 
 @holding_arrays
@@ -401,7 +393,7 @@ class WholeBand:
             powers = [value * value, -value * turning, value - turning, 1.0]
             band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
         for row, support in zip(P.rows, P.rotor.supports, strict=True):
-            D = _turned(support.dynamic_stiffness(value / 1j, speed))
+            D = on_waves(support.dynamic_stiffness(value / 1j, speed))
             for a, b in np.ndindex(p, p):
                 band[2 * reach + a - b, p * row + b] += D[a, b]
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)

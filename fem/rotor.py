@@ -205,7 +205,7 @@ class Support:
         xx, xy, yx, yy = self.table.reshape(-1, 4).T
         stand = self.pedestal
         alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
-        return alike and np.array_equal((xx, xy), (yy, -yx))
+        return alike and bool((xx == yy).all() and (xy == -yx).all())
 
     @property
     def plain(self) -> bool:
@@ -544,7 +544,8 @@ class Rotor:
     @cached_property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        positions = np.append(0.0, np.cumsum(self.length))
+        positions = np.zeros(self.n_nodes)
+        self.length.cumsum(out=positions[1:])
         read_only(positions)
         return positions
 
@@ -555,10 +556,12 @@ class Rotor:
         read_only(area)
         return area
 
-    @property
+    @cached_property
     def second_moment(self) -> FloatArray:
         """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
-        return self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16
+        second_moment = self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16
+        read_only(second_moment)
+        return second_moment
 
     @property
     def shear_modulus(self) -> FloatArray:

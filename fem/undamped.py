@@ -25,15 +25,16 @@ from typing import Any
 import numpy as np
 
 from fem.assembly import (
-    FROM_XY,
+    DENSE,
     TO_XY,
     Matrices,
     assemble,
     dense,
+    free_motions,
     ignored_inertia,
     multiply,
+    on_waves,
     rounding_error,
-    static_stiffness,
 )
 from fem.elements import strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
@@ -44,7 +45,6 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, error_figures, listing, percent
 
-DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
 NO_MASS = (
     "the rotor can move as a rigid body without moving any mass: give the shaft a density, or add supports"
@@ -525,7 +525,7 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, floa
     Stiffness and mass of the plane.
     """
     held = [(s.node, s.stiffness) for s in rotor.supports if s.plain] if springs is None else springs.items()
-    return _pencil(rotor, A, (whirl,), [(node, k * np.eye(2), None) for node, k in held])
+    return _pencil(rotor, A, (whirl,), [(node, np.full((1, 1), k), None) for node, k in held])
 
 
 def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
@@ -544,64 +544,76 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     -------
     Stiffness and mass.
     """
-    held = [(s.node, static_stiffness(s, speed), s.pedestal) for s in rotor.supports]
-    return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
+    supports, whirls = rotor.supports, (1,) if rotor.symmetric else (1, -1)
+    k = np.reshape([support.at(speed)[0] for support in supports], (-1, 2, 2))
+    # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
+    forms: AnyArray = on_waves((k + k.swapaxes(1, 2)) / 2)[:, : len(whirls), : len(whirls)]
+    forms = forms if forms.imag.any() else forms.real
+    held = [(s.node, form, s.pedestal) for s, form in zip(supports, forms, strict=True)]
+    return _pencil(rotor, A, whirls, held)
 
 
 def _pencil(
-    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, FloatArray, Pedestal | None]]
+    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, AnyArray, Pedestal | None]]
 ) -> Pencil:
-    """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
-    planes, size, springs = len(whirls), A.size, list[tuple[IndexArray, AnyArray]]()
+    """Pencil on springs: node, stiffness of the waves, shape (waves, waves), and what they stand on."""
+    planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
     held = [each for each in held if each[1].any()]
-    feet = [(A.deflection(node) + 0.5, stand.mass) for node, _, stand in held if stand]
+    kind = np.result_type(float, *(form for _, form, _ in held))
+    bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
+    for wave, whirl in enumerate(whirls):
+        bands[:, ::planes, wave::planes] = A.shaft, A.mass - whirl * A.gyroscopic
     # Waves alternate, and a foot stands behind the deflection of its node.
-    order = np.append(np.arange(size), [at for at, _ in feet]).argsort(kind="stable")
-    places = planes * order.argsort() + np.arange(planes)[:, None]
-
-    def spring(k: FloatArray, *ends: int) -> None:
-        form = (FROM_XY @ k @ TO_XY)[:planes, :planes]
-        form = form if form.imag.any() else form.real
-        if len(ends) > 1:
-            form = np.kron(((1, -1), (-1, 1)), form)
-        springs.append((places[:, ends].T.ravel(), form))
-
-    stands = itertools.count(size)
-    for node, k, pedestal in held:
-        ends = [A.deflection(node)]
+    feet = [A.deflection(node) + 0.5 for node, _, stand in held if stand]
+    places = np.arange(planes * A.size).reshape(-1, planes).T
+    if feet:
+        ranks = np.append(np.arange(A.size), feet).argsort(kind="stable").argsort()
+        places = planes * ranks + np.arange(planes)[:, None]
+        bands = _spread(bands, places[:, : A.size].T.ravel(), places.size)
+        bands[1, -1, places[:, A.size :]] = [stand.mass for *_, stand in held if stand]
+    K, M = bands
+    shaft, stands, hold = places[:, : A.size], itertools.count(A.size), 0.0
+    for node, form, pedestal in held:
+        hold += float(form.trace().real) / planes
+        unknowns = shaft[:, A.deflection(node)]
         if pedestal:
-            ends.append(next(stands))
-            spring(np.diag(pedestal.xy("stiffness")), ends[1])
-        spring(k, *ends)
-    attached = springs[:]
-    for support in rotor.supports:  # in the shaft's matrices already
-        if support.tilting_stiffness:
-            spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
-    shaft, w = places[:, :size], A.deflections
-    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
-    bands = np.zeros((2, places.size * (width + 1)), np.result_type(float, *(k for _, k in attached)))
-    entries = np.empty((2, planes, A.width + 1, size))
-    entries[0], entries[1] = A.shaft, A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
-    for off in range(A.width + 1):
-        i, j = shaft[:, : size - off], shaft[:, off:]
-        bands[:, width * (1 + j) + i] = entries[:, :, A.width - off, off:]
-    K, M = bands.reshape(2, -1, width + 1).transpose(0, 2, 1)
-    M[-1, places[:, size:]] = [mass for _, mass in feet]
-    for unknowns, form in attached:
+            foot = places[:, next(stands)]
+            springs.append((foot, on_waves(np.diag(pedestal.xy("stiffness")))[:planes, :planes].real))
+            unknowns, form = np.append(unknowns, foot), np.kron(((1, -1), (-1, 1)), form)
+        springs.append((unknowns, form))
+    for unknowns, form in springs:
         for (a, b), stiffness in np.ndenumerate(form):
             if (i := unknowns[a]) <= (j := unknowns[b]):
-                K[width + i - j, j] += stiffness
-    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
-    for wave, row in enumerate(shaft):
-        R[row[w], wave], R[row[w], planes + wave] = 1.0, s
-        R[row[w + 1], planes + wave] = 1 / rotor.positions[-1]
-    holding = [(R[u].T @ k @ R[u], np.abs(k).max()) for u, k in springs]
-    values, V = np.linalg.eigh(
-        sum((one / largest for one, largest in holding), np.zeros((2 * planes, 2 * planes)))
-    )
-    rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
-    hold = float(sum(one.trace().real for one, _ in holding)) / planes
+                K[i - j - 1, j] += stiffness
+    span = rotor.positions[-1]
+    for support in rotor.supports:  # in the shaft's matrices already
+        if support.tilting_stiffness:
+            tilt = shaft[:, A.deflection(support.node) + 1]
+            springs.append((tilt, support.tilting_stiffness * np.eye(planes)))
+            hold += support.tilting_stiffness / span**2
+    rigid = np.empty((places.size, 0))
+    if planes > 1 or free_motions(rotor, {node for node, *_ in held}):
+        motions, holding = np.zeros((places.size, 2 * planes)), np.zeros((2 * planes, 2 * planes))
+        for wave, row in enumerate(shaft):
+            motions[row[w], wave], motions[row[w], planes + wave] = 1.0, rotor.positions / span
+            motions[row[w + 1], planes + wave] = 1 / span
+        for unknowns, form in springs:
+            work = motions[unknowns].T @ form @ motions[unknowns]
+            holding = holding + work / np.abs(form).max()
+        values, V = np.linalg.eigh(holding)
+        rigid = motions @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
     return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
+
+
+def _spread(bands: AnyArray, places: IndexArray, size: int) -> AnyArray:
+    """Upper bands, shape (2, width + 1, n), with other unknowns between: unknown i becomes places[i]."""
+    reach = bands.shape[1] - 1
+    width = int((places[reach:] - places[:-reach]).max())
+    wide = np.zeros((2, size, width + 1), bands.dtype).transpose(0, 2, 1)
+    for off in range(reach + 1):
+        i, j = places[: places.size - off], places[off:]
+        wide[:, width + i - j, j] = bands[:, reach - off, off:]
+    return wide
 
 
 @holding_arrays
@@ -710,19 +722,22 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
     fixed, free = pencil.rigid, pencil.rigid.shape[1]
+    loads = fixed
     if free:
         G = fixed.conj().T @ multiply(pencil.mass, fixed)
         if np.linalg.cond(G) > 1e13:
             raise ValueError(NO_MASS)
         # First the translation, then the turn.
         fixed = np.linalg.solve(np.linalg.cholesky(G), fixed.conj().T).conj().T
+        loads = multiply(pencil.mass, fixed)
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
     elastic = max(m - free, 0)
     K = pencil.stiffness + shift * pencil.mass
-    moving = _vectors(pencil, K, U, elastic, multiply(pencil.mass, fixed))
+    moving = _vectors(pencil, K, U, elastic, loads)
     mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
-    X = np.hstack((fixed, moving @ Y / np.sqrt(np.abs(mu))))[:, :m]
-    mu = np.append(np.full(free, np.inf), mu)[:m]
+    X = moving @ (Y / np.sqrt(np.abs(mu)))
+    if free:
+        X, mu = np.hstack((fixed, X))[:, :m], np.append(np.full(free, np.inf), mu)[:m]
     squares = 1 / mu
     if shift:  # the softest beside stiff ones
         squares = np.sign(mu) * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
