@@ -105,8 +105,10 @@ def assemble(rotor: Rotor) -> Matrices:
     for disc in rotor.discs:
         w = A.deflection(disc.node)
         M[-1, w] += disc.mass
-        M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
-        G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
+        if model.rotary_inertia:
+            M[-1, w + 1] += disc.diametral_inertia
+        if model.gyroscopic:
+            G[-1, w + 1] += disc.polar_inertia
     for support in rotor.supports:
         K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
     for force in rotor.forces:

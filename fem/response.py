@@ -628,8 +628,7 @@ class Series:
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
         needed = 1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS)))
-        self.powers = np.arange(needed)[:, None]
-        for _ in self.powers:
+        for _ in range(needed):
             R = dpbtrs(modes.factor, R)[0]
             R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
             factors.append(R[unknowns][..., None])
@@ -644,6 +643,9 @@ class Series:
         gap = self.squares - squared
         near: BoolArray = (np.abs(gap) <= self.margin).any(axis=0)
         gap[:, near] = 1.0
-        terms = np.vstack((1 / gap, (squared + self.modes.shift) ** self.powers))
+        terms = np.ones((self.factors.shape[2], squared.size), gap.dtype)
+        terms[: len(gap)] = 1 / gap
+        for k in range(len(gap) + 1, len(terms)):
+            np.multiply(terms[k - 1], squared + self.modes.shift, out=terms[k])
         rows, columns, n = self.factors.shape
         return (self.factors.reshape(-1, n) @ terms).reshape(rows, columns, -1), near

@@ -202,10 +202,12 @@ class Support:
     @cached_property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
+        if self.plain:
+            return True
         xx, xy, yx, yy = self.table.reshape(-1, 4).T
         stand = self.pedestal
         alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
-        return alike and bool((xx == yy).all() and (xy == -yx).all())
+        return alike and np.array_equal((xx, xy), (yy, -yx))
 
     @property
     def plain(self) -> bool:

@@ -593,15 +593,14 @@ def _pencil(
             hold += support.tilting_stiffness / span**2
     rigid = np.empty((places.size, 0))
     if planes > 1 or free_motions(rotor, {node for node, *_ in held}):
-        motions, holding = np.zeros((places.size, 2 * planes)), np.zeros((2 * planes, 2 * planes))
+        motions = np.zeros((places.size, 2 * planes))
         for wave, row in enumerate(shaft):
             motions[row[w], wave], motions[row[w], planes + wave] = 1.0, rotor.positions / span
             motions[row[w + 1], planes + wave] = 1 / span
-        for unknowns, form in springs:
-            work = motions[unknowns].T @ form @ motions[unknowns]
-            holding = holding + work / np.abs(form).max()
-        values, V = np.linalg.eigh(holding)
-        rigid = motions @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
+        # Not their work: what pushes back and what pushes outwards at one node could sum up to none.
+        forces = [form @ motions[unknowns] / np.abs(form).max() for unknowns, form in springs]
+        _, values, V = np.linalg.svd(np.vstack((np.zeros(2 * planes), *forces)))
+        rigid = motions @ V[np.count_nonzero(values > 1e-13 * values[0]) :].conj().T
     return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
 
 
@@ -821,5 +820,6 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, image @ Q)[0])
+    most = min(m, most)
     ends = None if pencil.matrices.gyroscopic.any() else (size - most + 1, size)  # only M - G may be negative
     return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]
