@@ -203,12 +203,17 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     dampers = _internal(rotor)
     attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
     nodes = tuple(dict.fromkeys(attached))
-    stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
+    stiffness = np.zeros((len(nodes), 2, 2, speeds.size), complex)
     for support in rotor.supports:
-        stiffness[:, nodes.index(support.node)] += on_waves(support.dynamic_stiffness(speeds))
+        at = stiffness[nodes.index(support.node)]
+        if support.constant and not support.pedestal:  # linear in the speed
+            k, c = on_waves(support.table)[:, 0, ..., None]
+            at += k + c * (1j * speeds)
+        else:
+            at += np.moveaxis(on_waves(support.dynamic_stiffness(speeds)), 0, -1)
     for damper in dampers:
-        stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
-    return Supported(nodes, stiffness, 1 if rotor.symmetric else 2)
+        stiffness[nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
+    return Supported(nodes, stiffness.transpose(3, 0, 1, 2), 1 if rotor.symmetric else 2)
 
 
 def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:

@@ -542,7 +542,7 @@ class Receptance:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, a, b, S)."""
         stiffness = supported(self.rotor, speeds).stiffness
         # as many as stay in the cache of the processor
-        step = max(64, 32_768 // (self.unknowns.size * self.loads.shape[1]))
+        step = max(64, 8_192 // (self.unknowns.size * self.loads.shape[1]))
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
@@ -563,7 +563,9 @@ class Receptance:
             H.append(whole / stiffer if p else whole)
             lost |= near
         # What loads, and unit forces at the supports, make the supports do: in the end, what loads do.
-        system = np.concatenate([change[:, p, :, None] * each[a:] for p, each in enumerate(H)], axis=2)
+        system = np.concatenate(
+            [change[:, p, :, None] * each[a:].astype(complex) for p, each in enumerate(H)], axis=2
+        )
         system = system.reshape(planes * s, b + planes * s, omega.size)
         for k, row in enumerate(system):
             row[b + k] += 1.0
@@ -574,7 +576,7 @@ class Receptance:
         F = np.zeros((planes, a, b, omega.size), complex)
         F[0] = H[0][:a, :b]
         for k, force in enumerate(system[:, :b]):
-            F[k // s] -= H[k // s][:a, k % s - s, None] * force
+            F[k // s] -= H[k // s][:a, k % s - s, None].astype(complex) * force
         return F, lost
 
     @cached_property
