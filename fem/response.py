@@ -472,12 +472,12 @@ def influence(
     ways = np.array([turn.conj(), turn])
     nodes = [rotor.node(sensor.node) for sensor in places]
     receptance = Receptance(rotor, nodes, at, np.eye(len(at)), speeds)
-    W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
+    W = np.empty((len(sensors), len(planes), speeds.size), dtype=complex)
     for part, H in receptance.parts(speeds):
-        read = H * (ways[: len(H)] * speeds[part] ** 2)
-        W[part] = np.moveaxis(read.sum(axis=0), -1, 0)
+        H *= ways[: len(H)] * speeds[part] ** 2
+        H.sum(axis=0, out=W[..., part])
     windows, texts = judge(rotor, speeds)
-    return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings, *texts), windows)
+    return InfluenceCoefficients(speeds, sensors, planes, W.transpose(2, 0, 1), (*receptance.warnings, *texts), windows)
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
@@ -542,7 +542,7 @@ class Receptance:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, a, b, S)."""
         stiffness = supported(self.rotor, speeds).stiffness
         # as many as stay in the cache of the processor
-        step = max(64, 8_192 // (self.unknowns.size * self.loads.shape[1]))
+        step = max(64, 12_288 // (self.unknowns.size * self.loads.shape[1]))
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
