@@ -100,13 +100,12 @@ def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
     if band.shape[1] <= DENSE:
         return np.asarray(dense(band) @ X)
-    from scipy.linalg import blas
-
-    kind = np.result_type(band, X)
-    product = blas.dsbmv if kind.kind == "f" else blas.zhbmv
-    band = np.asarray(band, kind, order="F")
-    columns = [product(len(band) - 1, 1.0, band, column) for column in X.T.astype(kind)]
-    return np.reshape(columns, X.T.shape).T
+    product = band[-1, :, None] * X
+    for off in range(1, len(band)):
+        entries = band[-1 - off, off:, None]
+        product[:-off] += entries * X[off:]
+        product[off:] += entries.conj() * X[:-off]
+    return product
 
 
 def dense(band: AnyArray) -> AnyArray:

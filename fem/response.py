@@ -645,9 +645,7 @@ class Series:
         gap = self.squares - squared
         near: BoolArray = (np.abs(gap) <= self.margin).any(axis=0)
         gap[:, near] = 1.0
-        terms = np.ones((self.factors.shape[2], squared.size), gap.dtype)
-        terms[: len(gap)] = 1 / gap
-        for k in range(len(gap) + 1, len(terms)):
-            np.multiply(terms[k - 1], squared + self.modes.shift, out=terms[k])
         rows, columns, n = self.factors.shape
+        powers = np.vander(squared + self.modes.shift, n - len(gap), increasing=True).T
+        terms = np.concatenate((1 / gap, powers))
         return (self.factors.reshape(-1, n) @ terms).reshape(rows, columns, -1), near

@@ -787,23 +787,20 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
 
     real = np.isrealobj(U)
     tbtrs, adjoint = (lapack.dtbtrs, "T") if real else (lapack.ztbtrs, "C")
-    geqrf, orgqr = (lapack.dgeqrf, lapack.dorgqr) if real else (lapack.zgeqrf, lapack.zungqr)
     size, block = pencil.size, 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
     def operator(V: AnyArray) -> AnyArray:
         W = tbtrs(U, V)[0]
-        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
+        loads = multiply(pencil.mass, W)
+        if rigid.size:
+            loads -= rigid @ (rigid.conj().T @ W)
         return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
-
-    def orthonormal(Z: AnyArray) -> tuple[AnyArray, AnyArray]:
-        packed, tau, *_ = geqrf(Z)
-        return orgqr(packed, tau)[0], np.triu(packed[:block])
 
     if size > DENSE:
         # Smooth loads, which differ from one to the other wave.
         s = np.linspace(1, 2, size) * (1 + np.arange(size) % len(pencil.shaft))
-        V = orthonormal(operator(operator(np.cos(np.outer(s, np.arange(block))).astype(U.dtype))))[0]
+        V = np.linalg.qr(operator(operator(np.cos(np.outer(s, np.arange(block))))))[0]
         basis = image = np.empty((size, 0), U.dtype)
         residual = np.inf
         while basis.shape[1] < size // 2:
@@ -811,7 +808,7 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             basis, image = np.hstack((basis, V)), np.hstack((image, Z))
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
-            V, beta = orthonormal(Z)
+            V, beta = np.linalg.qr(Z)
             if basis.shape[1] < 2.5 * m + 6:
                 continue
             mu, Q = _largest(basis.conj().T @ image, most)
