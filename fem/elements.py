@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from fem.rotor import Rotor
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
 DENSE = 64  # unknowns up to which a full matrix costs less than its band, and all modes less than the lowest
 _LENGTHS = np.array([0, 1, 1, 1, 0, 1])  # powers of L in the scaling
@@ -35,25 +35,24 @@ _HERMITE = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]
 """Coefficients of 1, ξ, ξ², ξ³ on 0 … 1 of the polynomials of w₁, slope₁, w₂, slope₂."""
 
 
-def _forms() -> list[FloatArray]:
-    """∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as 6 × 6 matrices."""
+def _forms(unknowns: list[int]) -> tuple[IndexArray, list[FloatArray]]:
+    """Unknowns, and ∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as matrices of these."""
     derivative, powers = np.diag([1, 2, 3], 1), np.arange(4)
     w, gamma = _HERMITE[[0, 1, 1, 3, 2, 3]].T, np.zeros((4, 6))
     gamma[:2, 2:4] = [[1, 0], [-1, 1]]
     tilt = derivative @ w - gamma
     integrals = 1 / (powers[:, None] + powers + 1)
-    return [np.round(420 * f.T @ integrals @ f) / 420 for f in (derivative @ tilt, gamma, w, tilt)]
+    shapes = [shape[:, unknowns] for shape in (derivative @ tilt, gamma, w, tilt)]
+    return np.array(unknowns), [np.round(420 * f.T @ integrals @ f) / 420 for f in shapes]
 
 
-_ALL = np.arange(6), _forms()
-_BENDING_ONLY = _ALL[0][[0, 1, 4, 5]], [form[[0, 1, 4, 5]][:, [0, 1, 4, 5]] for form in _ALL[1]]
-"""Unknowns of an element, and these forms of them: with shear and without."""
+_BENDING, _SHEAR = _forms([0, 1, 4, 5]), _forms([0, 1, 2, 3, 4, 5])
 
 
 def shaft_bands(rotor: Rotor) -> FloatArray:
     """Upper bands of stiffness, mass, gyroscopic form and material damping, shape (4, width + 1, size)."""
     model, L, outer = rotor.model, rotor.length, np.multiply.outer
-    unknowns, (bending, shear, inertia, tilt) = _ALL if model.shear else _BENDING_ONLY
+    unknowns, (bending, shear, inertia, tilt) = _SHEAR if model.shear else _BENDING
     scale = L ** _LENGTHS[unknowns, None]
     stiffness = outer(bending, rotor.youngs_modulus * rotor.second_moment / L**3)
     if model.shear:

@@ -621,7 +621,7 @@ class Series:
         m, available = 12, finite_modes(whole)
         while True:
             m = min(m, available)
-            self.modes = modes = lowest_modes(whole.rotor, whole.matrices, m, whole)
+            self.modes = modes = lowest_modes(whole, m)
             ratio = (top * top + modes.shift) / abs(modes.squares[-1] + modes.shift)
             if m == available or ratio < 1 / 16:
                 break

@@ -448,7 +448,7 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
     """Modes of positive mass, ascending: n at least, and one above the square `top`, as far as there are."""
     finite, m = finite_modes(pencil), n
     while True:
-        spectrum = lowest_modes(pencil.rotor, pencil.matrices, min(m, finite), pencil)
+        spectrum = lowest_modes(pencil, min(m, finite))
         negative = np.count_nonzero(spectrum.squares < 0)
         if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
             if not negative:
@@ -547,8 +547,7 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     supports, whirls = rotor.supports, (1,) if rotor.symmetric else (1, -1)
     k = np.reshape([support.at(speed)[0] for support in supports], (-1, 2, 2))
     # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
-    forms: AnyArray = on_waves((k + k.swapaxes(1, 2)) / 2)[:, : len(whirls), : len(whirls)]
-    forms = forms if forms.imag.any() else forms.real
+    forms = on_waves((k + k.swapaxes(1, 2)) / 2)
     held = [(s.node, form, s.pedestal) for s, form in zip(supports, forms, strict=True)]
     return _pencil(rotor, A, whirls, held)
 
@@ -556,10 +555,10 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
 def _pencil(
     rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, AnyArray, Pedestal | None]]
 ) -> Pencil:
-    """Pencil on springs: node, stiffness of the waves, shape (waves, waves), and what they stand on."""
+    """Pencil on springs: node, stiffness of the waves, shape (2, 2), and what they stand on."""
     planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
-    held = [each for each in held if each[1].any()]
-    kind = np.result_type(float, *(form for _, form, _ in held))
+    held = [(node, form[:planes, :planes], foot) for node, form, foot in held if form.any()]
+    kind = complex if any(form.imag.any() for _, form, _ in held) else float
     bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
     for wave, whirl in enumerate(whirls):
         bands[:, ::planes, wave::planes] = A.shaft, A.mass - whirl * A.gyroscopic
@@ -569,11 +568,17 @@ def _pencil(
     if feet:
         ranks = np.append(np.arange(A.size), feet).argsort(kind="stable").argsort()
         places = planes * ranks + np.arange(planes)[:, None]
-        bands = _spread(bands, places[:, : A.size].T.ravel(), places.size)
+        moved, reach = places[:, : A.size].T.ravel(), planes * A.width
+        width = int((moved[reach:] - moved[:-reach]).max())
+        narrow, bands = bands, np.zeros((2, places.size, width + 1), kind).transpose(0, 2, 1)
+        for off in range(reach + 1):
+            i, j = moved[: moved.size - off], moved[off:]
+            bands[:, width + i - j, j] = narrow[:, reach - off, off:]
         bands[1, -1, places[:, A.size :]] = [stand.mass for *_, stand in held if stand]
     K, M = bands
     shaft, stands, hold = places[:, : A.size], itertools.count(A.size), 0.0
     for node, form, pedestal in held:
+        form = form if kind is complex else form.real
         hold += float(form.trace().real) / planes
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
@@ -602,17 +607,6 @@ def _pencil(
         _, values, V = np.linalg.svd(np.vstack((np.zeros(2 * planes), *forces)))
         rigid = motions @ V[np.count_nonzero(values > 1e-13 * values[0]) :].conj().T
     return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
-
-
-def _spread(bands: AnyArray, places: IndexArray, size: int) -> AnyArray:
-    """Upper bands, shape (2, width + 1, n), with other unknowns between: unknown i becomes places[i]."""
-    reach = bands.shape[1] - 1
-    width = int((places[reach:] - places[:-reach]).max())
-    wide = np.zeros((2, size, width + 1), bands.dtype).transpose(0, 2, 1)
-    for off in range(reach + 1):
-        i, j = places[: places.size - off], places[off:]
-        wide[:, width + i - j, j] = bands[:, reach - off, off:]
-    return wide
 
 
 @holding_arrays
@@ -697,17 +691,15 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     raise ValueError(NO_MASS if free and (pencil.mass[-1] >= 0).all() else _UNSTABLE)
 
 
-def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None) -> Spectrum:
-    """Lowest m modes of a pencil, by default of one plane at rest; m must not exceed the finite modes.
+def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
+    """Lowest m modes of a pencil; m must not exceed the finite modes.
 
     Parameters
     ----------
-    rotor, A
-        The rotor and its matrices.
+    pencil
+        Stiffness and mass.
     m
         How many modes.
-    pencil
-        Stiffness and mass; None: of one plane at rest.
 
     Returns
     -------
@@ -718,7 +710,6 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     ValueError
         If the mesh is so fine that float64 carries fewer than about two digits of a shape.
     """
-    pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
     fixed, free = pencil.rigid, pencil.rigid.shape[1]
     loads = fixed
@@ -743,7 +734,7 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     rounding = rounding_error(K, X, np.abs(squares + shift))
     if rounding.max(initial=0.0) > 1e-2:
         raise ValueError(
-            f"the mesh of {rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
+            f"the mesh of {pencil.rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
             "50 to 200 are ample for a rotor"
         )
     return Spectrum(squares, X, shift, U, rounding, pencil)
@@ -817,6 +808,8 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, image @ Q)[0])
-    most = min(m, most)
-    ends = None if pencil.matrices.gyroscopic.any() else (size - most + 1, size)  # only M - G may be negative
+    ends = None  # M - G may be negative
+    if not pencil.matrices.gyroscopic.any():
+        most = min(m, most)
+        ends = size - most + 1, size
     return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]

@@ -36,7 +36,7 @@ from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, proje
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor, Support
-from fem.undamped import Spectrum, finite_modes, lowest_modes
+from fem.undamped import Spectrum, finite_modes, lowest_modes, one_plane
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -262,7 +262,7 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
         Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
         for s, spring in zip(P.rotor.supports, springs, strict=True)
     ]
-    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
+    spectrum = lowest_modes(one_plane(replace(P.rotor, supports=supports), P.A), m)
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 

@@ -156,7 +156,7 @@ class RunReadings:
         still = pencil.rigid.shape[1]
         if self.bow > (most := finite_modes(pencil) - still):
             raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
-        shapes = lowest_modes(first, A, self.bow + still, pencil).vectors[:, still:]
+        shapes = lowest_modes(pencil, self.bow + still).vectors[:, still:]
         bent: FloatArray = shapes / np.abs(shapes[A.deflections]).max(axis=0)
         return multiply(assemble(now).shaft, bent)
 
