@@ -31,7 +31,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fem.elements import DENSE as DENSE
 from fem.elements import dense as dense
 from fem.elements import multiply as multiply
 from fem.elements import shaft_bands, strains
@@ -40,7 +39,6 @@ from fem.result import holding_arrays
 from fem.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
-EPSILON = float(np.finfo(float).eps)
 TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
 FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
 _TURN = np.kron(FROM_XY, TO_XY.T).T
@@ -129,16 +127,14 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
     return max(2 - len(held) - tilting, 0)
 
 
-def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
+def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray) -> FloatArray:
     """Relative error of xᴴ K x that rounding the entries of K may cause, for each column of X, shape (m,).
 
     It grows with the fourth power of the number of elements: about 1e-13 at 20, 1e-5 at 2000. Solutions
-    of K x = f are wrong by as much. The `energy` xᴴ K x is computed unless it is known.
+    of K x = f are wrong by as much. The `energy` is xᴴ K x.
     """
-    if energy is None:
-        energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
     scatter = (np.abs(X) * multiply(np.abs(band), np.abs(X))).sum(axis=0)
-    return np.asarray(EPSILON * scatter / np.maximum(energy, 1e-300))
+    return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
@@ -201,8 +197,7 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
         If a speed lies outside a bearing table.
     """
     dampers = _internal(rotor)
-    attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
-    nodes = tuple(dict.fromkeys(attached))
+    nodes = tuple(dict.fromkeys(each.node for each in (*rotor.supports, *dampers)))
     stiffness = np.zeros((len(nodes), 2, 2, speeds.size), complex)
     for support in rotor.supports:
         at = stiffness[nodes.index(support.node)]

@@ -527,7 +527,7 @@ class Receptance:
         places, units, top = np.append(self.unknowns, held), unit_loads(A, held), float(speeds.max())
 
         def series(whirl: int, columns: FloatArray) -> Series:
-            return Series(one_plane(rotor, A, whirl, springs), places, columns, top)
+            return Series(one_plane(rotor, A, whirl, springs.items()), places, columns, top)
 
         forward = np.hstack((self.loads, units))
         try:

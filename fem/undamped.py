@@ -18,14 +18,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fem.assembly import (
-    DENSE,
     TO_XY,
     Matrices,
     assemble,
@@ -36,7 +35,7 @@ from fem.assembly import (
     on_waves,
     rounding_error,
 )
-from fem.elements import strains
+from fem.elements import DENSE, strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import NORMAL_95, Result, holding_arrays
 from fem.rotor import Pedestal, Rotor, refined
@@ -492,11 +491,6 @@ class Pencil:
         return self.shaft[:, :: self.matrices.stride]
 
     @property
-    def tilts(self) -> IndexArray:
-        """Unknowns of the shaft that are slopes, shape (w, N)."""
-        return self.shaft[:, 1 :: self.matrices.stride]
-
-    @property
     def size(self) -> int:
         """Number of unknowns."""
         return int(self.mass.shape[1])
@@ -508,8 +502,8 @@ class Pencil:
         return np.asarray(sum(parts))
 
 
-def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
-    """Pencil of one plane on springs {node: N/m}, by default of plain supports; `whirl` 1 is forward.
+def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: Iterable[tuple[int, float]] = ()) -> Pencil:
+    """Pencil of one plane on springs, in the place of the stiffness of the supports; `whirl` 1 is forward.
 
     Parameters
     ----------
@@ -518,14 +512,13 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, floa
     whirl
         1 forward, −1 backward, 0 without gyroscopic moments.
     springs
-        N/m by node; None: those of plain supports.
+        Node and N/m of each.
 
     Returns
     -------
     Stiffness and mass of the plane.
     """
-    held = [(s.node, s.stiffness) for s in rotor.supports if s.plain] if springs is None else springs.items()
-    return _pencil(rotor, A, (whirl,), [(node, np.full((1, 1), k), None) for node, k in held])
+    return _pencil(rotor, A, (whirl,), [(node, np.full((1, 1), k), None) for node, k in springs])
 
 
 def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
@@ -544,12 +537,11 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     -------
     Stiffness and mass.
     """
-    supports, whirls = rotor.supports, (1,) if rotor.symmetric else (1, -1)
-    k = np.reshape([support.at(speed)[0] for support in supports], (-1, 2, 2))
+    k = np.reshape([support.at(speed)[0] for support in rotor.supports], (-1, 2, 2))
     # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
     forms = on_waves((k + k.swapaxes(1, 2)) / 2)
-    held = [(s.node, form, s.pedestal) for s, form in zip(supports, forms, strict=True)]
-    return _pencil(rotor, A, whirls, held)
+    held = [(s.node, form, s.pedestal) for s, form in zip(rotor.supports, forms, strict=True)]
+    return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
 
 
 def _pencil(
@@ -576,13 +568,13 @@ def _pencil(
             bands[:, width + i - j, j] = narrow[:, reach - off, off:]
         bands[1, -1, places[:, A.size :]] = [stand.mass for *_, stand in held if stand]
     K, M = bands
-    shaft, stands, hold = places[:, : A.size], itertools.count(A.size), 0.0
+    shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
     for node, form, pedestal in held:
         form = form if kind is complex else form.real
         hold += float(form.trace().real) / planes
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
-            foot = places[:, next(stands)]
+            foot = next(stands)
             springs.append((foot, on_waves(np.diag(pedestal.xy("stiffness")))[:planes, :planes].real))
             unknowns, form = np.append(unknowns, foot), np.kron(((1, -1), (-1, 1)), form)
         springs.append((unknowns, form))
@@ -646,7 +638,7 @@ class Spectrum:
     @property
     def motion(self) -> ComplexArray:
         """Amplitudes of x and y and of their slopes, shape (4, N, m)."""
-        X = self.vectors[np.array((self.pencil.waves, self.pencil.tilts))]
+        X = self.vectors[np.array([self.pencil.shaft[:, k :: self.pencil.matrices.stride] for k in (0, 1)])]
         return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
 
 
@@ -776,8 +768,7 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
     """
     from scipy.linalg import lapack
 
-    real = np.isrealobj(U)
-    tbtrs, adjoint = (lapack.dtbtrs, "T") if real else (lapack.ztbtrs, "C")
+    tbtrs = lapack.dtbtrs if np.isrealobj(U) else lapack.ztbtrs
     size, block = pencil.size, 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
@@ -786,7 +777,7 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
         loads = multiply(pencil.mass, W)
         if rigid.size:
             loads -= rigid @ (rigid.conj().T @ W)
-        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
+        return np.asarray(tbtrs(U, loads, trans="C")[0])
 
     if size > DENSE:
         # Smooth loads, which differ from one to the other wave.

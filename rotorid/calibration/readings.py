@@ -152,7 +152,7 @@ class RunReadings:
             for each in (start, rotor)
         )
         A, at = assemble(first), supported(first, self.trials.speeds)
-        pencil = one_plane(first, A, 0, at.springs)
+        pencil = one_plane(first, A, 0, at.springs.items())
         still = pencil.rigid.shape[1]
         if self.bow > (most := finite_modes(pencil) - still):
             raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
