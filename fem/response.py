@@ -477,7 +477,9 @@ def influence(
         H *= ways[: len(H)] * speeds[part] ** 2
         H.sum(axis=0, out=W[..., part])
     windows, texts = judge(rotor, speeds)
-    return InfluenceCoefficients(speeds, sensors, planes, W.transpose(2, 0, 1), (*receptance.warnings, *texts), windows)
+    return InfluenceCoefficients(
+        speeds, sensors, planes, W.transpose(2, 0, 1), (*receptance.warnings, *texts), windows
+    )
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:

@@ -801,6 +801,6 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
                 return np.asarray(tbtrs(U, image @ Q)[0])
     ends = None  # M - G may be negative
     if not pencil.matrices.gyroscopic.any():
-        most = min(m, most)
+        most = min(max(m, 1), most)
         ends = size - most + 1, size
     return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]
