@@ -197,7 +197,8 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
         If a speed lies outside a bearing table.
     """
     dampers = _internal(rotor)
-    nodes = tuple(dict.fromkeys(each.node for each in (*rotor.supports, *dampers)))
+    attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
+    nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((len(nodes), 2, 2, speeds.size), complex)
     for support in rotor.supports:
         at = stiffness[nodes.index(support.node)]

@@ -565,9 +565,7 @@ class Receptance:
             H.append(whole / stiffer if p else whole)
             lost |= near
         # What loads, and unit forces at the supports, make the supports do: in the end, what loads do.
-        system = np.concatenate(
-            [change[:, p, :, None] * each[a:].astype(complex) for p, each in enumerate(H)], axis=2
-        )
+        system = np.concatenate([change[:, p, :, None] * each[a:] for p, each in enumerate(H)], axis=2)
         system = system.reshape(planes * s, b + planes * s, omega.size)
         for k, row in enumerate(system):
             row[b + k] += 1.0

@@ -539,7 +539,8 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     """
     k = np.reshape([support.at(speed)[0] for support in rotor.supports], (-1, 2, 2))
     # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
-    forms = on_waves((k + k.swapaxes(1, 2)) / 2)
+    forms: AnyArray = on_waves((k + k.swapaxes(1, 2)) / 2)
+    forms = forms if forms.imag.any() else forms.real
     held = [(s.node, form, s.pedestal) for s, form in zip(rotor.supports, forms, strict=True)]
     return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
 
@@ -550,7 +551,7 @@ def _pencil(
     """Pencil on springs: node, stiffness of the waves, shape (2, 2), and what they stand on."""
     planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
     held = [(node, form[:planes, :planes], foot) for node, form, foot in held if form.any()]
-    kind = complex if any(form.imag.any() for _, form, _ in held) else float
+    kind = np.result_type(float, *(form for _, form, _ in held))
     bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
     for wave, whirl in enumerate(whirls):
         bands[:, ::planes, wave::planes] = A.shaft, A.mass - whirl * A.gyroscopic
@@ -570,7 +571,6 @@ def _pencil(
     K, M = bands
     shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
     for node, form, pedestal in held:
-        form = form if kind is complex else form.real
         hold += float(form.trace().real) / planes
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
@@ -579,9 +579,8 @@ def _pencil(
             unknowns, form = np.append(unknowns, foot), np.kron(((1, -1), (-1, 1)), form)
         springs.append((unknowns, form))
     for unknowns, form in springs:
-        for (a, b), stiffness in np.ndenumerate(form):
-            if (i := unknowns[a]) <= (j := unknowns[b]):
-                K[i - j - 1, j] += stiffness
+        for b, j in enumerate(unknowns):  # they ascend
+            K[unknowns[: b + 1] - j - 1, j] += form[: b + 1, b]
     span = rotor.positions[-1]
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
@@ -638,7 +637,8 @@ class Spectrum:
     @property
     def motion(self) -> ComplexArray:
         """Amplitudes of x and y and of their slopes, shape (4, N, m)."""
-        X = self.vectors[np.array([self.pencil.shaft[:, k :: self.pencil.matrices.stride] for k in (0, 1)])]
+        shaft, stride = self.pencil.shaft, self.pencil.matrices.stride
+        X = self.vectors[np.array((shaft[:, ::stride], shaft[:, 1::stride]))]
         return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
 
 
@@ -726,8 +726,8 @@ def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
     rounding = rounding_error(K, X, np.abs(squares + shift))
     if rounding.max(initial=0.0) > 1e-2:
         raise ValueError(
-            f"the mesh of {pencil.rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
-            "50 to 200 are ample for a rotor"
+            f"the mesh of {pencil.rotor.n_elements} elements is too fine for float64: join neighbouring "
+            "elements, 50 to 200 are ample for a rotor"
         )
     return Spectrum(squares, X, shift, U, rounding, pencil)
 

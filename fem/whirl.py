@@ -258,8 +258,8 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     """
     K, _ = P.supports(speeds[speeds.size // 2, None])
     springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
-    nodes = [support.node for support in P.rotor.supports]
-    spectrum = lowest_modes(one_plane(P.rotor, P.A, 0, zip(nodes, springs.tolist(), strict=True)), m)
+    held = zip(P.rows // P.A.stride + 1, springs, strict=True)
+    spectrum = lowest_modes(one_plane(P.rotor, P.A, 0, held), m)
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 

@@ -271,12 +271,11 @@ def guyan(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Method:
     places = np.array(mass_nodes(rotor, nodes))
     plane, remarks = plane_at_rest(rotor, None)
     pencil = whole_rotor(plane, assemble(plane))
-    if pencil.rigid.size or finite_modes(pencil) < places.size:
+    if pencil.rigid.size or finite_modes(pencil) < len(places):
         raise ValueError("the rotor is not held, or has fewer modes than there are nodes")
-    masters = pencil.waves[0][places - 1]
-    full = lowest_modes(pencil, places.size)
-    model = _ritz(pencil, static_shapes(pencil.stiffness, masters)[0], "; ".join(remarks))
-    return _beside("Guyan", model, np.sqrt(full.squares), full.vectors[masters])
+    masters, full = pencil.waves[0][places - 1], lowest_modes(pencil, len(places))
+    reduced = _ritz(pencil, static_shapes(pencil.stiffness, masters)[0], "; ".join(remarks))
+    return _beside("Guyan", reduced, np.sqrt(full.squares), full.vectors[masters])
 
 
 def _beside(name: str, model: _Model, frequencies: FloatArray, at_masters: FloatArray) -> Method:
