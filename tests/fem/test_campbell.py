@@ -179,45 +179,23 @@ SCAN = 500 if repetitions.FULL else 150
 HEAVY = 0.69  # damping ratio of a decrement of 6; beyond, modes are not counted
 
 
-def eigenvalues(rotor, speeds):
-    """All of them, shape (S, 2 N), from dense matrices, which are linear between the knots of the tables."""
-    knots = np.array(rotor.supports[0].speeds)
-    at = [dense_rotor.assemble(rotor, knot) for knot in knots]
-    i = np.clip(np.searchsorted(knots, speeds) - 1, 0, knots.size - 2)
-    part = ((speeds - knots[i]) / np.diff(knots)[i])[:, None, None]
-    C, K = (
-        np.stack([getattr(D, name) for D in at])[i] * (1 - part)
-        + np.stack([getattr(D, name) for D in at])[i + 1] * part
-        for name in ("C", "K")
-    )
-    M, size, shift = at[0].M, len(at[0].M), 91.0
-    companion = np.zeros((speeds.size, 2 * size, 2 * size))
-    companion[:, :size] = -np.linalg.solve(
-        K + shift * C + shift**2 * M,
-        np.concatenate((C + 2 * shift * M, np.broadcast_to(M, C.shape)), axis=2),
-    )
-    companion[:, size:, :size] = np.eye(size)
-    return 1 / np.linalg.eigvals(companion) + shift
-
-
 def missed(rotor, asked):
     """Steps of a dense scan in which the answer and the number of modes below the 1× line disagree."""
     found = fem.campbell(rotor, asked, 12)
     for speed in found.critical_speeds:
-        lam = eigenvalues(rotor, np.array([speed]))[0]
+        lam = dense_rotor.whirl(rotor, speed)[0]
         assert np.abs(np.abs(lam.imag) - speed).min() < 1e-6 * speed
     if found.cut:
         return 0
     speeds = np.linspace(asked[0], asked[-1], SCAN)
+    lam = [dense_rotor.whirl(rotor, speed)[0] for speed in speeds]
     # What does not oscillate is below the line: a mode that ceases to oscillate crosses it before.
-    below = (np.abs(eigenvalues(rotor, speeds).imag) < speeds[:, None]).sum(axis=1) // 2
+    above = [(each.imag > speed).sum() for each, speed in zip(lam, speeds, strict=True)]
     there = np.histogram(found.critical_speeds, speeds)[0]
-    extra = there - np.abs(np.diff(below))
+    extra = there - np.abs(np.diff(above))
     wrong = np.flatnonzero((extra < 0) | (extra % 2 != 0))
     # Heavy ones come and go, by rounding alone where they are double: what passes there must be light.
-    passed = [
-        light_crossings(*eigenvalues(rotor, speeds[k : k + 2]), speeds[k : k + 2]) for k in wrong.tolist()
-    ]
+    passed = [light_crossings(*lam[k : k + 2], speeds[k : k + 2]) for k in wrong.tolist()]
     return sum(n > there[k] for n, k in zip(passed, wrong.tolist(), strict=True))
 
 

@@ -51,7 +51,8 @@ def paths_of(rotor):
     bearings = [s for s in rotor.supports if s.kind == "bearing"]
     for i, support in enumerate(bearings, start=1):
         names = ["kxx", "kxy", "kyy", "cxx", "cyx", "kxx.scale", "stiffness.scale", "cyy.scale"]
-        names += ["pedestal_mass", "pedestal_stiffness_x", "pedestal_damping_y"] * bool(support.pedestal)
+        names += ["pedestal_stiffness_x", "pedestal_damping_y"] * bool(support.pedestal)
+        names += ["pedestal_mass"] * bool(support.pedestal and support.pedestal.mass)
         names += ["tilting_stiffness"] * bool(support.tilting_stiffness)
         paths += [f"bearing[{i}].{name}" for name in names]
     return paths + ["seal[1].kxx", "seal[1].cxy"] * (len(bearings) < len(rotor.supports))

@@ -185,14 +185,7 @@ def drawn(rng):
 
 def largest_growth(rotor, speed):
     """max Re λ / |λ| from dense matrices of the whole rotor."""
-    D = dense_rotor.assemble(rotor, speed)
-    shift, size = 77.0, len(D.M)
-    inverse = np.linalg.inv(D.dynamic(shift))
-    companion = np.block(
-        [[-inverse @ (D.C + 2 * shift * D.M), -inverse @ D.M], [np.eye(size), np.zeros((size, size))]]
-    )
-    mu = np.linalg.eigvals(companion)
-    lam = 1 / mu[np.abs(mu) > 1e-7 * np.abs(mu).max()] + shift
+    lam = dense_rotor.whirl(rotor, speed)[0]
     lam = lam[np.abs(lam) > 1e-3]
     return float((lam.real / np.abs(lam)).max())
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from fem_rotors import machines, rotor23, rotors, uniform
+from fem_rotors import machines, rotor23, uniform
 from hypothesis import given, settings
 
 import fem
@@ -23,9 +23,11 @@ def test_a_beam_on_springs_is_exact_with_any_mesh(n):
     np.testing.assert_allclose(alpha[0], [1 / left, 1 / (2 * left)], rtol=1e-7)
 
 
-@given(rotors(damped=False))
+@given(machines(elements=(2, 20)))
 @settings(max_examples=15, deadline=None)
 def test_compliance_is_symmetric_positive_and_the_slow_limit_of_the_response(rotor):
+    springs = [fem.Support(s.node, s.at(0.0)[0][0, 0]) for s in rotor.supports]
+    rotor = dataclasses.replace(rotor, supports=springs, material_damping=0.0)
     nodes = list(range(1, rotor.n_nodes + 1))
     alpha = fem.compliance(rotor, nodes)
     np.testing.assert_array_equal(alpha, alpha.T)

@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 from dense_rotor import whirl as dense_whirl
-from fem_rotors import rotor23, uniform
+from fem_rotors import machines, rotor23, uniform
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from whirl_rotors import FULL, machine, whirling_rotors
+from whirl_rotors import FULL, machine
 
 import fem
 
@@ -27,7 +27,7 @@ def test_what_does_no_work_is_not_in_the_decay():
 
 
 @settings(max_examples=10, deadline=None)
-@given(whirling_rotors(elements=(3, 12)), st.floats(0.0, 1000.0))
+@given(machines(elements=(3, 12)), st.floats(0.0, 1000.0))
 def test_the_dense_solver_of_the_tests_agrees(rotor, speed):
     rotor = dataclasses.replace(rotor, model=dataclasses.replace(rotor.model, shear=False))
     found = fem.whirl_modes(rotor, speed, 6)

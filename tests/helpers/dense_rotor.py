@@ -91,12 +91,10 @@ def assemble(rotor, speed):
 
 
 def whirl(rotor, speed):
-    """Eigenvalues λ with Im λ > 0, ascending in Im λ, and their vectors in both planes.
+    """All finite eigenvalues λ, and their vectors in both planes.
 
     Returns λ (m,), X (m, N), Y (m, N): deflections, so that x = Re X e^{λt}.
     """
-    import scipy.linalg
-
     D = assemble(rotor, speed)
     shift = 100.0  # rad/s: a free rotor has a singular K
     K = D.dynamic(shift)
@@ -104,13 +102,9 @@ def whirl(rotor, speed):
     size = len(K)
     inverse = np.linalg.inv(K)
     companion = np.block([[-inverse @ C, -inverse @ D.M], [np.eye(size), np.zeros((size, size))]])
-    values, vectors = scipy.linalg.eig(companion)
-    found = np.abs(values) > 1e-9 * np.abs(values).max()
-    lam = 1 / values[found] + shift
-    vectors = vectors[:size, found]
-    keep = np.flatnonzero(lam.imag > 1e-6 * np.abs(lam))
-    keep = keep[np.argsort(lam[keep].imag)]
-    return lam[keep], vectors[D.x][:, keep].T, vectors[D.y][:, keep].T
+    values, vectors = np.linalg.eig(companion)
+    finite = np.abs(values) > 1e-9 * np.abs(values).max()
+    return 1 / values[finite] + shift, vectors[D.x][:, finite].T, vectors[D.y][:, finite].T
 
 
 def synchronous(rotor, speed):

@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
-from fem_rotors import rotor23
+from fem_rotors import machines, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL
 from small_models import compare_response, compare_stability, small_rotor, stability_threshold, whirl_of
-from whirl_rotors import whirling_rotors
 
 import fem
 from rotorid.reduction import reduce
@@ -216,7 +215,7 @@ def test_disagreement_and_another_mode_are_said():
 
 
 @settings(max_examples=60 if FULL else 25, deadline=None)
-@given(rotor=whirling_rotors(elements=(4, 12)), seed=st.integers(0, 2**32 - 1))
+@given(rotor=machines(elements=(4, 12)), seed=st.integers(0, 2**32 - 1))
 def test_thresholds_of_random_rotors(rotor, seed):
     """Gyroscopic, cross-coupled, tabulated, on pedestals: the state space's eigenvalues say the same."""
     rng = np.random.default_rng(seed)

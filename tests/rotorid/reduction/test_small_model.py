@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases import each_of
 from exact_solutions import exactly, whirl_exactly
-from fem_rotors import rotor23
+from fem_rotors import machines, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,45 +36,17 @@ def eigenvalues(small, speed=0.0):
 
 @st.composite
 def lumped_rotors(draw):
-    """Discs on a massless shaft; bearings of any kind, some of them at a disc, some on pedestals."""
+    """Discs on a massless shaft; bearings of any kind, some of them undamped, some at a disc."""
+    rotor = draw(machines(elements=(4, 9)))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    n = int(rng.integers(4, 10))
-    nodes = np.arange(1, n + 2)
-    discs = sorted(int(node) for node in rng.choice(nodes, size=int(rng.integers(1, 4)), replace=False))
-    bearings = sorted(int(node) for node in rng.choice(nodes, size=int(rng.integers(2, 4)), replace=False))
-
-    def matrix(size):
-        a, b = rng.uniform(-0.3, 0.3, 2) * size
-        return ((size, a), (b, size * rng.uniform(0.5, 2.0)))
-
-    supports = []
-    for node in bearings:
-        k, c = 10 ** rng.uniform(6.5, 8), 10 ** rng.uniform(2, 3.5)
-        kind = int(rng.integers(4))
-        stand = None
-        if rng.random() < 0.5:
-            mass = float(rng.uniform(1, 20)) if rng.random() < 0.5 else 0.0
-            stand = fem.Pedestal(
-                mass, (float(k), 3.0 * k), (float(c), 2.0 * c) if rng.random() < 0.5 else 0.0
-            )
-        if kind == 0:
-            support = fem.Support(node, k, 0.0, pedestal=stand)
-        elif kind == 1:
-            support = fem.Support(node, matrix(k), 0.0, pedestal=stand)
-        elif kind == 2:
-            support = fem.Support(node, matrix(k), matrix(c), pedestal=stand)
-        else:
-            both = ([matrix(k), matrix(2 * k)], [matrix(c), matrix(0.5 * c)])
-            support = fem.Support(node, *both, speeds=(0.0, 1000.0), pedestal=stand)
-        supports.append(support)
-    return fem.Rotor(
-        rng.uniform(0.05, 0.2, n),
-        rng.uniform(0.04, 0.1, n),
+    nodes = rng.choice(np.arange(1, rotor.n_nodes + 1), size=rng.integers(1, 4), replace=False)
+    return replace(
+        rotor,
         density=0.0,
-        discs=[fem.Disc(node, float(rng.uniform(5, 50))) for node in discs],
-        supports=supports,
+        discs=[fem.Disc(node, rng.uniform(5, 50)) for node in sorted(nodes.tolist())],
+        supports=[replace(s, damping=0.0) if rng.random() < 0.4 else s for s in rotor.supports],
         material_damping=draw(st.sampled_from([0.0, 1e-5])),
-        model=fem.Model(shear=draw(st.booleans())),
+        model=fem.Model(shear=rotor.model.shear),
     )
 
 
