@@ -16,15 +16,14 @@ if TYPE_CHECKING:
 
 
 def as_proposed(job: Job, correction: Correction, influence: Influence, runs: Trials | None) -> Job:
-    """The job with what was proposed as the weights of its check runs, where nobody states them.
+    """The job with what was proposed as the weights of its check runs, which nobody states.
 
     Where the job has holes these are pieces, which are in them then, and no longer in stock.
     """
     import numpy as np
 
     check = job.check
-    if check is None or job.check_mounted:
-        return job
+    assert check is not None
     pieces = pieces_mounted(job, correction, influence, runs)
     mounted = np.tile((pieces or correction).weights, (len(check.runs), 1))
     check, holes = replace(check, planes=correction.planes, weights=mounted), dict(job.holes)

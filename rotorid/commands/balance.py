@@ -22,7 +22,6 @@ from rotorid.commands.balance_solution import (
     with_other_conventions,
 )
 from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
-from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import mounted_weights
 from rotorid.commands.quantities import one_of, speeds
 from rotorid.commands.without_phase import balanced_without_phase
@@ -33,13 +32,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict, Zones
-    from rotorid.commands.balance_solution import JobGiven, Solved
+    from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.outcome import Written
 
 
-_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", "grade", "rotor_mass", "service_speed")
+_TOLERANCE = ("grade", "rotor_mass", "service_speed")
+_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", *_TOLERANCE)
 """Options that mean nothing beside `weights`."""
 
 
@@ -70,11 +70,11 @@ class Balance(Outcome):
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
         return _answer(self)
 
-    def beside(self) -> dict[str, Any]:
-        """Keys of the document beside those of the correction."""
+    def to_dict(self) -> dict[str, Any]:
+        """The keys of the correction, and those of what is beside it."""
         parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
-        return {key: part.to_dict() for key, part in parts.items() if part}
+        return self.result.to_dict() | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -110,7 +110,17 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcom
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     options = options or BalanceOptions()
-    _check(options)
+    check_choices(options, choices())
+    if options.coefficients is not None:
+        one_of(options.coefficients, "--coefficients", KINDS)
+    if options.machine_type is not None and (options.coefficients or options.influence):
+        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
+    if options.ridge is not None and not 0 < options.ridge < math.inf:
+        raise ValueError(f"--ridge {options.ridge:g}: a strength above 0, such as 0.03")
+    if options.split and options.ridge is not None:
+        raise ValueError(
+            "--split takes the planes as they are, and would undo --ridge: use fewer --planes instead"
+        )
     read, files, again = job_of(job, options)
     if read.trials.amplitudes_only:
         return balanced_without_phase(read, options)
@@ -130,7 +140,10 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
     chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
     remove = [name for name, plane in job.planes.items() if plane.remove]
     result = what_if(influence, given, runs, chosen, remove)
-    result = replace(result, worse=(*result.worse, *next_mode(job, result)))
+    if job.rotor is not None:
+        from rotorid.commands.model_places import next_mode
+
+        result = replace(result, worse=(*result.worse, *next_mode(job, result)))
     verdict, limits = None, job.limits_of(influence.planes)
     if limits is not None:
         kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))
@@ -154,28 +167,30 @@ def corrected(
 
     `files` make the workbook, `again` reads the job under other conventions.
     """
-    from balancing import compare_check, zones_of
+    from balancing import compare_check, mount, zones_of
 
     stated = read.check is None or read.check_mounted
-    if options.refine and stated:
-        solved = solve(read, options)
-    else:
-        solved = solve(read, replace(options, refine=False))
+    solved = solve(read, options if stated else replace(options, refine=False))
+    if not stated:
         read = as_proposed(read, solved.result, *solved.coefficients)
         solved = solve(read, options) if options.refine else solved
     influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
-    result = special(result, read, options.coefficients)
-    mounted, check, left = _pieces(read, result, solved, options), None, None
-    if read.check is not None and not options.refine:
+    if read.trials.special:
+        result = special(result, read, options.coefficients)
+    mounted, check, left = None, None, None
+    if read.check is None or options.refine:
+        if options.split and (read.holes or read.check_pieces is None):
+            mounted = mount(result, influence, runs, read.holes, on_top=options.refine)
+    else:
+        mounted = read.check_pieces if options.split else None  # the trim has its own
         compared = result, read.check, influence, runs
         if read.held is not None and result.parts is not None and (there := counted(read)) is not None:
             measured = as_measured(read, influence)
             compared = result.parts, there, measured, runs and read.held.of_runs(runs)
         check = replace(compare_check(*compared), as_proposed=not stated)
-    tolerance = _tolerance(result.planes, options)
-    verdict = _judge(result, influence, read, tolerance, mounted)
+    verdict = _judge(result, influence, read, options, mounted)
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
@@ -201,7 +216,6 @@ def corrected(
     outcome = Balance(
         result=result,
         provenance=made,
-        keys=lambda: result.to_dict() | outcome.beside(),
         file=lambda: table_of((left or mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _picture(outcome)},
@@ -217,33 +231,6 @@ def corrected(
         zones=zones,
     )
     return outcome
-
-
-def _check(options: BalanceOptions) -> None:
-    """Refuse options that are not known or do not go together, before anything is read."""
-    check_choices(options, choices())
-    if options.coefficients is not None:
-        one_of(options.coefficients, "--coefficients", KINDS)
-    if options.machine_type is not None and (options.coefficients or options.influence):
-        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
-    if options.ridge is not None and not 0 < options.ridge < math.inf:
-        raise ValueError(f"--ridge {options.ridge:g}: a strength above 0, such as 0.03")
-    if options.split and options.ridge is not None:
-        raise ValueError(
-            "--split takes the planes as they are, and would undo --ridge: use fewer --planes instead"
-        )
-
-
-def _pieces(job: Job, result: Correction, solved: Solved, options: BalanceOptions) -> Mounted | None:
-    """Pieces in holes: those that a check run had, or that are to be mounted; None: not asked for."""
-    from balancing import mount
-
-    if job.check is not None and not options.refine:  # the trim has its pieces
-        return job.check_pieces if options.split else None
-    if options.split and (job.holes or job.check_pieces is None):
-        influence, runs = solved.coefficients
-        return mount(result, influence, runs, job.holes, on_top=options.refine)
-    return None
 
 
 def _answer(made: Balance) -> Answer:
@@ -285,11 +272,9 @@ def _picture(made: Balance) -> Figure:
     return correction_figure(made.result, made.mounted, made.check, made.left)
 
 
-def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
-    """Tolerance of one or two planes; None where no grade is given."""
+def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance:
+    """Tolerance of one or two planes."""
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
-    if grade is None and weight is None and speed is None:
-        return None
     if grade is None or weight is None or speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
     if len(planes) > 2:
@@ -305,13 +290,16 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
 
 
 def _judge(
-    result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
+    result: Correction, influence: Influence, job: Job, options: BalanceOptions, mounted: Mounted | None
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
     import numpy as np
 
     from balancing import verdict_of_check, verdict_of_prediction
 
+    tolerance = None
+    if any(getattr(options, name) is not None for name in _TOLERANCE):
+        tolerance = _tolerance(result.planes, options)
     limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
     if tolerance is None and not limited:
         return None

@@ -234,7 +234,7 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
         weights = _limits(
             max_mass, "--max-mass", lambda w: units.weight(w or unit), si, example, "plane", planes, used
         )
-    amplitudes = _amplitudes(trials, limits)
+    amplitudes = _amplitudes(trials, limits) if limits else {}
     if not weights and not amplitudes:
         return job
     old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))

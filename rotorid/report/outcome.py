@@ -75,7 +75,7 @@ class Outcome(Answered):
 
     result: Any
     sentences: tuple[str, ...] = ()
-    keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+    keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
