@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import LINES, Answer, together
+from rotorid.base.answer import LINES, Answer, kinds, together
 from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
@@ -21,17 +22,35 @@ from rotorid.commands.balance_solution import (
     special,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
+from rotorid.commands.coefficients import (
+    KINDS,
+    NEEDS_TRIAL,
+    as_measured,
+    counted,
+    needs_trial_run,
+    of_planes,
+)
 from rotorid.commands.option_quantities import mounted_weights
 from rotorid.commands.quantities import one_of, speeds
 from rotorid.commands.without_phase import balanced_without_phase
 from rotorid.report.options import check_choices, refuse
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
+from rotorid.report.outcome import Outcome, aligned, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict, Zones
+    from balancing import (
+        CheckComparison,
+        Correction,
+        Influence,
+        Labels,
+        LeftToDo,
+        Limits,
+        Mounted,
+        Tolerance,
+        Verdict,
+        Zones,
+    )
     from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
@@ -74,7 +93,16 @@ class Balance(Outcome):
         """The keys of the correction, and those of what is beside it."""
         parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
-        return self.result.to_dict() | {key: part.to_dict() for key, part in parts.items() if part}
+        document = self.result.to_dict()
+        if self.left is not None:  # what is mounted is not to be mounted again
+            trim, scale = self.left.word == "trim", self.result.labels.vibration_scale
+            document["judgement"] |= {
+                "word": self.left.word,
+                "cause": self.left.why,
+                "instead": [],
+                "rms_expected": self.left.correction.decision.expected * scale if trim else None,
+            }
+        return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -136,7 +164,12 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
 
     refuse(options, _NEEDLESS, "means nothing with --weights, which are taken as they are")
     given = mounted_weights(job, options.weights or {})
-    (influence, runs), of_type = coefficients_of(job, options)
+    coefficients, of_type = coefficients_of(job, options)
+    influence, runs = of_planes(job, coefficients)
+    limits = job.limits_of(influence.planes)
+    beyond = [] if limits is None else _beyond(limits, influence, given, job)
+    remarks = influence.remarks
+    influence = replace(influence, remarks=remarks._replace(warnings=(*beyond, *remarks.warnings)))
     chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
     remove = [name for name, plane in job.planes.items() if plane.remove]
     result = what_if(influence, given, runs, chosen, remove)
@@ -144,8 +177,8 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
         from rotorid.commands.model_places import next_mode
 
         result = replace(result, worse=(*result.worse, *next_mode(job, result)))
-    verdict, limits = None, job.limits_of(influence.planes)
-    if limits is not None:
+    verdict = None
+    if limits is not None and limits.residual.min() < math.inf:
         kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))
         verdict = verdict_of_readings(result.influence, result.after, result.after_covariance, kept)
     zones = zones_of(result, job.zones) if job.zones else None
@@ -158,6 +191,20 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
         file=Table("weights", result.columns()),
         title="What these weights would leave",
     )
+
+
+def _beyond(limits: Limits, influence: Influence, given: Mapping[str, complex], job: Job) -> list[str]:
+    """Where given weights are beyond the largest weight of a plane, or in an arc that is forbidden."""
+    words, labels = list[str](), influence.labels
+    for plane, most, arcs in zip(influence.planes, limits.max_weight, limits.forbidden, strict=True):
+        weight = given.get(plane, 0j)
+        put = f"{labels.weight_at(-weight if job.planes[plane].remove else weight)} in plane {plane!r}"
+        if abs(weight) > most * (1 + 1e-9):
+            words.append(f"{put} is more than the largest weight there, {labels.weight_words(most)}")
+        turns = [((cmath.phase(weight) - start) % math.tau, width) for start, width in arcs if weight]
+        if any(1e-9 < turn < width - 1e-9 for turn, width in turns):
+            words.append(f"{put} stands where the job forbids weights (forbidden_deg)")
+    return words
 
 
 def corrected(
@@ -194,6 +241,7 @@ def corrected(
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
+        result = _also_warned(result, left.correction)
     zones = None
     if read.zones:
         zones = zones_of(result, read.zones, None if mounted is None else mounted.after, read.check)
@@ -251,13 +299,42 @@ def _answer(made: Balance) -> Answer:
             first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
         first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
         tables = [_behind(part.answer) for part in (mounted, result) if part]
-        every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
+        check_runs = [check.answer] if check else []
+        trim = _trim_tables(left, result.labels)
+        every = together([left.answer, *limits, *trim, *check_runs, *zone, *tables])
         return replace(every, judgement=" ".join(first))
     if mounted:
         elsewhere = "\n".join(result.decision.elsewhere)
         weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
     judged = [*limits, *([mounted.answer] if mounted else [])]
     return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
+
+
+def _also_warned(result: Correction, counted: Correction) -> Correction:
+    """With what only the correction with the check run counted warns of."""
+    warned = result.warnings
+    more = [
+        f"with the check run counted, {words}"
+        for words in counted.warnings[len(counted.contradictions) :]
+        if len(kinds((*warned, words))) > len(kinds(warned))
+    ]
+    decision = replace(result.decision, warnings=(*result.decision.warnings, *more))
+    return replace(result, decision=decision)
+
+
+def _trim_tables(left: LeftToDo, labels: Labels) -> list[Answer]:
+    """Every reading now and with the trim, and its weights where pieces stand for them."""
+    from rotorid.report.balance import next_run, trim_table
+
+    if left.word != "trim":
+        return []
+    document, unit = {"left_to_do": left.to_dict()}, labels.vibration_in
+    blocks = [
+        f"Vibration{unit and f' in {unit}'}, now and with the trim\n{aligned(next_run(document, labels))}"
+    ]
+    if left.pieces is not None:
+        blocks.insert(0, f"The trim that the pieces make\n{aligned(trim_table(document, labels))}")
+    return [Answer("", tables=tuple(blocks))]
 
 
 def _behind(answer: Answer) -> Answer:
@@ -293,14 +370,12 @@ def _judge(
     result: Correction, influence: Influence, job: Job, options: BalanceOptions, mounted: Mounted | None
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
-    import numpy as np
-
     from balancing import verdict_of_check, verdict_of_prediction
 
     tolerance = None
     if any(getattr(options, name) is not None for name in _TOLERANCE):
         tolerance = _tolerance(result.planes, options)
-    limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
+    limited = result.limits is not None and result.limits.residual.min() < math.inf
     if tolerance is None and not limited:
         return None
     radii = None

@@ -121,10 +121,6 @@ class BalanceOptions:
         ValueError
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
-        from rotorid.commands.app import check_targets
-        from rotorid.files.disk import write_files
-        from rotorid.files.job_excel import template_bytes
-
         path = self.template
         if job and path is None:
             return None
@@ -133,6 +129,10 @@ class BalanceOptions:
                 "give a job (.toml, .xlsx) or a runs table and a weights table; --template, without a "
                 "job, writes a form"
             )
+        from rotorid.commands.app import check_targets
+        from rotorid.files.disk import write_files
+        from rotorid.files.job_excel import template_bytes
+
         check_targets([(path, (".xlsx",))])
         if path.exists():
             raise ValueError(f"{path}: exists already, and may be filled in; choose another name")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,14 +42,11 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
     ValueError
         For options and parts of the job that need phases, all in one message; UndeterminedError.
     """
-    import numpy as np
-
     from balancing import balance_without_phase
 
     given = [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]
-    limited = job.limits is not None and np.isfinite(job.limits.residual).any()
+    limited = job.limits is not None and job.limits.residual.min() < inf
     of_job = {
-        "holes (rotorid split puts a weight into them)": job.holes,
         "limits of sensors": limited,
         "zones": job.zones,
         "the check run (add it to the runs, with its weights)": job.check is not None,
@@ -56,9 +55,14 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
         raise ValueError(f"the runs have no phases: leave {listing(given, 'and')} away")
     planes = job.trials.planes
     remove = [plane for plane in planes if job.planes[plane].remove]
+    limits = job.limits_of(planes)
     result = balance_without_phase(
-        job.trials, limits=job.limits_of(planes), row_weights=job.row_weights, remove=remove
+        job.trials, limits=limits, row_weights=job.row_weights, remove=remove, holes=job.holes
     )
+    if job.holes:
+        note = "the weights stand at any angle: rotorid split puts them into holes"
+        decision = replace(result.decision, notes=(*result.decision.notes, note))
+        result = replace(result, decision=decision)
 
     def coefficients(_: Path) -> Written:
         raise ValueError("amplitudes give no influence coefficients: write a table, .csv or .xlsx")

@@ -180,10 +180,10 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
         "the rotor table, relative to this file; required",
         expected='the file of the shaft, shaft = "shaft.csv"',
     )
-    material: Material = key("of elements whose row says nothing", default=Material())
+    material: Material = key("of elements whose row says nothing", default=Material.model_construct())
     model: Effects = key(
         "effects that count, true or false; an inertia that is thereby ignored gives a warning",
-        default=Effects(),
+        default=Effects.model_construct(),
     )
     disc: list[DiscKeys] = key("a disc, as many as there are", default=[])
     station: list[Station] = key("a name for a node", default=[])

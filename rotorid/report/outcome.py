@@ -98,11 +98,11 @@ class Outcome(Answered):
         names = [table.name for table in self.more if isinstance(table, Table)]
         return Answer(
             "\n".join(self.sentences),
-            "\n\n".join(map(_aligned, self.tables)),
+            "\n\n".join(map(aligned, self.tables)),
             self.warnings,
             self.notes,
             tuple(
-                f"{capital(each.name)}:\n{_aligned(each)}" if isinstance(each, Table) else each
+                f"{capital(each.name)}:\n{aligned(each)}" if isinstance(each, Table) else each
                 for each in self.more
             ),
             self.beyond or listing(names, "and"),
@@ -178,7 +178,8 @@ class Outcome(Answered):
         )
 
 
-def _aligned(table: Table | str) -> str:
+def aligned(table: Table | str) -> str:
+    """For a terminal."""
     return terminal(table, COLUMNS) if isinstance(table, Table) else table
 
 
