@@ -87,21 +87,41 @@ class Balance(Outcome):
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-        return _answer(self)
+        result, mounted, check, left, job = self.result, self.mounted, self.check, self.left, self.job
+        weights, sound = result.answer, result.sound
+        if needs_trial_run(job, self.influence):
+            weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
+        limits, zone = ([] if part is None else [part.answer] for part in (self.verdict, self.zones))
+        if left is not None:  # the weights of the bare rotor are tables
+            first = [one.judgement for one in (left.answer, *limits)]
+            if check is not None:
+                first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
+            if job.check_pieces is not None:
+                pieces = job.check_pieces.in_holes()
+                first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
+            elif not (job.check_mounted or job.check_of_weights):
+                first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
+            first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
+            tables = [_behind(part.answer) for part in (mounted, result) if part]
+            every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
+            trim = _trim_tables(left, result.labels) if left.word == "trim" else []
+            return replace(every, judgement=" ".join(first), tables=(*trim, *every.tables))
+        if mounted:
+            elsewhere = "\n".join(result.decision.elsewhere)
+            weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
+        judged = [*limits, *([mounted.answer] if mounted else [])]
+        return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
 
     def to_dict(self) -> dict[str, Any]:
         """The keys of the correction, and those of what is beside it."""
         parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
-        document = self.result.to_dict()
-        if self.left is not None:  # what is mounted is not to be mounted again
-            trim, scale = self.left.word == "trim", self.result.labels.vibration_scale
-            document["judgement"] |= {
-                "word": self.left.word,
-                "cause": self.left.why,
-                "instead": [],
-                "rms_expected": self.left.correction.decision.expected * scale if trim else None,
-            }
+        document: dict[str, Any] = self.result.to_dict()
+        if (left := self.left) is not None:  # what is mounted is not to be mounted again
+            counted = left.correction.decision.to_dict(left.correction.labels)
+            expected = counted["rms_expected"] if left.word == "trim" else None
+            left_to_do = {"word": left.word, "cause": left.why, "instead": [], "rms_expected": expected}
+            document["judgement"] |= left_to_do
         return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
@@ -201,8 +221,8 @@ def _beyond(limits: Limits, influence: Influence, given: Mapping[str, complex], 
         put = f"{labels.weight_at(-weight if job.planes[plane].remove else weight)} in plane {plane!r}"
         if abs(weight) > most * (1 + 1e-9):
             words.append(f"{put} is more than the largest weight there, {labels.weight_words(most)}")
-        turns = [((cmath.phase(weight) - start) % math.tau, width) for start, width in arcs if weight]
-        if any(1e-9 < turn < width - 1e-9 for turn, width in turns):
+        at = cmath.phase(weight)
+        if weight and any(1e-9 < (at - start) % math.tau < width - 1e-9 for start, width in arcs):
             words.append(f"{put} stands where the job forbids weights (forbidden_deg)")
     return words
 
@@ -281,35 +301,6 @@ def corrected(
     return outcome
 
 
-def _answer(made: Balance) -> Answer:
-    """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-    result, mounted, check, left, job = made.result, made.mounted, made.check, made.left, made.job
-    weights, sound = result.answer, result.sound
-    if needs_trial_run(job, made.influence):
-        weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-    limits, zone = ([] if part is None else [part.answer] for part in (made.verdict, made.zones))
-    if left is not None:  # the weights of the bare rotor are tables
-        first = [one.judgement for one in (left.answer, *limits)]
-        if check is not None:
-            first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
-        if job.check_pieces is not None:
-            pieces = job.check_pieces.in_holes()
-            first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
-        elif not (job.check_mounted or job.check_of_weights):
-            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
-        first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
-        tables = [_behind(part.answer) for part in (mounted, result) if part]
-        check_runs = [check.answer] if check else []
-        trim = _trim_tables(left, result.labels)
-        every = together([left.answer, *limits, *trim, *check_runs, *zone, *tables])
-        return replace(every, judgement=" ".join(first))
-    if mounted:
-        elsewhere = "\n".join(result.decision.elsewhere)
-        weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
-    judged = [*limits, *([mounted.answer] if mounted else [])]
-    return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
-
-
 def _also_warned(result: Correction, counted: Correction) -> Correction:
     """With what only the correction with the check run counted warns of."""
     warned = result.warnings
@@ -322,19 +313,17 @@ def _also_warned(result: Correction, counted: Correction) -> Correction:
     return replace(result, decision=decision)
 
 
-def _trim_tables(left: LeftToDo, labels: Labels) -> list[Answer]:
-    """Every reading now and with the trim, and its weights where pieces stand for them."""
+def _trim_tables(left: LeftToDo, labels: Labels) -> list[str]:
+    """Every reading now and with the trim, below its weights where pieces stand for them."""
     from rotorid.report.balance import next_run, trim_table
 
-    if left.word != "trim":
-        return []
     document, unit = {"left_to_do": left.to_dict()}, labels.vibration_in
     blocks = [
         f"Vibration{unit and f' in {unit}'}, now and with the trim\n{aligned(next_run(document, labels))}"
     ]
     if left.pieces is not None:
         blocks.insert(0, f"The trim that the pieces make\n{aligned(trim_table(document, labels))}")
-    return [Answer("", tables=tuple(blocks))]
+    return blocks
 
 
 def _behind(answer: Answer) -> Answer:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
+from rotorid.report.options import changed, option_name
 from rotorid.report.outcome import Outcome, Written, outcome_of, provenance
 
 if TYPE_CHECKING:
@@ -16,22 +17,11 @@ if TYPE_CHECKING:
     from rotorid.commands.balance_solution import BalanceOptions
     from rotorid.files import Job
 
-_REFUSED = {
-    "method": "--method",
-    "influence": "--influence",
-    "coefficients": "--coefficients",
-    "machine_type": "--type",
-    "planes": "--planes",
-    "speeds": "--speeds (leave rows out)",
-    "limit": "--limit",
-    "ridge": "--ridge",
-    "split": "--split (rotorid split puts a weight into holes)",
-    "refine": "--refine",
-    "weights": "--weights",
-    "grade": "--grade",
-    "rotor_mass": "--rotor-mass",
-    "service_speed": "--service-speed",
-}
+_REFUSED = (
+    *("method", "influence", "coefficients", "machine_type", "planes", "speeds", "limit", "ridge", "split"),
+    *("refine", "weights", "grade", "rotor_mass", "service_speed"),
+)
+_INSTEAD = {"speeds": " (leave rows out)", "split": " (rotorid split puts a weight into holes)"}
 
 
 def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
@@ -44,7 +34,7 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
     """
     from balancing import balance_without_phase
 
-    given = [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]
+    given = [option_name(name) + _INSTEAD.get(name, "") for name in changed(options) if name in _REFUSED]
     limited = job.limits is not None and job.limits.residual.min() < inf
     of_job = {
         "limits of sensors": limited,

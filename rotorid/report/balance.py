@@ -135,11 +135,13 @@ def to_do(
     left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
     part = "mounting" if left is None else "left_to_do"
     pieces = not plain and document[part]["holes"]
+    unit = result.labels.weight_in
+    holes = _work(document, f"{part}.holes", unit, hole="hole", pieces="pieces") if pieces else ()
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
         "trim": "" if left is None else shown(trim_table(document, result.labels)),
-        "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
+        "holes": shown(Table("", tuple(holes))) if pieces else nothing,
     }
 
 
@@ -214,12 +216,6 @@ def trim_table(document: Mapping[str, Any], labels: Labels) -> Table:
     plane, *work = _work(document, "left_to_do.add", f"trim, {labels.weight_in}")
     mounted = _columns(document, "left_to_do.mounted", there)
     return Table("", (plane, *mounted, *work))
-
-
-def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Table:
-    """What goes into each hole."""
-    work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
-    return Table("", tuple(work))
 
 
 def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison | None) -> Markup:
