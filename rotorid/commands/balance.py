@@ -120,8 +120,7 @@ class Balance(Outcome):
         if (left := self.left) is not None:  # what is mounted is not to be mounted again
             counted = left.correction.decision.to_dict(left.correction.labels)
             expected = counted["rms_expected"] if left.word == "trim" else None
-            left_to_do = {"word": left.word, "cause": left.why, "instead": [], "rms_expected": expected}
-            document["judgement"] |= left_to_do
+            document["judgement"].update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
         return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
