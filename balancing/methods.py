@@ -60,6 +60,8 @@ FLOOR = 1e-4
 """Every residual of the weighted fit gets a further error of this share of the rms error of all."""
 LEAST_INFORMATION = 0.2
 """Share of M that is left to A in any direction."""
+STEPS, CLOSE = 500, 1e-10
+"""Of the search for the weighted weights: at most so many, until one is so short."""
 SETTLED = 1e-6
 """Share of 1 + Q by which the next step would lower Q, at a minimum."""
 DRAWN = 1e-6
@@ -331,22 +333,22 @@ class _Errors(NamedTuple):
         return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
-        """Weights at which Q is smallest, sought from some start."""
-        from scipy.optimize import least_squares
-
-        for method in ("lm", "trf"):  # the first is fast, the second does not lose its way
-            end = least_squares(
-                lambda d: self.at(unstretch(d)).r,
-                stretch(start),
-                lambda d: self.at(unstretch(d)).rows,
-                method=method,
-                x_scale="jac",
-                xtol=1e-12,
-                ftol=1e-15,
-                max_nfev=500,
-            )
-            if end.fun @ end.jac @ solution(end.jac, end.fun) <= SETTLED * (1 + 2 * end.cost):
-                return unstretch(end.x)
+        """Weights at which Q is smallest, sought from some start by steps of Levenberg and Marquardt."""
+        D, damping = start, 1e-3
+        state = self.at(D)
+        for _ in range(STEPS):
+            J, sizes = state.rows, np.linalg.norm(state.rows, axis=0)
+            damped = np.vstack((J, np.sqrt(damping) * np.diag(sizes)))
+            step = -solution(damped, np.append(state.r, np.zeros(len(sizes))))
+            tried = self.at(D + unstretch(step))
+            shorter = tried.r @ tried.r <= state.r @ state.r
+            if shorter:
+                D, state = D + unstretch(step), tried
+            damping *= 0.1 if shorter else 10.0
+            if np.linalg.norm(sizes * step) <= CLOSE * np.linalg.norm(sizes * stretch(D)):
+                break
+        if state.r @ state.rows @ solution(state.rows, state.r) <= SETTLED * (1 + state.r @ state.r):
+            return D
         raise UndeterminedError(
             "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
             "bound; use larger trial weights, fewer planes or another method"

@@ -145,7 +145,7 @@ class Verdict(Answered):
             "\n".join(map(self._words, shown)),
             self.warnings,
             tables=("\n".join(["The other limits:", *map(self._words, others)]),) if others else (),
-            more="the other limits",
+            more="the other limits" if others else "",
         )
 
     def _words(self, row: Judgement) -> str:

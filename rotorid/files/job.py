@@ -298,7 +298,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
             holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
     files = (written.path, *map(tables.get, TABLES), *model_files, *records)
-    sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
+    sensors = {name: settings.sensors.get(name, Sensor.model_construct()) for name in trials.sensors}
     key_phasor = trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0)
     # phases always matter, the direction of angles as soon as one is written other than 0° and 180°
     degrees = [angle for plane in planes.values() for angle in plane.angles]
@@ -396,7 +396,7 @@ def _readings(
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels
     labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
-    notes = [] if source is None else _on_conventions(conventions, labels, source_name(source))
+    notes = [] if source is None else _on_conventions(conventions, stated, labels, source_name(source))
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors, slow_roll = tables.get("slow_roll"), None
     if vectors is not None:
@@ -408,13 +408,18 @@ def _readings(
     return trials, influence, conventions, slow_roll
 
 
-def _on_conventions(conventions: Conventions, labels: Labels, name: str) -> list[str]:
-    """What readings take from stored coefficients that state their conventions."""
-    usual = vars(Labels())
-    adopted = [key for key in conventions.unstated if getattr(labels, key) != usual[key]]
-    words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
-    note = f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
-    return [note] if adopted else []
+def _on_conventions(
+    conventions: Conventions, stated: Mapping[str, Any], labels: Labels, name: str
+) -> list[str]:
+    """What readings take from stored coefficients that state their conventions, or these from readings."""
+    usual, notes = vars(Labels()), list[str]()
+    each = (conventions.unstated, "the readings", name), ({"phase"} - {*stated}, name, "the readings")
+    for unstated, one, other in each:
+        adopted = [key for key in unstated if getattr(labels, key) != usual[key]]
+        words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+        words = f"nothing states the conventions of {one}: those of {other} are used for them too, {words}"
+        notes += [words] if adopted else []
+    return notes
 
 
 def conventions_of(settings: JobSettings, stored: Mapping[str, Any]) -> Conventions:

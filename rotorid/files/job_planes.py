@@ -103,7 +103,7 @@ def planes_of(
     measured = trials.planes if influence is None else unknowns(groups, influence.planes).planes
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
-    planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
+    planes = {name: stated.get(name, Plane.model_construct()) for name in (*measured, *more)}
     if not measured:
         masses = rotor is None or all(plane.radius is not None for plane in planes.values())
         unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]

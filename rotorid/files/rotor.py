@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -54,8 +54,8 @@ from rotorid.files.settings import (
     read_settings,
     read_toml,
     toml_bytes,
+    unwritten,
 )
-from rotorid.files.small_model import is_small, is_small_model, read_small_model
 from rotorid.files.units import one_of
 
 USUAL = {
@@ -179,10 +179,10 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
         "the rotor table, relative to this file; required",
         expected='the file of the shaft, shaft = "shaft.csv"',
     )
-    material: Material = key("of elements whose row says nothing", default=Material())
+    material: Material = key("of elements whose row says nothing", default=Material.model_construct())
     model: Effects = key(
         "effects that count, true or false; an inertia that is thereby ignored gives a warning",
-        default=Effects(),
+        default=Effects.model_construct(),
     )
     disc: list[DiscKeys] = key("a disc, as many as there are", default=[])
     station: list[Station] = key("a name for a node", default=[])
@@ -238,14 +238,16 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": "the table itself"}
-    if is_file := path.suffix.lower() == ".toml":
+    file, shaft, stations = unwritten(RotorFile, str(path)), path, dict[str, int]()
+    if path.suffix.lower() == ".toml":
+        from rotorid.files.small_model import is_small
+
         data = read_toml(path)
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             raise refusal(path, expected, column="shaft")
-    file = read_settings(RotorFile, data, str(path))
-    shaft, stations = path.parent / file.shaft if is_file else path, dict[str, int]()
+        file = read_settings(RotorFile, data, str(path))
+        shaft = path.parent / file.shaft
     parts = _shaft(shaft, file.material)
     at = places(range(1, len(parts["length"]) + 2), stations)
 
@@ -282,6 +284,8 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     -------
     The file itself first, then the tables that it names.
     """
+    from rotorid.files.small_model import is_small_model, read_small_model
+
     path = Path(path)
     with each_file_once() as asked, suppress(InputError), warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -229,3 +229,13 @@ def test_stored_conventions_hold_for_the_readings_unless_others_are_stated(folde
         np.testing.assert_allclose(c.weights, expected, rtol=1e-9)
         assert c.to_dict()["conventions"]["angles"] == "against rotation"
         assert any(words in w for w in c.warnings) or not words
+
+
+def test_a_table_that_states_no_phase_counts_as_the_readings_do_and_says_so(folder):
+    trials = read_trials(folder / "runs.csv", folder / "weights.csv", phase="lag")
+    write_influence(folder / "w.csv", estimate_influence(trials))
+    now = write_csv(folder / "now.csv", RUNS[:3])
+    for heading, phase, words in (("_lag_", "lag", 0), ("_", "lag", 1), ("_", "lead", 0)):
+        (folder / "w.csv").write_text((folder / "w.csv").read_text().replace("phase_lag_", f"phase{heading}"))
+        warned = job_from_files([now], influence=folder / "w.csv", phase=phase, angles="with").trials.warnings
+        assert sum("w.csv: those of the readings are used" in each for each in warned) == words
