@@ -21,7 +21,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact book lint house sure docs pages format bench bench-all build constraints clean
+.PHONY: demo test test-full test-wheel test-latest test-lowest mutants fuzz golden golden-near golden-exact book lint house sure docs pages format bench bench-all memory build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -132,6 +132,11 @@ bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
 bench-all: $(BENCH_VENV)/.bench-all $(HSBALANCE_VENV)/.peer
 	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python \
 	  $(BENCH_VENV)/bin/python -m benchmarks --all --page docs/benchmarks.md
+
+# Peak memory of the commands beside the size of their data, a table for docs/benchmarks.md; with COMMANDS only those.
+COMMANDS ?=
+memory: $(VENV)/.dev
+	$(BIN)/python .ci/memory.py $(COMMANDS)
 
 # Wheel and sdist, the wheel made from the sdist.
 DIST ?= dist

@@ -123,7 +123,7 @@ class CheckComparison(Answered):
     @property
     def difference(self) -> ComplexArray:
         """Achieved − predicted, shape (R, S, C)."""
-        return np.asarray(self.achieved - self.predicted)
+        return self.achieved - self.predicted
 
     @property
     def verdict(self) -> str:
@@ -427,7 +427,7 @@ def with_check_runs(trials: Trials, check: Trials, corrections: Correction | Non
             f"{listing(map(repr, trials.sensors), 'and')}: give those of the same sensors"
         )
     check = with_readings(_as_mounted(check, corrections), trials, "readings of the check run")
-    added = [plane for plane, there in zip(check.planes, check.weights.any(axis=0), strict=True) if there]
+    added = [plane for plane, there in zip(check.planes, check.weights.T, strict=True) if there.any()]
     planes = tuple(dict.fromkeys((*trials.planes, *added)))
     weights = [in_order(runs.weights, runs.planes, planes) for runs in (trials, check)]
     stated = trials.errors or check.errors

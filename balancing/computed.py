@@ -40,8 +40,7 @@ from balancing.influence import (
 )
 from balancing.noise import Gaussian
 from balancing.regions import mean_variances
-from rotorid.base.text import Quantity as Quantity
-from rotorid.base.text import rpm_text
+from rotorid.base.text import Quantity, rpm_text
 
 if TYPE_CHECKING:
     from fem import Rotor, SensorLike
@@ -141,13 +140,10 @@ def with_parameters(influence: Influence, columns: ArrayLike, lack: ArrayLike) -
     far = np.asarray(lack, dtype=np.float64)
     if not (np.isfinite(far) & (far >= 0)).all():
         raise ValueError("the relative errors that the lack of fit leaves must be finite numbers ≥ 0")
-    S, C, P = influence.W.shape
-    F = np.asarray(columns, dtype=complex)
-    independent = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    at = np.arange(2, 2 * P + 2)
-    std = np.broadcast_to(far, (S, C))[..., None] * np.abs(influence.W)
-    independent[..., at, at] = np.repeat(std**2, 2, axis=-1)
-    common = np.concatenate((np.zeros_like(F[..., :1]), F), axis=-1)
+    variance = np.insert((far[..., None] * np.abs(influence.W)) ** 2, 0, 0.0, axis=-1)
+    each = np.repeat(variance, 2, axis=-1)
+    common = np.insert(np.asarray(columns, dtype=complex), 0, 0.0, axis=-1)
+    independent = each[..., None] * np.eye(each.shape[-1])
     return replace(influence, errors=Gaussian(independent, common, *influence.errors[1:4]))
 
 
@@ -192,13 +188,11 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
     first, second = (np.isin(planes, side.planes) for side in (measured, computed))
-    one, other = (
-        mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed)
-    )
+    one, other = (mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed))
     v, u = (mean_variances(side.channels())[..., 1:] for side in (one, other))
     both, total = first & second, np.maximum(v + u, 1e-300)
     share = np.where(both, u / total, first)
-    parts = np.eye(len(planes) + 1) * np.insert(share, 0, 1.0, axis=-1)[..., None]
+    parts = np.eye(len(planes) + 1, dtype=complex) * np.insert(share, 0, 1.0, axis=-1)[..., None]
     chi = both * np.abs(one.W - other.W) ** 2 / total
     warnings = *measured.remarks.warnings, *computed.remarks.warnings
     s, c, p = map(int, np.unravel_index(int(np.argmax(chi)), chi.shape))

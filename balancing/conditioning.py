@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.regions import mean_variances
+from balancing.regions import LEVEL, mean_variances
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.regression import RCOND, WORD_TOLERANCE, solution
+from rotorid.regression import RCOND, WORD_TOLERANCE, solution, stretch
 
 NEARLY_ALIKE = 30.0
 """Planes with a larger condition number are named."""
@@ -27,8 +27,8 @@ HOPELESS = 1e3
 """No instrument supports planes that act alike up to so large a condition number."""
 CLEAR = 5.0
 """Effect of a good trial weight in units of its errors."""
-LEVEL, SINGLE_LEVEL = 0.95, 0.99
-"""Of the tests whether there is an effect: in all readings together, and in one of them."""
+SINGLE_LEVEL = 0.99
+"""Of the test whether there is an effect in one of the readings."""
 REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 
@@ -234,8 +234,8 @@ def unresolved(W: ComplexArray, planes: Sequence[str], covariance: FloatArray) -
     alike = alike_words(W, apart.weakest, planes)
     if covariance.any():
         v = apart.directions[:, -1] / apart.lengths
-        parts = np.stack((v.conj(), 1j * v.conj())).view(np.float64)  # times (Re dW₁, …): Re and Im of v dW
-        variance = np.einsum("ik,nkl,il->n", parts, covariance, parts) / 2
+        real = stretch(v[None])
+        variance = np.einsum("ik,nkl,il->n", real, covariance, real) / 2
         each = np.abs(W @ v) ** 2 / np.maximum(variance, 1e-9 * variance.max())
         if significant(each, n):
             return ""

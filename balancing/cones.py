@@ -36,7 +36,7 @@ AT_LIMIT = 2e-3
 """A limit is reached where less than this share of it is left: solvers stay a little inside."""
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
-FIRST, MORE = 3, 3
+MORE = 3
 """Discs a plane that a program starts from, and that are added to it."""
 STEPS = 4
 """Of reweighting before min–max."""
@@ -95,7 +95,7 @@ def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
             f"there are {N} and {P}"
         )
-    sectors = tuple(allowed_sectors(arcs) for arcs in limits.forbidden)
+    sectors = tuple(map(allowed_sectors, limits.forbidden))
     return Bounds(W, Y, limits.residual.reshape(N), limits.max_weight, sectors)
 
 
@@ -150,7 +150,7 @@ def stands_in(weight: complex, sectors: Sectors) -> bool:
     """Whether a weight is zero or stands in one of the sectors (None: anywhere)."""
     if weight == 0 or sectors is None:
         return True
-    return any(abs(project(weight, sector) - weight) <= 1e-9 * abs(weight) for sector in sectors)
+    return any((np.angle(weight) - start + 1e-9) % TURN <= width + 2e-9 for start, width in sectors)
 
 
 def within(bounds: Bounds, weights: ComplexArray) -> bool:
@@ -299,7 +299,7 @@ def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, toleran
             return Optimum(start, goal.objective(start), 0.0, np.zeros(len(e)))
         rows, sides, T = scale * rows, scale * sides, scale * T
     active = excess > 0
-    active[np.argsort(-np.abs(centres[rises]))[: FIRST * P]] = True
+    active[np.argsort(-np.abs(centres[rises]))[: MORE * P]] = True
     for tighter in TIGHTER:
         inner = head * (1 - tighter * tolerance)
         while True:
@@ -383,7 +383,7 @@ def _program(
 
 def explain(
     bounds: Bounds,
-    planes: Sequence[str] = (),
+    planes: Sequence[str],
     readings: Sequence[str] = (),
     amplitude: Words = PLAIN,
     weight: Words = PLAIN,
@@ -395,12 +395,11 @@ def explain(
     bounds
         Limits that no weights meet, some of them of amplitudes.
     planes, readings
-        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "1", … and "reading 1", ….
+        Names (P) and labels (N), such as "sensor 'B' at 3000 rpm"; default "reading 1", ….
     amplitude, weight
         Write a number with its unit.
     """
     L, M = bounds.residual, bounds.max_weight
-    planes = planes or [str(p + 1) for p in range(len(M))]
     readings = readings or [f"reading {i + 1}" for i in range(len(L))]
     relaxed = smallest_maximum(bounds._replace(residual=L + np.inf), 1 / L)
     factor, best = relaxed.objective, np.abs(bounds.Y + bounds.W @ relaxed.weights)

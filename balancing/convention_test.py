@@ -9,9 +9,9 @@ weights of each plane stand on one line through the shaft.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -69,28 +69,6 @@ class ConventionTest:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class OtherReading:
-    """Weights that the same numbers give if a convention is otherwise.
-
-    Attributes
-    ----------
-    words
-        What is otherwise: "lag", "lag or against" (either of both alone).
-    rows
-        Weights (P) as JSON has them: the angles are those that the job would write.
-    places
-        Where to work, degrees as the job would count them, P.
-    angle_sign
-        +1 where these count with the rotation, −1 against it.
-    """
-
-    words: str
-    rows: list[dict[str, Any]]
-    places: list[float]
-    angle_sign: int
-
-
 def convention_test(trials: Trials) -> ConventionTest:
     """Ask the runs whether phases and angles go together as they were read.
 
@@ -136,10 +114,11 @@ def _refuted(one: float, other: float, dof: int) -> bool:
     return clearly or bool(ratio > FAR and chance(ratio * dof, dof, dof) < UNLIKELY)
 
 
-def assumptions(
-    labels: Labels, test: ConventionTest | None, others: Sequence[OtherReading]
-) -> tuple[str, ...]:
-    """The first sentences of an answer: what is assumed, what the runs say to it, what to do otherwise."""
+def assumptions(labels: Labels, test: ConventionTest | None, others: Iterable[str]) -> tuple[str, ...]:
+    """The first sentences of an answer: what is assumed, what the runs say to it, what to do otherwise.
+
+    `others`: what is otherwise where the same numbers give other weights, such as "lag or against".
+    """
     if not labels.assumed:
         return ()
     words = [labels.assumed_in_words()]
@@ -147,7 +126,7 @@ def assumptions(
         words.append(_WHY[test.verdict])
         if test.chi_square is not None:
             words[-1] += f"{_compared(test, labels)}."
-    words += [f"If it is {o.words}, the weights go to the angles under “if {o.words}”." for o in others]
+    words += [f"If it is {other}, the weights go to the angles under “if {other}”." for other in others]
     return tuple(words)
 
 

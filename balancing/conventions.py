@@ -14,13 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.arrays import polar as polar
-from rotorid.base.text import SPEEDS, vibration_unit_words, weight_unit_words
-from rotorid.base.text import Angles as Angles
-from rotorid.base.text import Phase as Phase
-from rotorid.base.text import Rotation as Rotation
-from rotorid.base.text import View as View
+from rotorid.base.arrays import ComplexArray, FloatArray, polar
+from rotorid.base.text import SPEEDS, Angles, Phase, Rotation, View, vibration_unit_words, weight_unit_words
 
 PHASES = ("lead", "lag")
 ANGLES = ("with rotation", "against rotation")
@@ -195,7 +190,9 @@ class Labels:
         """How angles count, in the word of the job: "with rotation", or "clockwise" seen from `view`."""
         if not self.clock or self.rotation is None:
             return self.angles
-        return self.rotation if self.angle_sign > 0 else opposite(self.rotation)
+        if self.angle_sign > 0:
+            return self.rotation
+        return "counter-clockwise" if self.rotation == "clockwise" else "clockwise"
 
     @property
     def side(self) -> str:
@@ -240,20 +237,16 @@ class Labels:
 
     def conventions(self) -> dict[str, Any]:
         """The conventions in the words of the job file; rotation and view only where they are stated."""
-        stated = {"rotation": self.rotation, "view": self.view}
-        return {
+        words = {
             "phase": self.phase,
             "angles": self.angle_words,
             "vibration_unit": self.vibration_unit,
             "weight_unit": self.weight_unit,
             "assumed": list(self.assumed),
-            **{name: words for name, words in stated.items() if words is not None},
+            "rotation": self.rotation,
+            "view": self.view,
         }
-
-
-def opposite(rotation: Rotation) -> Rotation:
-    """The direction of the same rotation seen from the other end."""
-    return "counter-clockwise" if rotation == "clockwise" else "clockwise"
+        return {name: each for name, each in words.items() if each is not None}
 
 
 def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:

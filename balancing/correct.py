@@ -26,7 +26,7 @@ from balancing.methods import NoErrorsError, Solution, solve
 from balancing.regions import LEVEL
 from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
-from balancing.what_if import DRAWS, check_run_spread
+from balancing.what_if import check_run_spread, todays
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 EMPTY = 1e-7
@@ -93,12 +93,7 @@ def correct(  # noqa: PLR0913
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
-    if not today.has_baseline:
-        raise ValueError(
-            "these influence coefficients are stored ones without a vibration to correct: "
-            "give the readings of a baseline run"
-        )
+    today = todays(influence, baseline)
     grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
     chosen = plane_indices(today, planes if grouped is None else grouped.planes)
     used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
@@ -144,9 +139,11 @@ def correct(  # noqa: PLR0913
     D = fitted.weights
     if kept is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
-    after_covariance, sizes = check_run_spread(part, D)
-    drawn = (fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws(DRAWS))
-    draws = np.concatenate([np.zeros((0, len(D)), dtype=complex), *drawn])
+    drawn = [np.zeros((0, len(D)), dtype=complex)]
+    after_covariance, sizes = check_run_spread(
+        part, D, lambda y, w: drawn.append(fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))))
+    )
+    draws = np.concatenate(drawn)
     result = Correction(
         influence=part,
         weights=D,
@@ -194,28 +191,26 @@ def fit_part(
     strength: float | None = None,
 ) -> tuple[Solution, str]:
     """Weights, and the method that they follow from; least squares where errors are assumed or hardly any."""
-    errors = part.known_errors
-    asked = method or ("weighted" if errors and strength is None else "least-squares")
+    asked = method or ("weighted" if part.known_errors and strength is None else "least-squares")
 
     labels, readings = part.labels, reading_names(part.labels, part.sensors, part.speeds)
     by = partial(
         solve,
         part.W.reshape(part.baseline.size, -1),
         part.baseline.ravel(),
-        channels=part.channels() if errors else None,
-        columns=part.columns() if errors else None,
+        channels=part.channels(),
+        columns=part.columns(),
         row_weights=rows,
         limits=limits,
         strength=strength,
         names=part.planes,
         conflict=partial(
             explain,
-            planes=part.planes,
             readings=readings,
             amplitude=labels.amplitude_words,
             weight=labels.weight_words,
         ),
-        explained=partial(_explained, part) if errors and (rows is None or rows.all()) else None,
+        explained=partial(_explained, part) if rows is None or rows.all() else None,
     )
     try:
         return by(asked), asked

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
-from balancing.convention_test import ConventionTest, OtherReading, assumptions
+from balancing.convention_test import ConventionTest, assumptions
 from balancing.conventions import Labels
 from balancing.prediction import HELD, Prediction
 from balancing.regions import NORMAL_RADIUS
 from balancing.tables import (
-    INVISIBLE,
     ROUNDING,
     covariance_column,
     degrees,
@@ -150,12 +149,13 @@ class Correction(Prediction, Answered):
     convention_test
         What the runs say about the relation of phases to angles; None: they were not asked.
     others
-        What the same numbers give if a convention that is assumed is otherwise.
+        What the same numbers give if a convention that is assumed is otherwise: what is, such as "lag or
+        against" (either of both alone), and the correction then.
     """
 
     decision: MountDecision = field(default_factory=MountDecision)
     convention_test: ConventionTest | None = None
-    others: tuple[OtherReading, ...] = ()
+    others: tuple[tuple[str, Correction], ...] = ()
 
     @classmethod
     def of(cls, result: Correction, **more: Any) -> Self:  # noqa: ANN401
@@ -173,6 +173,11 @@ class Correction(Prediction, Answered):
         return (*self.contradictions, *self.influence.remarks.warnings, *self.decision.warnings)
 
     @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Sentences on the conventions that are assumed."""
+        return assumptions(self.labels, self.convention_test, dict(self.others))
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Further remarks for the user, none of them a warning."""
         return (*self.influence.remarks.notes, *self.decision.notes)
@@ -186,7 +191,9 @@ class Correction(Prediction, Answered):
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
         scale = self.labels.vibration_scale
         old = np.abs(self.before) * scale
-        residuals = self._residual_columns()
+        covariance = self.after_covariance if self.errors_known else None
+        last = covariance_column(self.labels, "after_covariance", covariance, old.size)
+        residuals = (*self.vibration_columns(ROUNDING), last)
         new = np.array(residuals[4].values)
         run, planes, weights = self.mounted
         there = bool(weights.any())
@@ -218,8 +225,8 @@ class Correction(Prediction, Answered):
                 "limits_that_bind": self.active,
                 "errors": error_document(self.influence.reading, self.influence.run_errors, self.labels),
                 "convention_test": None if self.convention_test is None else asdict(self.convention_test),
-                "other_readings": [row for other in self.others for row in other.rows],
-                "assumptions": assumptions(self.labels, self.convention_test, self.others),
+                "other_readings": [row for words, other in self.others for row in other._rows_if(words)],
+                "assumptions": self.assumptions,
                 "warnings": self.warnings,
                 "notes": self.notes,
             }
@@ -235,15 +242,15 @@ class Correction(Prediction, Answered):
         if not self.remove:
             return frame((plane, mass, unit, angle, *numbers))
         work = replace(angle, values=self.places(self.planes, self.weights))
-        return frame((plane, action, mass, unit, work, *numbers, replace(angle, heading="equivalent_added_deg")))
+        return frame(
+            (plane, action, mass, unit, work, *numbers, replace(angle, heading="equivalent_added_deg"))
+        )
 
-    def otherwise(self, words: str) -> OtherReading:
-        """What a correction under other conventions notes of this one; in words, what is otherwise in it."""
-        labels, planes = self.labels, self.planes
-        head = {"if": words, "phase": labels.phase, "angles": labels.angle_words}
-        *columns, _, at = self.work_columns(planes, self.weights)
-        each = [head | row for row in records((*columns, at))]
-        return OtherReading(words, each, self.places(planes, self.weights).tolist(), labels.angle_sign)
+    def _rows_if(self, words: str) -> list[dict[str, Any]]:
+        """Weights under other conventions; in words, what is otherwise."""
+        head = {"if": words, "phase": self.labels.phase, "angles": self.labels.angle_words}
+        *columns, _, at = self.work_columns(self.planes, self.weights)
+        return [head | row for row in records((*columns, at))]
 
     def _weight_columns(self) -> tuple[Column, ...]:
         P = len(self.planes)
@@ -258,11 +265,6 @@ class Correction(Prediction, Answered):
             at,
         )
 
-    def _residual_columns(self) -> tuple[Column, ...]:
-        covariance = self.after_covariance if self.errors_known else None
-        last = covariance_column(self.labels, "after_covariance", covariance, self.before.size)
-        return (*self.vibration_columns(ROUNDING), last)
-
     def sentence(self) -> str:
         """Whether to mount what, what is determined, and what a check run will read."""
         labels = self.labels
@@ -270,8 +272,7 @@ class Correction(Prediction, Answered):
             first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
             first += self.decision.lines()
             if self.decision.word == "determined in part":
-                first.insert(len(self.contradictions) + 1, f"With these weights: {self._left()}.")
-                first += self.decision.elsewhere
+                first += [f"With these weights: {self._left()}.", *self.decision.elsewhere]
             return "\n".join(first)
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
@@ -287,7 +288,7 @@ class Correction(Prediction, Answered):
         first, test, predicted = self.sentence(), self.convention_test, self._left()
         warnings = list(self.warnings[len(self.contradictions) :])
         notes = list(self.notes)
-        if assumed := " ".join(assumptions(self.labels, test, self.others)):
+        if assumed := " ".join(self.assumptions):
             (notes if test is not None and test.verdict == "confirmed" else warnings).insert(0, assumed)
         largest = largest_readings(
             self.labels, self.speeds, self.sensors, self.before, self.after, self.within
@@ -324,8 +325,7 @@ class Correction(Prediction, Answered):
 
     def in_words(self) -> str:
         """Weights and their 95 %, in a line."""
-        places = map(degrees, self.places(self.planes, self.weights))
-        each = zip(self.planes, self._sizes()[0].texts, *self._widths(), places, strict=True)
+        each = zip(self.planes, self._sizes()[0].texts, *self._widths(), self._places(self), strict=True)
         words = (f"{plane} {size} {width} at {place} {turn}" for plane, size, width, turn, place in each)
         return ", ".join(" ".join(one.split()) for one in words)
 
@@ -333,25 +333,23 @@ class Correction(Prediction, Answered):
         """Weights and their 95 %, in each plane; under other conventions, and beside what is mounted."""
         labels, sizes, removed = self.labels, self._sizes(), [plane in self.remove for plane in self.planes]
         actions = [Column("", ["(remove)" if away else "(add)" for away in removed])] if any(removed) else []
-        work = [self._place(at, labels.angle_sign) for at in self.places(self.planes, self.weights)]
-        columns = [Column("plane", self.planes), *actions, *sizes, Column("angle", work)]
+        columns = [Column("plane", self.planes), *actions, *sizes, Column("angle", self._places(self))]
         if self.region_known:
             widths, turns = self._widths(sizes[0].title or "")
             columns += [Column("95 %", widths), Column("", turns)]
-        for other in self.others:  # the mass where that is another than the one shown
-            places = [self._place(at, other.angle_sign) for at in other.places]
-            masses = [figures(row["mass"]) for row in other.rows]
+        for words, other in self.others:  # the mass where that is another than the one shown
+            both = (map(figures, one[0].values) for one in (other._sizes(), sizes))
             cells = [
-                place if size == figures(here) else f"{size} at {place}"
-                for size, place, here in zip(masses, places, sizes[0].values, strict=True)
+                place if size == here else f"{size} at {place}"
+                for size, here, place in zip(*both, self._places(other), strict=True)
             ]
-            columns.append(Column(f"if {other.words}", cells))
+            columns.append(Column(f"if {words}", cells))
         taken = f" ({' and '.join(labels.assumed)} assumed)" if labels.assumed else ""
         lines = [f"{capital(self._counting)}; phases as {labels.phase}{taken}; weights for the bare rotor."]
         if self.mounted.weights.any():
             run, planes, _ = self.mounted
-            sizes, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
-            each = zip(planes, sizes, places, strict=True)
+            masses, places = labels.weight(self.to_add)[0], map(degrees, self.places(planes, self.to_add))
+            each = zip(planes, masses, places, strict=True)
             stays = {name: f"{figures(size)} at {place}" for name, size, place in each if size}
             cells = [stays.pop(name, "nothing") for name in self.planes]
             word = "remove" if all(removed) else "add"
@@ -365,9 +363,9 @@ class Correction(Prediction, Answered):
         """Sizes of the weights, first in the unit of their errors."""
         return weight_columns(self.labels, self.planes, self.weights)[1:2]
 
-    def _place(self, angle: float, _sign: int) -> str:
-        """Where to work, of degrees that count with the rotation (sign 1) or against it (−1)."""
-        return degrees(angle)
+    def _places(self, of: Correction) -> list[str]:
+        """Where to work by a correction, this one or one under other conventions."""
+        return list(map(degrees, of.places(of.planes, of.weights)))
 
     @property
     def _counting(self) -> str:
@@ -389,7 +387,7 @@ class Correction(Prediction, Answered):
         return fill(f"In parts, {self.labels.weight_in}: {parts.in_words()}{how}.", WIDTH)
 
     def _vibration_text(self) -> str:
-        columns = list(self.vibration_columns(INVISIBLE))
+        columns = list(self.vibration_columns())
         if self.errors_known:
             columns.append(Column("95 % within", self.within.ravel(), lambda width: f"± {figures(width, 2)}"))
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""

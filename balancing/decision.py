@@ -27,7 +27,7 @@ from balancing.conditioning import CLEAR, REMEDY, acting_alike
 from balancing.correction import Choice, Correction, MountDecision
 from balancing.influence import in_order
 from balancing.prediction import shown
-from balancing.tables import rms
+from balancing.tables import reading_names, rms
 from balancing.what_if import worse_elsewhere
 from rotorid.base.text import capital, listing
 from rotorid.regression import solution
@@ -57,7 +57,6 @@ _MORE = 1 + 1e-6
 """Above a limit by more than rounding."""
 
 
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """What a correction is made of: its coefficients, those of all speeds and planes, what it must keep to.
@@ -83,7 +82,7 @@ class Case:
     @property
     def W(self) -> ComplexArray:
         """Coefficients, (N, P)."""
-        return np.asarray(self.part.W.reshape(-1, len(self.names)))
+        return self.part.W.reshape(-1, len(self.names))
 
     @cached_property
     def forms(self) -> tuple[ComplexArray, ComplexArray]:
@@ -104,7 +103,7 @@ class Case:
     @property
     def effect(self) -> FloatArray:
         """Root mean square effect of a unit weight in each plane, (P,)."""
-        return np.asarray(np.sqrt(np.diag(self.forms[0]).real[1:]))
+        return np.sqrt(np.diag(self.forms[0]).real[1:])
 
     @property
     def clearness(self) -> FloatArray:
@@ -200,10 +199,9 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
         cause = result.combination or unclear.removesuffix(REMEDY)
         if cause and some:
             made = replace(made, word="determined in part", cause=cause, instead=remedies(case))
-        chosen = [case.today.planes.index(plane) for plane in case.names]
-        today = case.today.part(range(len(case.today.speeds)), None, chosen)
-        elsewhere = worse_elsewhere(today, D, result.speeds)
-        warnings = (*made.warnings, *(() if elsewhere else _over_limit(result, case.today, limits)))
+        there = case.today, in_order(D, case.names, case.today.planes), result.speeds
+        elsewhere = worse_elsewhere(*there)
+        warnings = (*made.warnings, *(() if elsewhere else _over_limit(*there, limits)))
         return replace(made, warnings=warnings, notes=case.coarse, elsewhere=elsewhere)
     promised = case.shown(whole.rms) if whole.rms > 1e-6 * before else "0"
     outlook = (
@@ -217,8 +215,8 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
             cause="; ".join((*contradictions, outlook)),
             instead=("Instead: mend the table, or measure these runs again until they agree.",),
         )
-    causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
-    causes = causes if sound else _causes(result, case)
+    certain = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
+    causes = certain if sound else _causes(result, case)
     determined = [f"{capital(result.combination)}."] if result.combination else []
     instead = (*determined, *remedies(case))
     return replace(made, word="do not mount", cause="; ".join((*causes, outlook)), instead=instead)
@@ -326,15 +324,16 @@ def _contradicted(result: Correction) -> tuple[str, ...]:
     )
 
 
-def _over_limit(result: Correction, today: Influence, limits: Limits | None) -> tuple[str, ...]:
-    """The reading that passes its limit by most at speeds that were left out."""
-    planes = [today.planes.index(plane) for plane in result.planes]
-    new = np.abs(today.baseline + today.W[..., planes] @ result.weights)
-    most = np.inf if limits is None else limits.residual * _MORE
-    over = np.where(np.isin(today.speeds, result.speeds)[:, None], 0.0, new - most)
-    s, c = divmod(int(np.argmax(over)), len(today.sensors))
-    if over[s, c] <= 0:
+def _over_limit(
+    today: Influence, weights: ComplexArray, used: FloatArray, limits: Limits | None
+) -> tuple[str, ...]:
+    """The largest reading that passes its limit with weights (P,) at speeds that were left out."""
+    if limits is None:
         return ()
-    name, size = f"sensor {today.sensors[c]!r}", today.labels.amplitude_words(new[s, c])
-    at = today.labels.speed_words(today.speeds[s])
-    return (f"the vibration of {name} at {at} is predicted to pass its limit: {size}",)
+    new = np.abs(today.baseline + today.W @ weights)
+    left_out = ~np.isin(today.speeds, used)[:, None]
+    over = (left_out * (new > limits.residual * _MORE) * new).ravel()
+    worst, names = int(np.argmax(over)), reading_names(today.labels, today.sensors, today.speeds)
+    size = today.labels.amplitude_words(over[worst])
+    words = f"the vibration of {names[worst]} is predicted to pass its limit: {size}"
+    return (words,) if over.any() else ()

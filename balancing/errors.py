@@ -140,31 +140,26 @@ def reading_of(trials: Trials) -> Reading:
     """
     stated, scatter = trials.with_phases().errors, _scatter(trials)
     ratio, dof = _against_repeats(trials)
+    scattered, enlarged = f"repeated readings scatter {ratio:.2g} times as much as the ", ratio > 1.0
     if stated is None:
         estimate = _from_repeats(*scatter)
         if trials.covariance is None:
             return estimate
-        if ratio == 1.0:
+        if not enlarged:
             variance = np.nanmean(trials.covariance[[0, 1], [0, 1]])
             return Reading(ReadingErrors(floor=float(np.sqrt(variance))), "measured")
-        words = f"repeated readings scatter {ratio:.2g} times as much as the measured standard deviations: "
-        return estimate._replace(warnings=(words + "their scatter was added", *estimate.warnings))
+        words = f"{scattered}measured standard deviations: their scatter was added"
+        return estimate._replace(warnings=(words, *estimate.warnings))
     sizes = {"amplitude": stated.amplitude * ratio, "phase": stated.phase * ratio}
-    warnings: list[str] = []
-    if ratio > 1.0:
-        warnings.append(
-            f"repeated readings scatter {ratio:.2g} times as much as the stated errors: "
-            "the errors were enlarged accordingly"
-        )
-    degrees = dof if ratio > 1.0 else np.inf
+    warnings = (f"{scattered}stated errors: the errors were enlarged accordingly",) if enlarged else ()
+    degrees = dof if enlarged else np.inf
     if stated.floor == 0:
         # an error that was left out is not zero if the repeats show it
         for kind, size in zip(sizes, scatter, strict=False):
             if not sizes[kind] and size > ROUNDING:
                 sizes[kind], degrees = size, min(scatter[2], degrees)
     source: Source = "stated" if degrees == np.inf else "stated, enlarged by repeats"
-    errors = ReadingErrors(**sizes, floor=stated.floor * ratio)
-    return Reading(errors, source, tuple(warnings), degrees)
+    return Reading(ReadingErrors(**sizes, floor=stated.floor * ratio), source, warnings, degrees)
 
 
 def _from_repeats(radial: float, tangential: float, dof: int) -> Reading:
@@ -236,7 +231,7 @@ class RunErrors:
         """One set of sizes (4,): variances averaged by their precision, so that large ones do not decide."""
         total = np.sum(self.sizes**2, axis=1)
         if not total.all():
-            return np.asarray(np.sqrt(self.probability @ self.sizes**2))
+            return np.sqrt(self.probability @ self.sizes**2)
         precision = self.probability / total
         return np.asarray(np.sqrt(precision @ self.sizes**2 / precision.sum()))
 
@@ -252,7 +247,7 @@ def rms(values: ArrayLike) -> float:
 def unbalances(W: ComplexArray, size: float) -> ComplexArray:
     """Readings by one unbalance in each plane, of equal effect, together of mean square size², (S, C, P)."""
     mean = np.sqrt(np.mean(np.abs(W) ** 2, axis=(0, 1)) * W.shape[-1])
-    return np.asarray(W * (size / np.where(mean > 0, mean, np.inf)))
+    return W * (size / np.where(mean > 0, mean, np.inf))
 
 
 def own_variance(readings: ComplexArray, evenly: float) -> FloatArray:
@@ -318,21 +313,20 @@ def blocks(trials: Trials, theta: ComplexArray, covariance: FloatArray) -> list[
         Of the readings, by their errors alone, (R, S, C, 2, 2).
     """
     A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
-    (R, n), N = A.shape, theta[..., 0].size
+    n, N = A.shape[1], theta[..., 0].size
     at = np.linspace(0, N - 1, min(N, MOST)).round().astype(np.int64)
+    s, c = np.unravel_index(at, theta.shape[:2])
 
-    W = theta.reshape(N, n)[at, 1:]
-    further = unbalances(theta[..., 1:], rms(trials.mean)).reshape(N, -1)[at].T
-    others = job_columns(trials, theta[..., 1:]).reshape(-1, R, N)[..., at]
+    W, further = theta[s, c, 1:], unbalances(theta[..., 1:], rms(trials.mean))[s, c].T
+    others = job_columns(trials, theta[..., 1:])[..., s, c]
     # as the coefficients say: what each run errs by would explain itself
     whole = np.einsum("rp,scp->rsc", A, theta)
     each = (trials.mean, whole, whole - theta[..., 0])
-    Y, fitted, effect = (part.reshape(R, N)[:, at] for part in each)
     variances = (own_variance(whole, 1.0), own_variance(whole, 0.0), mean_variance(covariance))
-    even, uneven, variance = (part.reshape(R, N)[:, at] for part in variances)
+    Y, fitted, effect, even, uneven, variance = (part[:, s, c] for part in (*each, *variances))
 
     def alike(rows: ComplexArray) -> ComplexArray:
-        return np.asarray(rows.T @ rows.conj())
+        return rows.T @ rows.conj()
 
     def block(m: ComplexArray, free: ComplexArray) -> Block:
         share = np.abs(m) ** 2
@@ -477,7 +471,10 @@ def unseen(run: RunErrors) -> tuple[str, ...]:
     """A note about what no run measures."""
     if run.origin not in ("assumed", "none"):
         return ()
-    taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
+    taken = "none are stated, and the ± are smaller, those of readings alone"
+    if run.origin == "assumed":
+        whole = 100 * np.linalg.norm(run.typical)
+        taken = f"{100 * ASSUMED_RUN:g} % are assumed of each of three kinds, {whole:.2g} % in all"
     return (
         f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more baseline "
         "run at the end, or one more trial run, would measure them; repeated readings do not",

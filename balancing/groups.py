@@ -112,9 +112,10 @@ class Unknowns(NamedTuple):
         planes = tuple(dict.fromkeys((*self.planes, *trials.planes)))
         weights = np.zeros((len(trials.runs), len(planes)), dtype=complex)
         weights[:, [planes.index(plane) for plane in trials.planes]] = trials.weights
-        q = weights[:, : len(self.planes)] @ self.inverse.T
-        made = np.pad(q @ self.shares.T, ((0, 0), (0, len(planes) - len(self.planes))))
-        beside = float(norm(weights - made) / (norm(weights) or 1.0))
+        inside = weights[:, : len(self.planes)]
+        q = inside @ self.inverse.T
+        inside -= q @ self.shares.T
+        beside = float(norm(weights) / (norm(trials.weights) or 1.0))
         if beside > max(allowed, ROUNDING):
             raise ValueError(
                 f"{percent(beside)} % of what is mounted is beside {listing(map(repr, self.names), 'and')}, "
@@ -132,10 +133,10 @@ def held(groups: Groups, names: Sequence[str]) -> Unknowns | None:
         As of `unknowns`.
     """
     try:
-        of = unknowns(groups, names) if set(names) & set(groups) else None
-    except ValueError:  # more than the planes need
+        of = unknowns(groups, names)
+    except ValueError:  # none, or more than the planes need
         return None
-    return of if of is not None and of.constrained else None
+    return of if of.constrained else None
 
 
 def members(groups: Groups, names: Sequence[str]) -> tuple[str, ...]:
@@ -153,9 +154,14 @@ def in_planes(trials: Trials, groups: Groups) -> Trials:
     groups
         As of `unknowns`.
     """
-    planes, columns = members(groups, trials.planes), [groups.get(n, {n: 1.0}) for n in trials.planes]
-    shares = np.array([[column.get(plane, 0.0) for plane in planes] for column in columns])
-    return replace(trials, planes=planes, weights=trials.weights @ shares) if columns else trials
+    planes = members(groups, trials.planes)
+    return replace(trials, planes=planes, weights=trials.weights @ _shares(groups, trials.planes, planes).T)
+
+
+def _shares(groups: Groups, names: Sequence[str], planes: Sequence[str]) -> ComplexArray:
+    """What groups and planes put into planes, (P, U)."""
+    each = [[groups.get(name, {name: 1.0}).get(plane, 0.0) for name in names] for plane in planes]
+    return np.reshape(np.array(each, dtype=complex), (len(planes), len(names)))
 
 
 def unknowns(groups: Groups, names: Sequence[str], planes: Sequence[str] | None = None) -> Unknowns:
@@ -175,15 +181,15 @@ def unknowns(groups: Groups, names: Sequence[str], planes: Sequence[str] | None 
     ValueError
         For a name or a plane of a group that is not there, and for unknowns that depend on each other.
     """
-    columns, inside = [groups.get(name, {name: 1.0}) for name in names], members(groups, names)
+    inside = members(groups, names)
     there = tuple(planes or inside)
     if lost := next((plane for plane in inside if plane not in there), None):
-        of = next(name for name, column in zip(names, columns, strict=True) if lost in column)
+        of = next(name for name in names if lost in members(groups, [name]))
         what = f"in the group {of!r}" if of in groups else f"nor a group{did_you_mean(of, [*there, *groups])}"
         raise ValueError(f"there is no plane {lost!r}, {what}; the planes are {', '.join(map(repr, there))}")
     order = tuple(plane for plane in there if plane in inside)
-    shares = np.array([[column.get(plane, 0.0) for column in columns] for plane in order], dtype=complex)
-    if len(set(names)) < len(names) or np.linalg.matrix_rank(shares) < len(names):
+    shares = _shares(groups, names, order)
+    if np.linalg.matrix_rank(shares) < len(names):
         several = listing(map(repr, names), "and")
         raise ValueError(f"{several} are too many for planes {', '.join(map(repr, order))}: leave one out")
     return Unknowns(tuple(names), order, shares)

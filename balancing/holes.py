@@ -56,7 +56,7 @@ class Holes:
     @property
     def free(self) -> BoolArray:
         """Holes that can be used, shape (H,)."""
-        return np.asarray(self.taken <= 0)
+        return self.taken <= 0
 
     @property
     def free_amounts(self) -> bool:

@@ -175,10 +175,14 @@ class Influence:
         ------
         (B, S, C), blocks of the same lengths as those of `draws`.
         """
+        noise = self._of_runs(self._run(readings, weights), np.eye(1))
+        return (error[..., 0] for error in self.noise_draws(noise, count))
+
+    def _run(self, readings: ArrayLike, weights: ComplexArray) -> Trials:
+        """One run with readings (S, C) and weights (P,), mounted as those of the trial runs."""
+        names = ("baseline",), self.speeds, self.sensors, self.planes
         placement = Placement() if self.trials is None else self.trials.placement
-        names = ("run",), self.speeds, self.sensors, self.planes
-        run = Trials(*names, readings[None], weights[None], placement=placement)
-        return (error[..., 0] for error in self.noise_draws(self._of_runs(run, np.eye(1)), count))
+        return Trials(*names, np.array([readings]), weights[None], labels=self.labels, placement=placement)
 
     def difference_noise(self, check: Trials) -> Noise:
         """How readings of runs err against Y₀ + W T: `blocks` (2, S, C, 2R, 2R), `columns` (M, S, C, R).
@@ -253,9 +257,7 @@ class Influence:
         """
         P = len(self.planes)
         if not isinstance(baseline, Trials):
-            names = ("baseline",), self.speeds, self.sensors, self.planes
-            nothing = np.zeros((1, P), dtype=complex)
-            baseline = Trials(*names, np.array([baseline]), nothing, labels=self.labels)
+            baseline = self._run(baseline, np.zeros(P, dtype=complex))
         local = local_runs(self, baseline)
         weights, (R, *_) = local.weights, local.mean.shape
         bare = local.mean - np.einsum("scp,rp->rsc", self.W, weights)

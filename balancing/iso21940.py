@@ -217,7 +217,7 @@ def tolerance(
     '3979 g·mm, 7.96 µm'
     """
     named = dict(planes or {})
-    given = np.array([np.nan if z is None else z for z in named.values()], dtype=np.float64)
+    given = np.array([*named.values()], dtype=np.float64)  # None becomes NaN
     positions = given[np.isfinite(given)]
     placed, two = len(positions) == len(named) > 0, len(positions) == 2
     ends = np.array(positions if bearings is None and two else bearings or (), dtype=np.float64)
@@ -239,12 +239,9 @@ def tolerance(
             "with the positions of the bearings, give those of the planes, too",
         ),
         (
-            centre is None or len(ends),
-            "the position of the centre of mass says nothing without those of bearings or two planes",
-        ),
-        (
-            centre is not None or not len(ends),
-            "the share of each plane needs the position of the centre of mass: give that, too",
+            (centre is None) == (not len(ends)),
+            "the share of each plane needs the position of the centre of mass, and that the positions of the "
+            "bearings or of two planes: give both, or neither",
         ),
     ):
         if not right:

@@ -46,7 +46,7 @@ from balancing.cones import (
     smallest_maximum,
     within,
 )
-from balancing.regions import real_parts
+from balancing.regions import LEVEL, real_parts
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
@@ -56,12 +56,12 @@ from rotorid.regression import covariance_root, solution, stretch, unstretch
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
 
-UNEXPLAINED = 0.95
-"""Level of the χ² test beyond which the residuals are larger than the errors explain."""
 FLOOR = 1e-4
 """Every residual of the weighted fit gets a further error of this share of the rms error of all."""
 LEAST_INFORMATION = 0.2
 """Share of M that is left to A in any direction."""
+STEPS, CLOSE = 500, 1e-10
+"""Of the search for the weighted weights: at most so many, until one is so short."""
 SETTLED = 1e-6
 """Share of 1 + Q by which the next step would lower Q, at a minimum."""
 DRAWN = 1e-6
@@ -167,7 +167,7 @@ def solve(  # noqa: PLR0913
     channels: FloatArray | None = None,
     columns: ComplexArray | None = None,
     names: Sequence[str] | None = None,
-    conflict: Callable[[Bounds], str] = explain,
+    conflict: Callable[[Bounds, Sequence[str]], str] = explain,
     explained: Explained | None = None,
 ) -> Solution:
     """Weights D that make Y + W D small, within limits, and how to solve the same problem for redrawn data.
@@ -234,13 +234,19 @@ def solve(  # noqa: PLR0913
                 f"a ridge has a strength above 0, such as 0.05 (got {strength!r}), and goes with least "
                 "squares without limits only"
             )
-        return job.fitted(_normal(K, y, w, strength), lambda W, _: np.nan * W[:, 0])
+        A = w[:, None] * K
+        size = norm(A, axis=0) + TINY
+        short = strength * norm(A / size, 2) * np.diag(size)
+        D = -solution(np.vstack((A, short)), np.append(w * y, np.zeros(P)))
+        return job.fitted(D, lambda W, _: np.nan * W[:, 0])
     if () in bounds.sectors:
-        raise ValueError(f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out")
+        raise ValueError(
+            f"forbidden arcs leave plane {planes[bounds.sectors.index(())]!r} no angle: leave it out"
+        )
     try:
         return function(job)
     except InfeasibleError:
-        raise InfeasibleError(conflict(bounds)) from None
+        raise InfeasibleError(conflict(bounds, planes)) from None
 
 
 def _closed_form(job: Job) -> ComplexArray:
@@ -261,24 +267,15 @@ def _fit_plain(job: Job) -> Solution:
         return nearest(bounds, target, root, left, tolerance)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
-        return _within_limits(job.bounds, W, Y, _normal(W, Y, job.w), again, always=minmax)
+        A = job.w[:, None] * W
+        adjoint = np.conj(np.swapaxes(A, -1, -2))
+        drawn = -np.linalg.solve(adjoint @ A, adjoint @ (job.w * Y)[..., None])[..., 0]
+        return _within_limits(job.bounds, W, Y, np.asarray(drawn, dtype=complex), again, always=minmax)
 
     if not minmax and within(job.bounds, best):
         return job.fitted(best, resolve)
     optimum = again(job.bounds, best, TOLERANCE)
     return job.fitted(optimum.weights, resolve, gap=optimum.gap)
-
-
-def _normal(W: ComplexArray, Y: ComplexArray, w: FloatArray, strength: float = 0.0) -> ComplexArray:
-    """Least squares or ridge of W (…, N, P) and Y (…, N) by normal equations of scaled columns."""
-    A = w[:, None] * W
-    size = np.maximum(np.linalg.norm(A, axis=-2, keepdims=True), TINY)
-    A = A / size
-    adjoint = np.conj(np.swapaxes(A, -1, -2))
-    square = adjoint @ A
-    if strength:
-        square = square + strength**2 * np.linalg.norm(square, 2) * np.eye(len(square))
-    return np.asarray(-np.linalg.solve(square, adjoint @ (w * Y)[..., None])[..., 0] / size[..., 0, :])
 
 
 def _within_limits(
@@ -336,22 +333,22 @@ class _Errors(NamedTuple):
         return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
-        """Weights at which Q is smallest, sought from some start."""
-        from scipy.optimize import least_squares
-
-        for method in ("lm", "trf"):  # the first is fast, the second does not lose its way
-            end = least_squares(
-                lambda d: self.at(unstretch(d)).r,
-                stretch(start),
-                lambda d: self.at(unstretch(d)).rows,
-                method=method,
-                x_scale="jac",
-                xtol=1e-12,
-                ftol=1e-15,
-                max_nfev=500,
-            )
-            if end.fun @ end.jac @ solution(end.jac, end.fun) <= SETTLED * (1 + 2 * end.cost):
-                return unstretch(end.x)
+        """Weights at which Q is smallest, sought from some start by steps of Levenberg and Marquardt."""
+        D, damping = start, 1e-3
+        state = self.at(D)
+        for _ in range(STEPS):
+            J, sizes = state.rows, np.linalg.norm(state.rows, axis=0)
+            damped = np.vstack((J, np.sqrt(damping) * np.diag(sizes)))
+            step = -solution(damped, np.append(state.r, np.zeros(len(sizes))))
+            tried = self.at(D + unstretch(step))
+            shorter = tried.r @ tried.r <= state.r @ state.r
+            if shorter:
+                D, state = D + unstretch(step), tried
+            damping *= 0.1 if shorter else 10.0
+            if np.linalg.norm(sizes * step) <= CLOSE * np.linalg.norm(sizes * stretch(D)):
+                break
+        if state.r @ state.rows @ solution(state.rows, state.r) <= SETTLED * (1 + state.r @ state.r):
+            return D
         raise UndeterminedError(
             "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
             "bound; use larger trial weights, fewer planes or another method"
@@ -421,7 +418,7 @@ def _fit_weighted(job: Job) -> Solution:
         return wider(share).chi_square(D, common)
 
     chi, share = least(0.0), 0.0
-    explained = job.explained or (lambda _: chance(chi, dof) >= 1 - UNEXPLAINED)
+    explained = job.explained or (lambda _: chance(chi, dof) >= 1 - LEVEL)
     if chi > dof > 0 and not explained(D):
         D = start
         before, share = 0.0, chi / dof - 1
@@ -439,14 +436,14 @@ def _fit_weighted(job: Job) -> Solution:
     root = np.linalg.cholesky(np.linalg.inv(inverse)).T
     rows = at.rows.reshape(len(at.white), 2, -1)
     gradient = np.moveaxis(wide.w[:, None, None] * (np.swapaxes(at.white, 1, 2) @ rows), -1, 0)
-    gain = inverse @ gradient.reshape(len(inverse), -1)
+    response = inverse @ gradient.reshape(len(inverse), -1)
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
-        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ gain.T
+        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ response.T
         others = np.roll(step - step.mean(axis=0), 1, axis=0)[..., None]
         others *= norm(D) / np.fmax(norm(others, axis=1, keepdims=True), norm(D))
-        drawn = D + unstretch(step - (gain @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
+        drawn = D + unstretch(step - (response @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 

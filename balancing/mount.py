@@ -217,7 +217,7 @@ def mount(
     W, Y = c.influence.W.reshape(-1, len(planes)), c.before
     mounted = c.mounted.weights * on_top
     there = in_order(mounted, c.mounted.planes, planes)
-    unnamed = [p for p, w in zip(planes, there, strict=True) if w and each[p] and not each[p].taken.any()]
+    unnamed = [p for (p, h), w in zip(each.items(), there, strict=True) if w and h and not h.taken.any()]
     if unnamed:
         raise ValueError(
             f"the holes in which weights of run {c.mounted.run!r} stand are not named, and must stay "
@@ -240,7 +240,7 @@ def mount(
     discrete = solve_discrete(
         *rows,
         each,
-        _enough(c, Y, bound, PIECES * norm(wanted) if together else np.inf, wanted),
+        _enough(c, Y, bound, PIECES * float(norm(wanted)) if together else np.inf, wanted),
         wanted=wanted,
         method="minmax" if c.method == "minmax" and not together else "least-squares",
         row_weights=counts,
@@ -295,7 +295,7 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
             continue
         for h, vector, words in contents(holes, mounting, labels.weight_scale):
             places.append((plane, holes.names[h], vector, "" if holes.free_amounts else words))
-    planes, weights = ([place[k] for place in places] for k in (0, 2))
+    planes, weights = [place[0] for place in places], np.array([place[2] for place in places])
     _, mass, unit, _, action, _ = c.work_columns(planes, weights)
     return (
         Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),

@@ -128,6 +128,9 @@ class PlaneVectors:
             # holes 60°, 120° and 180° apart add up or cancel: the list of a half with both is shorter
             turned = np.round(np.mod(holes.angles[where] + 1e-7, np.pi / 3), 5)
             self.parts = [where[np.argsort(turned, kind="stable")]]
+        # amounts of any size in holes all around, and no largest weight
+        free = holes.free_amounts and not holes.step and np.isinf(max_weight)
+        self.any_weight = free and all(len(pair) == 2 for pair in self.parts)
         self.contents = _contents(len(self.sizes), steps)
         self.stock = np.full(len(self.sizes), self.most) if holes.stock is None else holes.stock
         self.reach = self.most * float(self.sizes.max())
@@ -210,7 +213,6 @@ class PlaneVectors:
         ]
         return Vectors(d[order], _number(used[order]) * (not self.holes.free_amounts), put[order])
 
-
     def listed(self, z: complex) -> Vectors:
         """Vectors near a point, of every number of pieces, for `around`."""
         from scipy.spatial import cKDTree
@@ -238,20 +240,13 @@ class PlaneVectors:
         there = rows < self.tree.n
         return rows[there], np.broadcast_to(of[:, None], rows.shape)[there]
 
-    @property
-    def any_weight(self) -> bool:
-        """Whether any vector can be made: amounts of any size in holes all around, and no largest weight."""
-        around = all(len(pair) == 2 for pair in self.parts)
-        return self.holes.free_amounts and not self.holes.step and around and np.isinf(self.max_weight)
-
     def place(self, z: complex) -> Mounting:
         """Amounts of any size that make z."""
         return mounting(self.holes, lightest(self.holes, self.usable, z, np.inf)[:, None], np.ones(1))
 
 
-
 def _number(used: FloatArray) -> FloatArray:
-    return np.asarray(used @ np.ones(used.shape[1]))
+    return used @ np.ones(used.shape[1])
 
 
 def _points(d: ComplexArray, height: FloatArray) -> FloatArray:

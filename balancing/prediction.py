@@ -90,7 +90,7 @@ class Outlook:
     @property
     def after(self) -> ComplexArray:
         """Its prediction with the corrections mounted, (S, C)."""
-        return np.asarray(self.before + self.influence.W @ self.weights)
+        return self.before + self.influence.W @ self.weights
 
     @property
     def errors_known(self) -> bool:
@@ -100,7 +100,7 @@ class Outlook:
     def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
         """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
         turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
-        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
+        return (self.labels.weight(weights)[1] + turn) % 360
 
     def work_words(self, planes: Sequence[str], weights: ComplexArray) -> list[str]:
         """What to add to each plane, or to take away from it, where it is something."""
@@ -239,9 +239,9 @@ class Prediction(Outlook):
         if len(self.planes) != 2 or self.told_apart:
             return ""
         v = apart.directions[:, 0].conj() * apart.lengths
-        ratio = v[1] / v[0]
-        static = bool(abs(ratio - 1) < STATIC)
-        ways = np.array([[1, 0.5], [1, -0.5]]) if static else np.array([[1, 0.5], [ratio, -0.5 * ratio]])
+        static = abs(v[1] / v[0] - 1) < STATIC
+        ratio = 1.0 if static else v[1] / v[0]
+        ways = np.array([[1, 0.5], [ratio, -0.5 * ratio]])
         both, widths = self.weights @ ways, half_width((self.draws - self.weights) @ ways)
         if abs(both[1]) > widths[1]:
             return ""
@@ -272,23 +272,24 @@ class Prediction(Outlook):
         weights = zip(self.planes, map(labels.weight_words, limits.max_weight), strict=True)
         names = reading_names(labels, self.sensors, self.speeds)
         readings = zip(names, map(labels.amplitude_words, limits.residual.ravel()), strict=True)
-        at = np.exp(-1j * np.angle(self.weights))
-        ends = [
-            bool(D)
-            and any(np.abs(np.angle(u * np.exp([1j * a, 1j * (a + w)]))).min() < 1e-6 for a, w in arcs)
-            for D, u, arcs in zip(self.weights, at, limits.forbidden, strict=True)
+        at_end = [
+            D != 0 and any(abs(np.angle(D * np.exp(-1j * end))) < 1e-6 for a, w in arcs for end in (a, a + w))
+            for D, arcs in zip(self.weights, limits.forbidden, strict=True)
         ]
         heavy, high = compress(weights, fitted.active_weights), compress(readings, fitted.active_residuals)
         return (
             *(f"plane {name!r} has its largest weight, {most}" for name, most in heavy),
             *(f"{name} has its largest amplitude, {most}" for name, most in high),
-            *(f"plane {name!r} stands at the end of a forbidden arc" for name in compress(self.planes, ends)),
+            *(
+                f"plane {name!r} stands at the end of a forbidden arc"
+                for name in compress(self.planes, at_end)
+            ),
         )
 
     @property
     def held(self) -> BoolArray:
         """Which weights (P,) limits hold, so that errors do not move their sizes."""
-        return np.asarray(self.half_widths()[0] < HELD * np.abs(self.weights))
+        return self.half_widths()[0] < HELD * np.abs(self.weights)
 
     @property
     def method_in_words(self) -> str:

@@ -35,13 +35,12 @@ from balancing.noise import Gaussian
 from balancing.tables import three_figures
 from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
 from rotorid.base.answer import COLUMNS
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records
 from rotorid.base.text import figures, weight_unit_words
 
 _SAME = 1e-6
-_NOTHING = Mounted("", (), np.zeros(0, dtype=complex))
 
 
 class RotorAndArbor(NamedTuple):
@@ -94,14 +93,6 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
             "weights, at indices such as 0° and 180°, and one with a trial weight for each plane do"
         ) from None
     fitted = fit_runs(runs)
-    if stored is None:
-        rotor_alone = fitted.part(range(len(runs.speeds)), None, range(1, len(runs.planes)))
-        check_effects(
-            replace(runs, planes=runs.planes[1:], weights=runs.weights[:, 1:]),
-            rotor_alone.W,
-            rotor_alone.channels(known=True),
-            fitted.remarks.contradictions,
-        )
     W, planes = (fitted.W[..., 1:], trials.planes) if stored is None else (stored.W, stored.planes)
     P, labels = len(planes), (stored or fitted).labels
     shares = np.eye(len(runs.planes), 1 + P)[:, 1:].astype(complex)
@@ -116,6 +107,8 @@ def rotor_and_arbor(trials: Trials, stored: Influence | None = None) -> RotorAnd
         return replace(of, W=W, errors=errors, labels=labels)
 
     rotor, arbor = part(0.0, 1.0), part(1.0, -1.0)
+    if stored is None:
+        check_effects(trials, W, rotor.channels(known=True), fitted.remarks.contradictions)
     if not arbor.baseline.any():  # a correction of nothing at all is refused
         arbor = replace(arbor, baseline=arbor.baseline + 1e-12 * np.abs(rotor.baseline).max())
     return RotorAndArbor(rotor, arbor)
@@ -136,11 +129,8 @@ def machine_influence(trials: Trials) -> Influence:
     """
     S, C = trials.mean.shape[1:]
     one = np.broadcast_to(np.eye(C, dtype=complex), (S, C, C))
-    labels = replace(
-        trials.labels,
-        weight_unit=trials.labels.vibration_unit,
-        weight_scale=trials.labels.vibration_scale,
-    )
+    labels = trials.labels
+    labels = replace(labels, weight_unit=labels.vibration_unit, weight_scale=labels.vibration_scale)
     nothing = np.full((S, C), np.nan + 0j)
     errors = Gaussian.none(S, C, C)
     return Influence(trials.speeds, trials.sensors, trials.sensors, one, nothing, errors, labels)
@@ -152,17 +142,11 @@ class ArborCorrection(Correction):
 
     Attributes
     ----------
-    rotor_and_arbor
-        What would correct the rotor, and its arbor, free of limits: opposite to their unbalances.
+    unbalances
+        Weights that do what the rotor does, and what its arbor does, with their draws.
     """
 
-    rotor_and_arbor: tuple[Correction, ...] = ()
-
-    @property
-    def unbalances(self) -> tuple[Correction, ...]:
-        """Weights that do what the rotor does, and what its arbor does, with their draws."""
-        both = self.rotor_and_arbor
-        return tuple(replace(c, remove=(), weights=-c.weights, draws=-c.draws) for c in both)
+    unbalances: tuple[Correction, ...] = ()
 
     def _what(self) -> str:
         return f"{super()._what()} {'from' if 'Remove' in super()._what() else 'on'} the rotor"
@@ -199,8 +183,9 @@ def with_arbor(result: Correction, both: RotorAndArbor) -> ArborCorrection:
         Whose JSON has rotor_unbalance and arbor_unbalance.
     """
     at = result.planes, result.speeds
-    corrections = tuple(correct(part, None, *at, refuse=False) for part in both)
-    return ArborCorrection.of(result, rotor_and_arbor=corrections)
+    opposite = (correct(part, None, *at, refuse=False) for part in both)
+    unbalances = tuple(replace(c, weights=-c.weights, draws=-c.draws) for c in opposite)
+    return ArborCorrection.of(result, unbalances=unbalances)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,8 +207,7 @@ class RelativeCorrection(Correction):
     def _what(self) -> str:
         if len(self.planes) > 1:
             return super()._what()
-        (angle,), times = self.places(self.planes, self.weights), three_figures(abs(self.weights[0]))
-        place = self._place(angle, self.labels.angle_sign)
+        (place,), times = self._places(self), three_figures(abs(self.weights[0]))
         if self.relative.angle and not self.remove:
             return f"Move the trial weight by {place} and take {times} times as much"
         start = " from its place" if self.relative.angle else ""
@@ -238,11 +222,11 @@ class RelativeCorrection(Correction):
         times = Column("times", np.abs(self.weights), three_figures)
         return (times,) if np.isnan(self._masses()).all() else (times, masses)
 
-    def _place(self, angle: float, sign: int) -> str:
+    def _places(self, of: Correction) -> list[str]:
         if not self.relative.angle:
-            return super()._place(angle, sign)
-        turn = sign * ((angle + 180) % 360 - 180)
-        return f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation"
+            return super()._places(of)
+        turns = of.labels.with_rotation(_turns(of)).tolist()
+        return [f"{abs(turn):.0f}° {'with' if turn >= 0 else 'against'} the rotation" for turn in turns]
 
     @property
     def _counting(self) -> str:
@@ -253,7 +237,7 @@ class RelativeCorrection(Correction):
         nothing = np.full(len(self.planes), np.nan)
         turn = Column("turn_deg", nothing)
         if self.relative.angle:
-            turn = replace(turn, values=(self.places(self.planes, self.weights) + 180) % 360 - 180)
+            turn = replace(turn, values=_turns(self))
             angle, at = (replace(column, values=nothing) for column in (angle, at))
         masses = self._masses()
         return (
@@ -276,6 +260,11 @@ class RelativeCorrection(Correction):
         return super().to_dict() | {"relative_to_trial_weight": relative}
 
 
+def _turns(of: Correction) -> FloatArray:
+    """How far to move trial weights, degrees as the job counts them, -180 … 180, (P,)."""
+    return (of.places(of.planes, of.weights) + 180) % 360 - 180
+
+
 def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
     """A correction of runs whose weights are multiples of trial weights, told as such.
 
@@ -291,4 +280,5 @@ def relative_to(result: Correction, relative: Relative) -> RelativeCorrection:
     RelativeCorrection
         Whose JSON has times_trial and turn_deg of every plane.
     """
-    return RelativeCorrection.of(result, relative=relative, mounted=_NOTHING)
+    nothing = Mounted("", (), np.zeros(0, dtype=complex))
+    return RelativeCorrection.of(result, relative=relative, mounted=nothing)

@@ -128,21 +128,20 @@ def reading_names(labels: Labels, sensors: Sequence[str], speeds: FloatArray) ->
 
 def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     """Errors of a reading and between runs in one or two sentences."""
-    e = reading.errors
-    parts = {}
+    e, whole, parts = reading.errors, float(np.linalg.norm(run.typical)), {}
     if e is not None:
-        parts[f"{100 * e.amplitude:.3g} % of the amplitude"] = e.amplitude
-        parts[f"{np.degrees(e.phase):.3g}°"] = e.phase
-        parts[labels.amplitude_words(e.floor)] = e.floor
-    stated = ", ".join(words for words, size in parts.items() if size) or "not known"
-    out = f"One standard deviation of a reading: {stated} ({reading.source})"
-    whole = float(np.linalg.norm(run.typical))
-    between = f"{100 * whole:.2g} %" if whole > 5e-4 else ""
+        parts = {
+            f"{100 * e.amplitude:.3g} % of the amplitude": e.amplitude,
+            f"{np.degrees(e.phase):.3g}°": e.phase,
+            labels.amplitude_words(e.floor): e.floor,
+        }
+    between = {f"{100 * whole:.2g} %": whole * (whole > 5e-4)}
     if run.origin == "stated":  # as it was, whatever share of it is common
         relative, floor = whole * np.sqrt(1 - run.evenly), whole * np.sqrt(run.evenly) * run.level
-        each = (f"{100 * relative:.2g} %", relative), (labels.amplitude_words(floor), floor)
-        between = ", ".join(words for words, size in each if size)
-    out += f"; from run to run: {between} ({run.origin})" if between else ""
+        between = {f"{100 * relative:.2g} %": relative, labels.amplitude_words(floor): floor}
+    stated, changes = (", ".join(w for w, size in each.items() if size) for each in (parts, between))
+    out = f"One standard deviation of a reading: {stated or 'not known'} ({reading.source})"
+    out += f"; from run to run: {changes} ({run.origin})" if changes else ""
     return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 
 

@@ -34,7 +34,7 @@ import numpy as np
 
 from balancing.conventions import Labels
 from balancing.influence import Influence, plane_indices
-from balancing.tables import largest_readings, reading_columns, three_figures, vector_columns
+from balancing.tables import largest_readings, reading_columns, reading_names, three_figures, vector_columns
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain
@@ -304,9 +304,8 @@ def trial_from_coefficients(
         raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
     warnings: list[str] = []
     positive("share of the largest reading", share)
-    s, c = np.unravel_index(int(np.argmax(np.abs(w))), w.shape)
-    amount = share * size / float(abs(w[s, c]))
-    reading = f"sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[s])}"
+    amount = share * size / float(np.abs(w).max())
+    reading = reading_names(labels, influence.sensors, influence.speeds)[int(np.argmax(np.abs(w)))]
     basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
     if amount > limit:
         amount, basis = limit, "the largest weight of the plane"

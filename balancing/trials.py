@@ -298,9 +298,8 @@ class Limits:
     @property
     def any(self) -> bool:
         """Whether anything is limited."""
-        return bool(
-            np.isfinite(self.max_weight).any() or np.isfinite(self.residual).any() or any(self.forbidden)
-        )
+        largest = np.append(self.max_weight, self.residual)
+        return bool(np.isfinite(largest).any() or any(self.forbidden))
 
     def pick(self, speeds: Sequence[int], planes: Sequence[int]) -> Limits:
         """Limits of some speeds and planes, by index."""

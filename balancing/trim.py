@@ -155,9 +155,8 @@ def after_check_run(
     pick = np.ix_(*match_readings(check, c.influence))
     bare = c.before[pick] if bare is None else bare
     now, before = rms(check.mean[-1]), rms(bare)
-    trim, made = c.to_add, c
-    if pieces is not None:
-        trim, made = in_order(pieces.weights, pieces.correction.planes, planes), pieces
+    made = pieces or c
+    trim = c.to_add if pieces is None else in_order(pieces.weights, pieces.correction.planes, planes)
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
     change = rms_change(labels, check.mean[-1], made.after[pick])
     if bound is not None:
@@ -201,6 +200,3 @@ def after_check_run(
         c.within[pick],
         pieces if word == "trim" else None,
     )
-
-
-

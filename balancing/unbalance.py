@@ -85,7 +85,7 @@ class Unbalance(Answered):
     @property
     def own_share(self) -> FloatArray:
         """How much of a station's estimate is its own unbalance, Re R_qq, shape (Q,); 1: all."""
-        return np.asarray(np.diag(self.resolution).real)
+        return np.diag(self.resolution).real
 
     @property
     def determined(self) -> BoolArray:
@@ -266,7 +266,7 @@ def unbalance_of_run(
     today = influence if baseline is None else influence.rebased(baseline)
     if not today.has_baseline:
         raise ValueError("there is no vibration to explain: give the readings of a baseline run")
-    unit = {"weight_unit": influence.labels.weight_unit, "weight_scale": influence.labels.weight_scale}
+    of = influence.labels
     result = estimate_unbalance(
         today.W.reshape(-1, len(today.planes)),
         today.baseline.ravel(),
@@ -274,6 +274,6 @@ def unbalance_of_run(
         errors=np.concatenate([(y - today.baseline).reshape(len(y), -1) for y, _ in today.draws()])
         if today.known_errors
         else None,
-        labels=replace(today.labels, **unit),  # type: ignore[arg-type]
+        labels=replace(today.labels, weight_unit=of.weight_unit, weight_scale=of.weight_scale),
     )
     return replace(result, warnings=today.remarks.warnings + result.warnings)

@@ -145,7 +145,7 @@ class Verdict(Answered):
             "\n".join(map(self._words, shown)),
             self.warnings,
             tables=("\n".join(["The other limits:", *map(self._words, others)]),) if others else (),
-            more="the other limits",
+            more="the other limits" if others else "",
         )
 
     def _words(self, row: Judgement) -> str:
@@ -247,7 +247,7 @@ def judge_unbalance(
 
     each = zip(planes, np.eye(len(planes)), tolerance.limits[order] / radius, strict=True)
     judged = [one("plane", name, row, limit) for name, row, limit in each]
-    if tolerance.transfer is not None and tolerance.bearing_limits is not None:
+    if tolerance.transfer is not None:
         ends = zip(("A", "B"), tolerance.transfer[:, order] * radius, tolerance.bearing_limits, strict=True)
         judged += [one("bearing", name, row, float(limit)) for name, row, limit in ends]
     return tuple(judged)
@@ -325,11 +325,11 @@ def verdict_of_check(
     warnings = left.remarks.warnings
     if tolerance is not None:
         part = left.part(range(len(left.speeds)), None, plane_indices(left, tolerance.planes))
-        S, C, P = part.W.shape
-        check_planes(part.W.reshape(-1, P), part.planes)
-        fitted = solve(part.W.reshape(-1, P), part.baseline.ravel())
-        solved = [fitted.resolve(W.reshape(-1, S * C, P), Y.reshape(-1, S * C)) for Y, W in part.draws()]
-        draws = np.concatenate([np.zeros((0, P), dtype=complex), *solved])
+        W, Y = part.W.reshape(-1, len(part.planes)), part.baseline.ravel()
+        check_planes(W, part.planes)
+        fitted = solve(W, Y)
+        solved = [fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws()]
+        draws = np.concatenate([0 * fitted.weights[None][:0], *solved])
         judged += judge_unbalance(-fitted.weights, -draws, tolerance, part.planes, radii=radii)
         by_errors, _ = fit_part(part)
         if by_errors.dof and chance(by_errors.chi_square or 0.0, by_errors.dof) < POOR:
@@ -443,9 +443,10 @@ def zones_of(
     if outlook.errors_known:
         most = largest(predicted, outlook.after_covariance)
     read = np.full(most.shape, np.nan)
-    for speed, readings in () if check is None else zip(check.speeds, np.abs(check.mean[-1]), strict=True):
-        for name, size in zip(check.sensors, readings, strict=True) if check else ():
-            read[np.ix_(outlook.speeds == speed, np.array(outlook.sensors) == name)] = size
+    if check is not None:
+        for (s, c), size in np.ndenumerate(np.abs(check.mean[-1])):
+            here = np.ix_(outlook.speeds == check.speeds[s], np.array(outlook.sensors) == check.sensors[c])
+            read[here] = size
     names = [name for name in outlook.sensors if name in boundaries]
     limits = np.array([boundaries[name] for name in names])
 

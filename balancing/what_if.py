@@ -54,6 +54,7 @@ SEEN = 1e-3
 AGREES = 0.95
 """Correlation of the model's coefficients with those of the job."""
 Word = Literal["better", "worse", "hardly different", "not judged"]
+Look = Callable[["ComplexArray", "ComplexArray"], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +161,7 @@ def what_if(
     ValueError
         For an unknown plane or speed, and a missing or unfit baseline.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
-    if not today.has_baseline:
-        raise ValueError("there is no vibration that the weights could change: give the baseline run")
+    today = todays(influence, baseline)
     D = np.zeros(len(today.planes), dtype=complex)
     if weights:
         D[plane_indices(today, list(weights))] = list(weights.values())
@@ -172,24 +171,44 @@ def what_if(
     low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL)).tolist()
     width = float(half_width(sizes - rms(part.baseline + part.W @ D)))
     word: Word = "better" if bound <= BETTER * before else "worse" if low > before else "hardly different"
-    removed = tuple(plane for plane in today.planes if plane in remove)
-    worse = worse_elsewhere(today, D, part.speeds)
     return WhatIf(
-        part, D, covariance, bound, width, "not judged" if np.isnan(bound) else word, worse, remove=removed
+        part,
+        D,
+        covariance,
+        bound,
+        width,
+        "not judged" if np.isnan(bound) else word,
+        worse_elsewhere(today, D, part.speeds),
+        remove=tuple(plane for plane in today.planes if plane in remove),
     )
 
 
-def check_readings(influence: Influence, weights: ComplexArray) -> ComplexArray:
-    """How far check runs with weights (P,) are off, drawn, (n, S, C); n = 0 where errors are unknown."""
+def todays(influence: Influence, baseline: Trials | ArrayLike | None) -> Influence:
+    """Coefficients with the vibration to correct, that of a baseline or their own."""
+    today = influence if baseline is None else influence.rebased(baseline)
+    if not today.has_baseline:
+        raise ValueError("there is no vibration to correct: give the readings of a baseline run")
+    return today
+
+
+def check_readings(influence: Influence, weights: ComplexArray, look: Look = lambda *_: None) -> ComplexArray:
+    """How far check runs with weights (P,) are off, drawn, (n, S, C); n = 0 where errors are unknown.
+
+    `look` is shown the draws (Y₀, W), block by block.
+    """
     after = influence.baseline + influence.W @ weights
-    each = zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False)
-    off = [Y + W @ weights + more - after for (Y, W), more in each]
-    return np.concatenate([np.zeros((0, *after.shape), dtype=complex), *off])
+    off = [np.zeros((0, *after.shape), dtype=complex)]
+    for (Y, W), more in zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False):
+        look(Y, W)
+        off.append(Y + W @ weights + more - after)
+    return np.concatenate(off)
 
 
-def check_run_spread(influence: Influence, weights: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN where errors are unknown."""
-    off = check_readings(influence, weights)
+def check_run_spread(
+    influence: Influence, weights: ComplexArray, *look: Look
+) -> tuple[FloatArray, FloatArray]:
+    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN: errors are unknown."""
+    off = check_readings(influence, weights, *look)
     off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
     read, parts = influence.baseline + influence.W @ weights + off, real_parts(off[..., None])
     covariance = np.einsum("nsci,nscj->scij", parts, parts) / len(off)

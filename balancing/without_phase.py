@@ -8,9 +8,8 @@ interval of the vibration that it leaves ends below 0.9 of the present, whicheve
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from balancing.conditioning import UndeterminedError, chance
 from balancing.cones import allowed_sectors, stands_in
 from balancing.correction import MountDecision
 from balancing.decision import HARDLY_BELOW
+from balancing.holes import SAME_ANGLE, Holes
 from balancing.regions import LEVEL, Region, half_width
 from balancing.tables import reading_columns, rms, three_figures, weight_columns
 from balancing.trials import Limits, Trials
@@ -101,11 +101,6 @@ class AmplitudeSolution:
     draws: ComplexArray
     left: float
 
-    @cached_property
-    def region(self) -> Region:
-        """Where the weights are with 95 %, all planes jointly."""
-        return Region.of(self.draws, self.weights)
-
 
 @dataclass(frozen=True, eq=False)
 class WithoutPhase(Answered):
@@ -122,7 +117,7 @@ class WithoutPhase(Answered):
     decision
         Whether to mount the weights, and what to do instead.
     next_run
-        Plane and weight of a run that would tell more.
+        Plane, weight and hole (empty: none) of a run that would tell more.
     remove
         Planes where material is taken away, opposite to the weight that would be added.
     """
@@ -132,7 +127,7 @@ class WithoutPhase(Answered):
     scatter: Scatter
     errors: FloatArray
     decision: MountDecision
-    next_run: tuple[str, complex]
+    next_run: tuple[str, complex, str]
     remove: tuple[str, ...] = ()
 
     @property
@@ -160,7 +155,7 @@ class WithoutPhase(Answered):
 
         For one plane also where one that leaves nothing misfits by no more than 95 % allow.
         """
-        if any(one.region.holds(weights) for one in self.solutions):
+        if any(Region.of(one.draws, one.weights).holds(weights) for one in self.solutions):
             return True
         if len(self.planes) > 1:
             return False
@@ -197,7 +192,11 @@ class WithoutPhase(Answered):
                 "chi_square": self.scatter.chi_square,
                 "chi_square_dof": self.scatter.dof,
                 "errors": {"amplitude_percent": 100 * self.scatter.relative, "origin": self.scatter.origin},
-                "next_run": {"plane": self.next_run[0], **labels.weight_entry(self.next_run[1])},
+                "next_run": {
+                    "plane": self.next_run[0],
+                    **labels.weight_entry(self.next_run[1]),
+                    **({"hole": self.next_run[2]} if self.next_run[2] else {}),
+                },
                 "warnings": self.decision.warnings,
                 "notes": self.decision.notes,
             }
@@ -273,6 +272,7 @@ def balance_without_phase(
     limits: Limits | None = None,
     row_weights: FloatArray | None = None,
     remove: Sequence[str] = (),
+    holes: Mapping[str, Holes] | None = None,
 ) -> WithoutPhase:
     """Correct one or two planes by amplitudes alone.
 
@@ -286,6 +286,8 @@ def balance_without_phase(
         How much each reading counts for the weights, (S, C).
     remove
         Planes where material is taken away.
+    holes
+        Of planes that have some: a further run has its weight in one of them.
 
     Returns
     -------
@@ -308,9 +310,11 @@ def balance_without_phase(
     >>> abs(balance_without_phase(trials).weights - 0.8j) < 1e-6
     array([ True])
     """
-    _check(trials)
+    holes = holes or {}
+    _check(trials, holes)
     a, (errors, scatter) = np.abs(trials.mean).reshape(len(trials.runs), -1), _errors(trials)
     N, P = a.shape[1], len(trials.planes)
+    limits = limits or Limits.none(1, N, P)
     first = trials.weights[np.argmax(trials.weights != 0, axis=0), np.arange(P)]
     size, top = np.abs(trials.weights).max(axis=0) * first / np.abs(first), a.max(axis=0)
     T, a, errors = trials.weights / size, a / top, errors / top  # around 1, the first weight at 0°
@@ -323,7 +327,7 @@ def balance_without_phase(
     limit, rng = scatter.limit(2 * P, POSSIBLE), np.random.default_rng(0)
     minima = [fit.minima(rng, limit, scatter.estimated) for fit in fits]
     weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
-    largest = np.full(P, np.inf) if limits is None else limits.max_weight / np.abs(size)
+    largest = limits.max_weight / np.abs(size)
     solutions = list[AmplitudeSolution]()
     for choice in choices(minima, weights, limit):
         x = np.array([one.parameters for one in choice])
@@ -342,15 +346,18 @@ def balance_without_phase(
                 float(np.quantile(left, (1 + LEVEL) / 2)),
             )
         )
-    gaps = [_widest_gap(of) for of in trials.weights.T]
-    p = int(np.argmax([width for width, _ in gaps]))
-    run = trials.planes[p], gaps[p][1]
+    gaps = [
+        _widest_gap(of, holes.get(name)) for name, of in zip(trials.planes, trials.weights.T, strict=True)
+    ]
+    p = int(np.argmax([width for width, *_ in gaps]))
+    _, further, hole = gaps[p]
+    run = trials.planes[p], further, hole
     weak = chance(float((((a - a.mean(axis=0)) / errors) ** 2).sum()), a.size - N) > 1 - LEVEL
     decision = _decide(trials, solutions, scatter, limits, run, weak=weak)
     return WithoutPhase(trials, tuple(solutions), scatter, errors * top, decision, run, tuple(remove))
 
 
-def _check(trials: Trials) -> None:
+def _check(trials: Trials, holes: Mapping[str, Holes]) -> None:
     """Refuse what cannot be solved, with the runs that are missing."""
     T, P = trials.weights, len(trials.planes)
     if not 1 <= P <= 2 or not T.any(axis=0).all():
@@ -366,8 +373,8 @@ def _check(trials: Trials) -> None:
     missing = [] if (T == 0).all(axis=1).any() else ["the rotor without weights"]
     for plane, of in zip(trials.planes, T.T, strict=True):
         while len(np.unique(np.round(np.angle(of[of != 0]), 6))) < 3:
-            weight = _widest_gap(of)[1]
-            missing.append(f"{trials.labels.weight_at(weight)} in plane {plane!r}")
+            _, weight, hole = _widest_gap(of, holes.get(plane))
+            missing.append(f"{trials.labels.weight_at(weight)}{_there(hole)} in plane {plane!r}")
             of = np.append(of, weight)
     raise UndeterminedError(
         "without phases one plane needs four runs, a baseline and three trial weights at directions that "
@@ -376,20 +383,33 @@ def _check(trials: Trials) -> None:
     )
 
 
-def _widest_gap(weights: ComplexArray) -> tuple[float, complex]:
-    """Of angles of one plane's weights; and one as large as the largest in it, a third or half of the way."""
+def _there(hole: str) -> str:
+    return hole and f" (hole {hole})"
+
+
+def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[float, complex, str]:
+    """Of angles of one plane's weights; one as large as the largest in it, a third or half of the way.
+
+    Where there are holes it is in the nearest one with a direction that no weight had; and its name.
+    """
     angles = np.unique(np.round(np.angle(weights[weights != 0]), 6))
     gaps = np.diff([*angles, angles[0] + 2 * np.pi])
     k = int(np.argmax(gaps))
-    angle = angles[k] + gaps[k] / (3 if len(angles) == 1 else 2)
-    return float(gaps[k]), complex(np.abs(weights).max() * np.exp(1j * angle))
+    direction, hole = np.exp(1j * (angles[k] + gaps[k] / (3 if len(angles) == 1 else 2))), ""
+    if holes is not None:
+        places = np.exp(1j * holes.angles)
+        new = np.abs(places[:, None] - np.exp(1j * angles)).min(axis=1) > SAME_ANGLE
+        if new.any():
+            at = int(np.where(new, np.abs(places - direction), np.inf).argmin())
+            direction, hole = places[at], holes.names[at]
+    return float(gaps[k]), complex(np.abs(weights).max() * direction), hole
 
 
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
     """One standard deviation of each amplitude (R, N), stated or assumed."""
     a, n, reading, run = np.abs(trials.mean), trials.repeats, trials.errors, trials.run_errors
-    size, floor = (0.0, 0.0) if reading is None else (reading.amplitude, reading.floor)
-    between, lowest = (0.0, 0.0) if run is None else run
+    size, floor = (reading.amplitude, reading.floor) if reading else (0.0, 0.0)
+    between, lowest = run or (0.0, 0.0)
     stated = any((size, floor, between, lowest))
     if not stated:
         between = ASSUMED
@@ -422,16 +442,16 @@ def _decide(
     trials: Trials,
     solutions: Sequence[AmplitudeSolution],
     scatter: Scatter,
-    limits: Limits | None,
-    run: tuple[str, complex],
+    limits: Limits,
+    run: tuple[str, complex, str],
     *,
     weak: bool,
 ) -> MountDecision:
     """Mount what leaves less than 0.9 of the present vibration by every solution, where it may stand."""
     labels, before, weights = trials.labels, rms(solutions[0].before), solutions[0].weights
     expected, cause, instead = before * max(one.left for one in solutions), "", ""
-    arcs = () if limits is None else zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
-    forbidden = [repr(plane) for plane, D, each in arcs if not stands_in(D, allowed_sectors(each))]
+    each = zip(trials.planes, weights.tolist(), limits.forbidden, strict=True)
+    forbidden = [repr(plane) for plane, D, arcs in each if not stands_in(D, allowed_sectors(arcs))]
     word: Literal["mount", "do not mount", "measure again"] = "do not mount"
     if scatter.origin != "estimated" and chance(scatter.chi_square, scatter.dof) < CONTRADICTION:
         word, cause = "measure again", _contradiction(trials, scatter)
@@ -447,7 +467,7 @@ def _decide(
         cause = f"they may leave rms {labels.amplitude_words(float(f'{expected:.2g}'))} (95 %)"
         if len(solutions) > 1:
             cause = f"{counted(len(solutions), 'solution')} explain the readings"
-        instead = f"Make this run: {labels.weight_at(run[1])} in plane {run[0]!r} alone."
+        instead = f"Make this run: {labels.weight_at(run[1])}{_there(run[2])} in plane {run[0]!r} alone."
     note = (
         f"amplitudes are taken to scatter by {percent(ASSUMED)} % from run to run: state amplitude_percent "
         "in [errors] where it is known"

@@ -103,8 +103,10 @@ def assemble(rotor: Rotor) -> Matrices:
     for disc in rotor.discs:
         w = A.deflection(disc.node)
         M[-1, w] += disc.mass
-        M[-1, w + 1] += disc.diametral_inertia * model.rotary_inertia
-        G[-1, w + 1] += disc.polar_inertia * model.gyroscopic
+        if model.rotary_inertia:
+            M[-1, w + 1] += disc.diametral_inertia
+        if model.gyroscopic:
+            G[-1, w + 1] += disc.polar_inertia
     for support in rotor.supports:
         K[-1, A.deflection(support.node) + 1] += support.tilting_stiffness
     for force in rotor.forces:
@@ -125,14 +127,12 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
     return max(2 - len(held) - tilting, 0)
 
 
-def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray | None = None) -> FloatArray:
+def rounding_error(band: FloatArray, X: AnyArray, energy: FloatArray) -> FloatArray:
     """Relative error of xᴴ K x that rounding the entries of K may cause, for each column of X, shape (m,).
 
     It grows with the fourth power of the number of elements: about 1e-13 at 20, 1e-5 at 2000. Solutions
-    of K x = f are wrong by as much. The `energy` xᴴ K x is computed unless it is known.
+    of K x = f are wrong by as much. The `energy` is xᴴ K x.
     """
-    if energy is None:
-        energy = np.abs((X.conj() * multiply(band, X)).sum(axis=0))
     scatter = (np.abs(X) * multiply(np.abs(band), np.abs(X))).sum(axis=0)
     return np.asarray(np.finfo(float).eps * scatter / np.maximum(energy, 1e-300))
 
@@ -150,21 +150,11 @@ def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     )
 
 
-def static_stiffness(support: Support, speed: float) -> FloatArray:
-    """Symmetric part of a support's stiffness without its pedestal, N/m, shape (2, 2).
-
-    The antisymmetric part (kxy − kyx)/2 does work over an orbit, as damping does: it belongs to no
-    conservative rotor.
-    """
-    k = support.at(speed)[0]
-    return (k + k.T) / 2
-
-
 def _internal(rotor: Rotor) -> list[InternalDamping]:
     return [force for force in rotor.forces if isinstance(force, InternalDamping)]
 
 
-def _turned(D: AnyArray) -> ComplexArray:
+def on_waves(D: AnyArray) -> ComplexArray:
     """Matrices of (x, y) as they act on (F, b), shape (…, 2, 2)."""
     # As one product: many products of 2 × 2 matrices take ten times as long.
     return np.asarray(D.reshape(-1, 4) @ _TURN).reshape(D.shape)
@@ -192,7 +182,7 @@ class Supported:
     @property
     def springs(self) -> dict[int, float]:
         """Real spring nearest to D at each node, N/m; 0 for what is mostly negative."""
-        middle = np.median(self.stiffness[..., 0, 0].real, axis=0)
+        middle = np.sort(self.stiffness[..., 0, 0].real, axis=0)[len(self.stiffness) // 2]
         return dict(zip(self.nodes, np.maximum(middle, 0.0).tolist(), strict=True))
 
 
@@ -209,12 +199,17 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     dampers = _internal(rotor)
     attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
     nodes = tuple(dict.fromkeys(attached))
-    stiffness = np.zeros((speeds.size, len(nodes), 2, 2), complex)
+    stiffness = np.zeros((len(nodes), 2, 2, speeds.size), complex)
     for support in rotor.supports:
-        stiffness[:, nodes.index(support.node)] += _turned(support.dynamic_stiffness(speeds))
+        at = stiffness[nodes.index(support.node)]
+        if support.constant and not support.pedestal:  # linear in the speed
+            k, c = on_waves(support.table)[:, 0, ..., None]
+            at += k + c * (1j * speeds)
+        else:
+            at += np.moveaxis(on_waves(support.dynamic_stiffness(speeds)), 0, -1)
     for damper in dampers:
-        stiffness[:, nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
-    return Supported(nodes, stiffness, 1 if rotor.symmetric else 2)
+        stiffness[nodes.index(damper.node), 1, 1] += 2j * damper.damping * speeds
+    return Supported(nodes, stiffness.transpose(3, 0, 1, 2), 1 if rotor.symmetric else 2)
 
 
 def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArray:
@@ -224,10 +219,10 @@ def whirl_change(more: Support, less: Support, speeds: FloatArray) -> ComplexArr
     """
     (B, S), (other, beneath) = (support.dynamic_parts(speeds) for support in (more, less))
     if S is None or beneath is None:
-        return _turned(B - other)
+        return on_waves(B - other)
     more_B, more_S, B, S = B - other, S - beneath, (B + other) / 2, (S + beneath) / 2
     G = np.linalg.inv(B + S)
-    return _turned(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
+    return on_waves(S @ G @ more_B @ G @ S + B @ G @ more_S @ G @ B)
 
 
 @holding_arrays
@@ -401,7 +396,7 @@ class WholeBand:
             powers = [value * value, -value * turning, value - turning, 1.0]
             band[reach::p, plane::p] = np.tensordot(powers, self._bands, 1)
         for row, support in zip(P.rows, P.rotor.supports, strict=True):
-            D = _turned(support.dynamic_stiffness(value / 1j, speed))
+            D = on_waves(support.dynamic_stiffness(value / 1j, speed))
             for a, b in np.ndindex(p, p):
                 band[2 * reach + a - b, p * row + b] += D[a, b]
         lu, pivots, info = zgbtrf(band, reach, reach, overwrite_ab=True)

@@ -22,40 +22,43 @@ all of them multiples of 1/420.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fem.rotor import Rotor
-from rotorid.base.arrays import AnyArray, FloatArray
+from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
+DENSE = 64  # unknowns up to which a full matrix costs less than its band, and all modes less than the lowest
 _LENGTHS = np.array([0, 1, 1, 1, 0, 1])  # powers of L in the scaling
 _HERMITE = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
 """Coefficients of 1, ξ, ξ², ξ³ on 0 … 1 of the polynomials of w₁, slope₁, w₂, slope₂."""
 
 
-def _forms() -> list[FloatArray]:
-    """∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as 6 × 6 matrices."""
+def _forms(unknowns: list[int]) -> tuple[IndexArray, list[FloatArray]]:
+    """Unknowns, and ∫(w'' − γ')², ∫γ², ∫w², ∫(w' − γ)² as matrices of these."""
     derivative, powers = np.diag([1, 2, 3], 1), np.arange(4)
     w, gamma = _HERMITE[[0, 1, 1, 3, 2, 3]].T, np.zeros((4, 6))
     gamma[:2, 2:4] = [[1, 0], [-1, 1]]
     tilt = derivative @ w - gamma
     integrals = 1 / (powers[:, None] + powers + 1)
-    return [np.round(420 * f.T @ integrals @ f) / 420 for f in (derivative @ tilt, gamma, w, tilt)]
+    shapes = [shape[:, unknowns] for shape in (derivative @ tilt, gamma, w, tilt)]
+    return np.array(unknowns), [np.round(420 * f.T @ integrals @ f) / 420 for f in shapes]
 
 
-_BENDING, _SHEAR, _MASS, _TILT = _forms()
+_BENDING, _SHEAR = _forms([0, 1, 4, 5]), _forms([0, 1, 2, 3, 4, 5])
 
 
 def shaft_bands(rotor: Rotor) -> FloatArray:
     """Upper bands of stiffness, mass, gyroscopic form and material damping, shape (4, width + 1, size)."""
     model, L, outer = rotor.model, rotor.length, np.multiply.outer
-    unknowns = np.arange(6) if model.shear else np.array([0, 1, 4, 5])
-    taken, scale = np.ix_(unknowns, unknowns), L ** _LENGTHS[unknowns, None]
-    area, inertia = rotor.area, rotor.second_moment
-    stiffness = outer(_BENDING[taken], rotor.youngs_modulus * inertia / L**3)
+    unknowns, (bending, shear, inertia, tilt) = _SHEAR if model.shear else _BENDING
+    scale = L ** _LENGTHS[unknowns, None]
+    stiffness = outer(bending, rotor.youngs_modulus * rotor.second_moment / L**3)
     if model.shear:
-        stiffness += outer(_SHEAR, rotor.shear_coefficient * rotor.shear_modulus * area / L)
-    mass = outer(_MASS[taken], rotor.density * area * L)
-    tilting = outer(_TILT[taken], rotor.density * inertia / L)
+        stiffness += outer(shear, rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L)
+    mass = outer(inertia, rotor.density * rotor.area * L)
+    tilting = outer(tilt, rotor.density * rotor.second_moment / L)
     turning = 2 * model.gyroscopic * tilting
     damping = rotor.material_damping * stiffness
     forms = np.array((stiffness, mass + model.rotary_inertia * tilting, turning, damping))
@@ -78,28 +81,30 @@ def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
     """
     stride = 4 if rotor.model.shear else 2
     w, tilt, *shear = (X[i::stride] for i in range(stride))
-    chord = np.diff(w, axis=0) / rotor.length[:, None]
+    chord = (w[1:] - w[:-1]) / rotor.length[:, None]
     bending = np.sqrt(rotor.youngs_modulus * rotor.second_moment / rotor.length)[:, None]
+    left, right = tilt[:-1], tilt[1:]
     parts = [
-        bending * np.diff(tilt, axis=0),
-        np.sqrt(3.0) * bending * ((tilt[:-1] - chord) + (tilt[1:] - chord) + sum(shear)),
+        bending * (right - left),
+        math.sqrt(3.0) * bending * ((left - chord) + (right - chord) + sum(shear)),
     ]
     if shear:
         left, right = shear
         stiff = np.sqrt(rotor.shear_coefficient * rotor.shear_modulus * rotor.area * rotor.length)[:, None]
-        parts += [stiff * (left + right) / 2, stiff * (right - left) / np.sqrt(12.0)]
-    return np.stack(parts)
+        parts += [stiff * (left + right) / 2, stiff * (right - left) / math.sqrt(12.0)]
+    return np.array(parts)
 
 
 def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
-    from scipy.linalg import blas
-
-    kind = np.result_type(band, X)
-    product = blas.dsbmv if kind.kind == "f" else blas.zhbmv
-    band = np.asarray(band, kind, order="F")
-    columns = [product(len(band) - 1, 1.0, band, column) for column in X.T.astype(kind)]
-    return np.reshape(columns, X.T.shape).T
+    if band.shape[1] <= DENSE:
+        return np.asarray(dense(band) @ X)
+    product = band[-1, :, None] * X
+    for off in range(1, len(band)):
+        entries = band[-1 - off, off:, None]
+        product[:-off] += entries * X[off:]
+        product[off:] += entries.conj() * X[:-off]
+    return product
 
 
 def dense(band: AnyArray) -> AnyArray:

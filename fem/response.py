@@ -472,12 +472,14 @@ def influence(
     ways = np.array([turn.conj(), turn])
     nodes = [rotor.node(sensor.node) for sensor in places]
     receptance = Receptance(rotor, nodes, at, np.eye(len(at)), speeds)
-    W = np.empty((speeds.size, len(sensors), len(planes)), dtype=complex)
+    W = np.empty((len(sensors), len(planes), speeds.size), dtype=complex)
     for part, H in receptance.parts(speeds):
-        read = H * (ways[: len(H)] * speeds[part] ** 2)
-        W[part] = np.moveaxis(read.sum(axis=0), -1, 0)
+        H *= ways[: len(H)] * speeds[part] ** 2
+        H.sum(axis=0, out=W[..., part])
     windows, texts = judge(rotor, speeds)
-    return InfluenceCoefficients(speeds, sensors, planes, W, (*receptance.warnings, *texts), windows)
+    return InfluenceCoefficients(
+        speeds, sensors, planes, W.transpose(2, 0, 1), (*receptance.warnings, *texts), windows
+    )
 
 
 def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
@@ -527,7 +529,7 @@ class Receptance:
         places, units, top = np.append(self.unknowns, held), unit_loads(A, held), float(speeds.max())
 
         def series(whirl: int, columns: FloatArray) -> Series:
-            return Series(one_plane(rotor, A, whirl, springs), places, columns, top)
+            return Series(one_plane(rotor, A, whirl, springs.items()), places, columns, top)
 
         forward = np.hstack((self.loads, units))
         try:
@@ -542,7 +544,7 @@ class Receptance:
         """Some speeds at a time, rad/s: receptances F, or F and b, shape (planes, a, b, S)."""
         stiffness = supported(self.rotor, speeds).stiffness
         # as many as stay in the cache of the processor
-        step = max(64, 32_768 // (self.unknowns.size * self.loads.shape[1]))
+        step = max(64, 12_288 // (self.unknowns.size * self.loads.shape[1]))
         for start in range(0, speeds.size, step):
             part = slice(start, start + step)
             omega = speeds[part]
@@ -574,7 +576,7 @@ class Receptance:
         F = np.zeros((planes, a, b, omega.size), complex)
         F[0] = H[0][:a, :b]
         for k, force in enumerate(system[:, :b]):
-            F[k // s] -= H[k // s][:a, k % s - s, None] * force
+            F[k // s] -= H[k // s][:a, k % s - s, None].astype(complex) * force
         return F, lost
 
     @cached_property
@@ -619,7 +621,7 @@ class Series:
         m, available = 12, finite_modes(whole)
         while True:
             m = min(m, available)
-            self.modes = modes = lowest_modes(whole.rotor, whole.matrices, m, whole)
+            self.modes = modes = lowest_modes(whole, m)
             ratio = (top * top + modes.shift) / abs(modes.squares[-1] + modes.shift)
             if m == available or ratio < 1 / 16:
                 break
@@ -628,8 +630,7 @@ class Series:
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
         needed = 1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS)))
-        self.powers = np.arange(needed)[:, None]
-        for _ in self.powers:
+        for _ in range(needed):
             R = dpbtrs(modes.factor, R)[0]
             R = R - V @ (MV.T @ R)  # rounding must not bring the modes back
             factors.append(R[unknowns][..., None])
@@ -644,6 +645,7 @@ class Series:
         gap = self.squares - squared
         near: BoolArray = (np.abs(gap) <= self.margin).any(axis=0)
         gap[:, near] = 1.0
-        terms = np.vstack((1 / gap, (squared + self.modes.shift) ** self.powers))
         rows, columns, n = self.factors.shape
+        powers = np.vander(squared + self.modes.shift, n - len(gap), increasing=True).T
+        terms = np.concatenate((1 / gap, powers))
         return (self.factors.reshape(-1, n) @ terms).reshape(rows, columns, -1), near

@@ -202,6 +202,8 @@ class Support:
     @cached_property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
+        if self.plain:
+            return True
         xx, xy, yx, yy = self.table.reshape(-1, 4).T
         stand = self.pedestal
         alike = stand is None or {type(stand.stiffness), type(stand.damping)} == {float}
@@ -544,7 +546,8 @@ class Rotor:
     @cached_property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        positions = np.append(0.0, np.cumsum(self.length))
+        positions = np.zeros(self.n_nodes)
+        self.length.cumsum(out=positions[1:])
         read_only(positions)
         return positions
 
@@ -555,10 +558,12 @@ class Rotor:
         read_only(area)
         return area
 
-    @property
+    @cached_property
     def second_moment(self) -> FloatArray:
         """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
-        return self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16
+        second_moment = self.area * (self.outer_diameter**2 + self.inner_diameter**2) / 16
+        read_only(second_moment)
+        return second_moment
 
     @property
     def shear_modulus(self) -> FloatArray:

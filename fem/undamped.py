@@ -18,24 +18,24 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fem.assembly import (
-    FROM_XY,
     TO_XY,
     Matrices,
     assemble,
     dense,
+    free_motions,
     ignored_inertia,
     multiply,
+    on_waves,
     rounding_error,
-    static_stiffness,
 )
-from fem.elements import strains
+from fem.elements import DENSE, strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import NORMAL_95, Result, holding_arrays
 from fem.rotor import Pedestal, Rotor, refined
@@ -44,7 +44,6 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, error_figures, listing, percent
 
-DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 NOT_COUNTED = "critical speeds below the tables are not known, nor counted"
 NO_MASS = (
     "the rotor can move as a rigid body without moving any mass: give the shaft a density, or add supports"
@@ -448,7 +447,7 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
     """Modes of positive mass, ascending: n at least, and one above the square `top`, as far as there are."""
     finite, m = finite_modes(pencil), n
     while True:
-        spectrum = lowest_modes(pencil.rotor, pencil.matrices, min(m, finite), pencil)
+        spectrum = lowest_modes(pencil, min(m, finite))
         negative = np.count_nonzero(spectrum.squares < 0)
         if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
             if not negative:
@@ -492,11 +491,6 @@ class Pencil:
         return self.shaft[:, :: self.matrices.stride]
 
     @property
-    def tilts(self) -> IndexArray:
-        """Unknowns of the shaft that are slopes, shape (w, N)."""
-        return self.shaft[:, 1 :: self.matrices.stride]
-
-    @property
     def size(self) -> int:
         """Number of unknowns."""
         return int(self.mass.shape[1])
@@ -508,8 +502,8 @@ class Pencil:
         return np.asarray(sum(parts))
 
 
-def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, float] | None = None) -> Pencil:
-    """Pencil of one plane on springs {node: N/m}, by default of plain supports; `whirl` 1 is forward.
+def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: Iterable[tuple[int, float]] = ()) -> Pencil:
+    """Pencil of one plane on springs, in the place of the stiffness of the supports; `whirl` 1 is forward.
 
     Parameters
     ----------
@@ -518,14 +512,13 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: dict[int, floa
     whirl
         1 forward, −1 backward, 0 without gyroscopic moments.
     springs
-        N/m by node; None: those of plain supports.
+        Node and N/m of each.
 
     Returns
     -------
     Stiffness and mass of the plane.
     """
-    held = [(s.node, s.stiffness) for s in rotor.supports if s.plain] if springs is None else springs.items()
-    return _pencil(rotor, A, (whirl,), [(node, k * np.eye(2), None) for node, k in held])
+    return _pencil(rotor, A, (whirl,), [(node, np.full((1, 1), k), None) for node, k in springs])
 
 
 def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
@@ -544,63 +537,66 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     -------
     Stiffness and mass.
     """
-    held = [(s.node, static_stiffness(s, speed), s.pedestal) for s in rotor.supports]
+    k = np.reshape([support.at(speed)[0] for support in rotor.supports], (-1, 2, 2))
+    # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
+    forms: AnyArray = on_waves((k + k.swapaxes(1, 2)) / 2)
+    forms = forms if forms.imag.any() else forms.real
+    held = [(s.node, form, s.pedestal) for s, form in zip(rotor.supports, forms, strict=True)]
     return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
 
 
 def _pencil(
-    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, FloatArray, Pedestal | None]]
+    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, AnyArray, Pedestal | None]]
 ) -> Pencil:
-    """Pencil on springs: node, stiffness in (x, y), shape (2, 2), and what they stand on."""
-    planes, size, springs = len(whirls), A.size, list[tuple[IndexArray, AnyArray]]()
-    held = [each for each in held if each[1].any()]
-    feet = [(A.deflection(node) + 0.5, stand.mass) for node, _, stand in held if stand]
+    """Pencil on springs: node, stiffness of the waves, shape (2, 2), and what they stand on."""
+    planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
+    held = [(node, form[:planes, :planes], foot) for node, form, foot in held if form.any()]
+    kind = np.result_type(float, *(form for _, form, _ in held))
+    bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
+    for wave, whirl in enumerate(whirls):
+        bands[:, ::planes, wave::planes] = A.shaft, A.mass - whirl * A.gyroscopic
     # Waves alternate, and a foot stands behind the deflection of its node.
-    order = np.append(np.arange(size), [at for at, _ in feet]).argsort(kind="stable")
-    places = planes * order.argsort() + np.arange(planes)[:, None]
-
-    def spring(k: FloatArray, *ends: int) -> None:
-        form = (FROM_XY @ k @ TO_XY)[:planes, :planes]
-        form = form if form.imag.any() else form.real
-        if len(ends) > 1:
-            form = np.kron(((1, -1), (-1, 1)), form)
-        springs.append((places[:, ends].T.ravel(), form))
-
-    stands = itertools.count(size)
-    for node, k, pedestal in held:
-        ends = [A.deflection(node)]
+    feet = [A.deflection(node) + 0.5 for node, _, stand in held if stand]
+    places = np.arange(planes * A.size).reshape(-1, planes).T
+    if feet:
+        ranks = np.append(np.arange(A.size), feet).argsort(kind="stable").argsort()
+        places = planes * ranks + np.arange(planes)[:, None]
+        moved, reach = places[:, : A.size].T.ravel(), planes * A.width
+        width = int((moved[reach:] - moved[:-reach]).max())
+        narrow, bands = bands, np.zeros((2, places.size, width + 1), kind).transpose(0, 2, 1)
+        for off in range(reach + 1):
+            i, j = moved[: moved.size - off], moved[off:]
+            bands[:, width + i - j, j] = narrow[:, reach - off, off:]
+        bands[1, -1, places[:, A.size :]] = [stand.mass for *_, stand in held if stand]
+    K, M = bands
+    shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
+    for node, form, pedestal in held:
+        hold += float(form.trace().real) / planes
+        unknowns = shaft[:, A.deflection(node)]
         if pedestal:
-            ends.append(next(stands))
-            spring(np.diag(pedestal.xy("stiffness")), ends[1])
-        spring(k, *ends)
-    attached = springs[:]
+            foot = next(stands)
+            springs.append((foot, on_waves(np.diag(pedestal.xy("stiffness")))[:planes, :planes].real))
+            unknowns, form = np.append(unknowns, foot), np.kron(((1, -1), (-1, 1)), form)
+        springs.append((unknowns, form))
+    for unknowns, form in springs:
+        for b, j in enumerate(unknowns):  # they ascend
+            K[unknowns[: b + 1] - j - 1, j] += form[: b + 1, b]
+    span = rotor.positions[-1]
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
-            spring(support.tilting_stiffness * np.eye(2), A.deflection(support.node) + 1)
-    shaft, w = places[:, :size], A.deflections
-    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max())
-    bands = np.zeros((2, places.size * (width + 1)), np.result_type(float, *(k for _, k in attached)))
-    entries = np.empty((2, planes, A.width + 1, size))
-    entries[0], entries[1] = A.shaft, A.mass - np.reshape(whirls, (-1, 1, 1)) * A.gyroscopic
-    for off in range(A.width + 1):
-        i, j = shaft[:, : size - off], shaft[:, off:]
-        bands[:, width * (1 + j) + i] = entries[:, :, A.width - off, off:]
-    K, M = bands.reshape(2, -1, width + 1).transpose(0, 2, 1)
-    M[-1, places[:, size:]] = [mass for _, mass in feet]
-    for unknowns, form in attached:
-        for (a, b), stiffness in np.ndenumerate(form):
-            if (i := unknowns[a]) <= (j := unknowns[b]):
-                K[width + i - j, j] += stiffness
-    s, R = rotor.positions / rotor.positions[-1], np.zeros((places.size, 2 * planes))
-    for wave, row in enumerate(shaft):
-        R[row[w], wave], R[row[w], planes + wave] = 1.0, s
-        R[row[w + 1], planes + wave] = 1 / rotor.positions[-1]
-    holding = [(R[u].T @ k @ R[u], np.abs(k).max()) for u, k in springs]
-    values, V = np.linalg.eigh(
-        sum((one / largest for one, largest in holding), np.zeros((2 * planes, 2 * planes)))
-    )
-    rigid = R @ V[:, np.abs(values) <= 1e-13 * np.abs(values).max()]
-    hold = float(sum(one.trace().real for one, _ in holding)) / planes
+            tilt = shaft[:, A.deflection(support.node) + 1]
+            springs.append((tilt, support.tilting_stiffness * np.eye(planes)))
+            hold += support.tilting_stiffness / span**2
+    rigid = np.empty((places.size, 0))
+    if planes > 1 or free_motions(rotor, {node for node, *_ in held}):
+        motions = np.zeros((places.size, 2 * planes))
+        for wave, row in enumerate(shaft):
+            motions[row[w], wave], motions[row[w], planes + wave] = 1.0, rotor.positions / span
+            motions[row[w + 1], planes + wave] = 1 / span
+        # Not their work: what pushes back and what pushes outwards at one node could sum up to none.
+        forces = [form @ motions[unknowns] / np.abs(form).max() for unknowns, form in springs]
+        _, values, V = np.linalg.svd(np.vstack((np.zeros(2 * planes), *forces)))
+        rigid = motions @ V[np.count_nonzero(values > 1e-13 * values[0]) :].conj().T
     return Pencil(rotor, A, K, M, shaft, springs, hold, rigid)
 
 
@@ -641,7 +637,8 @@ class Spectrum:
     @property
     def motion(self) -> ComplexArray:
         """Amplitudes of x and y and of their slopes, shape (4, N, m)."""
-        X = self.vectors[np.array((self.pencil.waves, self.pencil.tilts))]
+        shaft, stride = self.pencil.shaft, self.pencil.matrices.stride
+        X = self.vectors[np.array((shaft[:, ::stride], shaft[:, 1::stride]))]
         return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
 
 
@@ -686,17 +683,15 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     raise ValueError(NO_MASS if free and (pencil.mass[-1] >= 0).all() else _UNSTABLE)
 
 
-def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None) -> Spectrum:
-    """Lowest m modes of a pencil, by default of one plane at rest; m must not exceed the finite modes.
+def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
+    """Lowest m modes of a pencil; m must not exceed the finite modes.
 
     Parameters
     ----------
-    rotor, A
-        The rotor and its matrices.
+    pencil
+        Stiffness and mass.
     m
         How many modes.
-    pencil
-        Stiffness and mass; None: of one plane at rest.
 
     Returns
     -------
@@ -707,30 +702,32 @@ def lowest_modes(rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None
     ValueError
         If the mesh is so fine that float64 carries fewer than about two digits of a shape.
     """
-    pencil = pencil or one_plane(rotor, A)
     shift, U = factor(pencil)
     fixed, free = pencil.rigid, pencil.rigid.shape[1]
+    loads = fixed
     if free:
         G = fixed.conj().T @ multiply(pencil.mass, fixed)
         if np.linalg.cond(G) > 1e13:
             raise ValueError(NO_MASS)
         # First the translation, then the turn.
         fixed = np.linalg.solve(np.linalg.cholesky(G), fixed.conj().T).conj().T
+        loads = multiply(pencil.mass, fixed)
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
     elastic = max(m - free, 0)
     K = pencil.stiffness + shift * pencil.mass
-    moving = _vectors(pencil, K, U, elastic, multiply(pencil.mass, fixed))
+    moving = _vectors(pencil, K, U, elastic, loads)
     mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
-    X = np.hstack((fixed, moving @ Y / np.sqrt(np.abs(mu))))[:, :m]
-    mu = np.append(np.full(free, np.inf), mu)[:m]
+    X = moving @ (Y / np.sqrt(np.abs(mu)))
+    if free:
+        X, mu = np.hstack((fixed, X))[:, :m], np.append(np.full(free, np.inf), mu)[:m]
     squares = 1 / mu
     if shift:  # the softest beside stiff ones
         squares = np.sign(mu) * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
     rounding = rounding_error(K, X, np.abs(squares + shift))
     if rounding.max(initial=0.0) > 1e-2:
         raise ValueError(
-            f"the mesh of {rotor.n_elements} elements is too fine for float64: join neighbouring elements, "
-            "50 to 200 are ample for a rotor"
+            f"the mesh of {pencil.rotor.n_elements} elements is too fine for float64: join neighbouring "
+            "elements, 50 to 200 are ample for a rotor"
         )
     return Spectrum(squares, X, shift, U, rounding, pencil)
 
@@ -771,25 +768,21 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
     """
     from scipy.linalg import lapack
 
-    real = np.isrealobj(U)
-    tbtrs, adjoint = (lapack.dtbtrs, "T") if real else (lapack.ztbtrs, "C")
-    geqrf, orgqr = (lapack.dgeqrf, lapack.dorgqr) if real else (lapack.zgeqrf, lapack.zungqr)
+    tbtrs = lapack.dtbtrs if np.isrealobj(U) else lapack.ztbtrs
     size, block = pencil.size, 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
     def operator(V: AnyArray) -> AnyArray:
         W = tbtrs(U, V)[0]
-        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
-        return np.asarray(tbtrs(U, loads, trans=adjoint)[0])
-
-    def orthonormal(Z: AnyArray) -> tuple[AnyArray, AnyArray]:
-        packed, tau, *_ = geqrf(Z)
-        return orgqr(packed, tau)[0], np.triu(packed[:block])
+        loads = multiply(pencil.mass, W)
+        if rigid.size:
+            loads -= rigid @ (rigid.conj().T @ W)
+        return np.asarray(tbtrs(U, loads, trans="C")[0])
 
     if size > DENSE:
         # Smooth loads, which differ from one to the other wave.
         s = np.linspace(1, 2, size) * (1 + np.arange(size) % len(pencil.shaft))
-        V = orthonormal(operator(operator(np.cos(np.outer(s, np.arange(block))).astype(U.dtype))))[0]
+        V = np.linalg.qr(operator(operator(np.cos(np.outer(s, np.arange(block))))))[0]
         basis = image = np.empty((size, 0), U.dtype)
         residual = np.inf
         while basis.shape[1] < size // 2:
@@ -797,7 +790,7 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             basis, image = np.hstack((basis, V)), np.hstack((image, Z))
             for _ in range(2):
                 Z = Z - basis @ (basis.conj().T @ Z)
-            V, beta = orthonormal(Z)
+            V, beta = np.linalg.qr(Z)
             if basis.shape[1] < 2.5 * m + 6:
                 continue
             mu, Q = _largest(basis.conj().T @ image, most)
@@ -806,5 +799,8 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
                 return np.asarray(tbtrs(U, image @ Q)[0])
-    ends = None if pencil.matrices.gyroscopic.any() else (size - most + 1, size)  # only M - G may be negative
+    ends = None  # M - G may be negative
+    if not pencil.matrices.gyroscopic.any():
+        most = min(max(m, 1), most)
+        ends = size - most + 1, size
     return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]

@@ -35,8 +35,8 @@ from numpy.typing import ArrayLike
 from fem.assembly import Planes, Reduced, assemble, both_planes, multiply, project
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import Result, holding_arrays
-from fem.rotor import Rotor, Support
-from fem.undamped import Spectrum, finite_modes, lowest_modes
+from fem.rotor import Rotor
+from fem.undamped import Spectrum, finite_modes, lowest_modes, one_plane
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray, checked_speeds, whole
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
@@ -258,11 +258,8 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> tuple[Spectrum, float]:
     """
     K, _ = P.supports(speeds[speeds.size // 2, None])
     springs = np.maximum(np.einsum("sii->s", K[0]).real / P.planes, 0.0)
-    supports = [
-        Support(s.node, spring, tilting_stiffness=s.tilting_stiffness)
-        for s, spring in zip(P.rotor.supports, springs, strict=True)
-    ]
-    spectrum = lowest_modes(replace(P.rotor, supports=supports), P.A, m)
+    held = zip(P.rows // P.A.stride + 1, springs, strict=True)
+    spectrum = lowest_modes(one_plane(P.rotor, P.A, 0, held), m)
     moving = spectrum.squares[spectrum.squares > 0]
     return spectrum, np.sqrt(moving[0] if moving.size else spectrum.shift)
 

@@ -1,5 +1,6 @@
 """`python -m rotorid`, and the command `rotorid`."""
 
+import os
 import signal
 from types import FrameType
 
@@ -16,6 +17,7 @@ def run() -> None:
     signal.signal(signal.SIGINT, _end)
     if hasattr(signal, "SIGPIPE"):  # Windows has none
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would look through every package
     from rotorid.cli import main
 
     main()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.plots.discs import ROW, disc_axes, draw_plane
+from balancing.plots.discs import disc_axes, disc_height, draw_plane
 from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
 from balancing.regions import reach
 from balancing.tables import INVISIBLE
@@ -54,7 +54,7 @@ def correction_figure(
         A check run (of several the last), and what is left to do: the trim is drawn, or what is mounted.
     """
     pieces = mounted if left is None else left.pieces
-    high = 3.9 if pieces is None else ROW * -(-len(c.planes) // 2) + 0.5
+    high = 3.9 if pieces is None else disc_height(len(c.planes))
     figure = new_figure(high + 4.9)
     grid = figure.add_gridspec(2, height_ratios=[high, 4.9])
     upper, lower = (figure.add_subfigure(grid[k]) for k in range(2))

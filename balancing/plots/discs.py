@@ -171,8 +171,7 @@ def weight_figure(
 ) -> Figure:
     """A new figure with a disc for each of several ways to place one weight; see `draw_disc`."""
     several = ways or ((),)
-    rows, columns = -(-len(several) // 2), min(len(several), 2)
-    figure = new_figure(ROW * rows + 0.5, 3.5 * max(columns, 1.3))
+    figure = new_figure(disc_height(len(several)), 3.5 * (2 if len(several) > 1 else 1.3))
     axes = disc_axes(figure, len(several), labels)
     for k, (ax, loose) in enumerate(zip(axes, several, strict=True), start=1):
         title = titles[k - 1] if titles else f"solution {k}" if len(several) > 1 else "weight"
@@ -180,8 +179,13 @@ def weight_figure(
     return figure
 
 
+def disc_height(count: int) -> float:
+    """Inches that so many discs want, two in a row."""
+    return ROW * -(-count // 2) + 0.5
+
+
 def disc_axes(figure: Figure | SubFigure, count: int, labels: Labels) -> list[Axes]:
-    """Axes for so many discs, two in a row, under what holds for all; a row wants `ROW` inches."""
+    """Axes for so many discs, two in a row, under what holds for all, in `disc_height`."""
     columns, rows = min(count, 2), -(-count // 2)
     way = "clockwise" if labels.drawn_sign < 0 else "counter-clockwise"
     words = (

@@ -63,13 +63,20 @@ def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
     ValueError
         If they are no numbers, not finite or negative, or do not ascend although they must.
     """
-    array = np.atleast_1d(np.array(speeds, dtype=float))
+    try:
+        array = np.atleast_1d(np.array(speeds, dtype=float))
+    except (TypeError, ValueError):  # no numbers, or lists of several lengths
+        array = np.empty(0)
     if array.ndim != 1 or not array.size or not ((array >= 0) & (array < np.inf)).all():
         raise ValueError(
             "speeds must be numbers in rad/s, at least one, in one list, finite and not negative"
         )
-    if ascending and (np.diff(array) <= 0).any():
-        raise ValueError("speeds must ascend, each once: sort them")
+    falls = np.flatnonzero(np.diff(array) <= 0)
+    if ascending and falls.size:
+        before, after = array[falls[0] :][:2]
+        raise ValueError(
+            f"speeds must ascend, each once: sort them; {after:.6g} rad/s follows {before:.6g} rad/s"
+        )
     read_only(array)
     return array
 

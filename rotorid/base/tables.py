@@ -128,7 +128,7 @@ class Table:
     @property
     def rows(self) -> list[tuple[Value, ...]]:
         """Values row by row."""
-        return list(zip(*(column.values for column in self.columns), strict=True))
+        return rows(self.columns)
 
     @property
     def records(self) -> list[dict[str, Value]]:
@@ -136,12 +136,15 @@ class Table:
         return records(self.columns)
 
 
+def rows(columns: Sequence[Column]) -> list[tuple[Any, ...]]:
+    """Values row by row, of JSON types."""
+    return list(zip(*(column.values for column in columns), strict=True))
+
+
 def records(columns: Sequence[Column]) -> list[dict[str, Any]]:
     """One dict a row, of JSON types."""
     names = [column.heading for column in columns]
-    return [
-        dict(zip(names, row, strict=True)) for row in zip(*(each.values for each in columns), strict=True)
-    ]
+    return [dict(zip(names, row, strict=True)) for row in rows(columns)]
 
 
 def frame(columns: Sequence[Column]) -> pd.DataFrame:

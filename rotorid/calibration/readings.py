@@ -152,11 +152,11 @@ class RunReadings:
             for each in (start, rotor)
         )
         A, at = assemble(first), supported(first, self.trials.speeds)
-        pencil = one_plane(first, A, 0, at.springs)
+        pencil = one_plane(first, A, 0, at.springs.items())
         still = pencil.rigid.shape[1]
         if self.bow > (most := finite_modes(pencil) - still):
             raise ValueError(f"the shaft has {counted(most, 'shape')} of a bow, not {self.bow}")
-        shapes = lowest_modes(first, A, self.bow + still, pencil).vectors[:, still:]
+        shapes = lowest_modes(pencil, self.bow + still).vectors[:, still:]
         bent: FloatArray = shapes / np.abs(shapes[A.deflections]).max(axis=0)
         return multiply(assemble(now).shaft, bent)
 

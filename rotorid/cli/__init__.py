@@ -111,19 +111,9 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
     return app
 
 
-def _version(show: bool) -> None:
-    if show:
-        from rotorid import __version__
-
-        typer.echo(f"rotorid {__version__}")
-        raise typer.Exit
-
-
 def _rotorid(
     ctx: typer.Context,
-    version: bool = typer.Option(
-        False, "--version", callback=_version, is_eager=True, help="Print the version and end."
-    ),
+    version: bool = typer.Option(False, "--version", help="Print the version and end."),
 ) -> None:
     """Rotor models, flexible-rotor balancing and identification of oscillating systems.
 
@@ -133,6 +123,11 @@ def _rotorid(
 
     Exit status: 0, or 2 for bad input with one message.
     """
+    if version:
+        from rotorid import __version__
+
+        typer.echo(f"rotorid {__version__}")
+        raise typer.Exit
     if ctx.invoked_subcommand is None:
         typer.echo(_overview())
 

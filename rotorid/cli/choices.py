@@ -33,12 +33,6 @@ class Command(TyperCommand):
         _compact(self, ctx)
         super().format_help(ctx, formatter)
 
-    def get_help_option(self, ctx: Any) -> Any:  # noqa: ANN401 - as typer declares it
-        """As typer's, among those of the output."""
-        option: Any = super().get_help_option(ctx)
-        option.rich_help_panel = "Output"
-        return option
-
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
         """As typer's, with the nearest choice in a complaint."""
         try:
@@ -71,6 +65,8 @@ def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no pub
     """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
     command.help = whole_paragraphs(command.help or "")
     for parameter in command.get_params(ctx):
+        if parameter.name == "help":
+            parameter.rich_help_panel = "Output"
         parameter._get_number_range_help_str = lambda: ""  # a refusal tells it
         if parameter.param_type_name == "argument" or parameter.is_flag:
             parameter.display_type_rich = lambda ctx: ""

@@ -31,6 +31,8 @@ def demo(
 
     Example: rotorid demo demo
     """
+    from rotorid.cli import application
+
     commands = {
         key: [word.replace("{}", str(folder)) for word in line.split()] for key, line in STEPS.items()
     }
@@ -38,7 +40,9 @@ def demo(
     _copy(folder, [Path(picture) for picture in pictures])
     typed = [shlex.join(["rotorid", *words]) for words in commands.values()]
     for number, (line, words) in enumerate(zip(typed, commands.values(), strict=True), start=1):
-        typer.echo("\n".join([f"{number}. {line}", *_run(words).splitlines()[:_LINES]]))
+        with contextlib.redirect_stdout(io.StringIO()) as text:
+            application(words)(words, prog_name="rotorid", standalone_mode=False)
+        typer.echo("\n".join([f"{number}. {line}", *text.getvalue().splitlines()[:_LINES]]))
     typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")
 
 
@@ -62,12 +66,3 @@ def _copy(folder: Path, pictures: list[Path]) -> None:
     for path in copies:
         path.parent.mkdir(parents=True, exist_ok=True)
     write_files({path: data for path, data in copies.items() if not path.exists()})
-
-
-def _run(words: list[str]) -> str:
-    """What one command prints."""
-    from rotorid.cli import application
-
-    with contextlib.redirect_stdout(io.StringIO()) as text:
-        application(words)(words, prog_name="rotorid", standalone_mode=False)
-    return text.getvalue()

@@ -16,16 +16,20 @@ if TYPE_CHECKING:
 
 
 def as_proposed(job: Job, correction: Correction, influence: Influence, runs: Trials | None) -> Job:
-    """The job with what was proposed as the weights of its check runs, where nobody states them.
+    """The job with what was proposed as the weights of its check runs, which nobody states.
 
     Where the job has holes these are pieces, which are in them then, and no longer in stock.
     """
     import numpy as np
 
+    from balancing import mount
+
     check = job.check
-    if check is None or job.check_mounted:
-        return job
-    pieces = pieces_mounted(job, correction, influence, runs)
+    assert check is not None
+    pieces = None
+    if not job.check_of_weights and {*correction.planes} & {*job.holes}:
+        with suppress(ValueError):  # no pieces can be proposed: the weights were
+            pieces = mount(correction, influence, runs, job.holes)
     mounted = np.tile((pieces or correction).weights, (len(check.runs), 1))
     check, holes = replace(check, planes=correction.planes, weights=mounted), dict(job.holes)
     placed = () if pieces is None else zip(correction.planes, pieces.discrete.mountings, strict=True)
@@ -96,24 +100,3 @@ def left_to_do(
         bare=None if check is None else check.before,
     )
     return replace(left, why=left.why + no_pieces) if left.word == "trim" else left
-
-
-def pieces_mounted(
-    job: Job, correction: Correction, influence: Influence, runs: Trials | None
-) -> Mounted | None:
-    """The pieces that `--split` proposes for a correction; None where others or none were mounted.
-
-    Parameters
-    ----------
-    job
-        With check runs, whose weights nobody states.
-    correction, influence, runs
-        Before the check runs.
-    """
-    from balancing import mount
-
-    if job.check_mounted or job.check_of_weights or not set(correction.planes) & set(job.holes):
-        return None
-    with suppress(ValueError):  # no pieces can be proposed: the weights were
-        return mount(correction, influence, runs, job.holes)
-    return None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import LINES, Answer, together
+from rotorid.base.answer import LINES, Answer, kinds, together
 from rotorid.base.tables import Table
 from rotorid.base.text import sentence
 from rotorid.commands.after_check import as_proposed, left_to_do
@@ -21,25 +22,43 @@ from rotorid.commands.balance_solution import (
     special,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import KINDS, NEEDS_TRIAL, as_measured, counted, needs_trial_run
-from rotorid.commands.model_places import next_mode
+from rotorid.commands.coefficients import (
+    KINDS,
+    NEEDS_TRIAL,
+    as_measured,
+    counted,
+    needs_trial_run,
+    of_planes,
+)
 from rotorid.commands.option_quantities import mounted_weights
 from rotorid.commands.quantities import one_of, speeds
 from rotorid.commands.without_phase import balanced_without_phase
 from rotorid.report.options import check_choices, refuse
-from rotorid.report.outcome import Outcome, command, outcome_of, provenance, table_of
+from rotorid.report.outcome import Outcome, aligned, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Tolerance, Verdict, Zones
-    from rotorid.commands.balance_solution import JobGiven, Solved
+    from balancing import (
+        CheckComparison,
+        Correction,
+        Influence,
+        Labels,
+        LeftToDo,
+        Limits,
+        Mounted,
+        Tolerance,
+        Verdict,
+        Zones,
+    )
+    from rotorid.commands.balance_solution import JobGiven
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.outcome import Written
 
 
-_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", "grade", "rotor_mass", "service_speed")
+_TOLERANCE = ("grade", "rotor_mass", "service_speed")
+_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", *_TOLERANCE)
 """Options that mean nothing beside `weights`."""
 
 
@@ -68,13 +87,41 @@ class Balance(Outcome):
     @property
     def answer(self) -> Answer:
         """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-        return _answer(self)
+        result, mounted, check, left, job = self.result, self.mounted, self.check, self.left, self.job
+        weights, sound = result.answer, result.sound
+        if needs_trial_run(job, self.influence):
+            weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
+        limits, zone = ([] if part is None else [part.answer] for part in (self.verdict, self.zones))
+        if left is not None:  # the weights of the bare rotor are tables
+            first = [one.judgement for one in (left.answer, *limits)]
+            if check is not None:
+                first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
+            if job.check_pieces is not None:
+                pieces = job.check_pieces.in_holes()
+                first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
+            elif not (job.check_mounted or job.check_of_weights):
+                first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
+            first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
+            tables = [_behind(part.answer) for part in (mounted, result) if part]
+            every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
+            trim = _trim_tables(left, result.labels) if left.word == "trim" else []
+            return replace(every, judgement=" ".join(first), tables=(*trim, *every.tables))
+        if mounted:
+            elsewhere = "\n".join(result.decision.elsewhere)
+            weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
+        judged = [*limits, *([mounted.answer] if mounted else [])]
+        return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
 
-    def beside(self) -> dict[str, Any]:
-        """Keys of the document beside those of the correction."""
+    def to_dict(self) -> dict[str, Any]:
+        """The keys of the correction, and those of what is beside it."""
         parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
-        return {key: part.to_dict() for key, part in parts.items() if part}
+        document: dict[str, Any] = self.result.to_dict()
+        if (left := self.left) is not None:  # what is mounted is not to be mounted again
+            counted = left.correction.decision.to_dict(left.correction.labels)
+            expected = counted["rms_expected"] if left.word == "trim" else None
+            document["judgement"].update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
+        return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -110,7 +157,17 @@ def balance(job: JobGiven = (), options: BalanceOptions | None = None) -> Outcom
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     options = options or BalanceOptions()
-    _check(options)
+    check_choices(options, choices())
+    if options.coefficients is not None:
+        one_of(options.coefficients, "--coefficients", KINDS)
+    if options.machine_type is not None and (options.coefficients or options.influence):
+        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
+    if options.ridge is not None and not 0 < options.ridge < math.inf:
+        raise ValueError(f"--ridge {options.ridge:g}: a strength above 0, such as 0.03")
+    if options.split and options.ridge is not None:
+        raise ValueError(
+            "--split takes the planes as they are, and would undo --ridge: use fewer --planes instead"
+        )
     read, files, again = job_of(job, options)
     if read.trials.amplitudes_only:
         return balanced_without_phase(read, options)
@@ -126,13 +183,21 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
 
     refuse(options, _NEEDLESS, "means nothing with --weights, which are taken as they are")
     given = mounted_weights(job, options.weights or {})
-    (influence, runs), of_type = coefficients_of(job, options)
+    coefficients, of_type = coefficients_of(job, options)
+    influence, runs = of_planes(job, coefficients)
+    limits = job.limits_of(influence.planes)
+    beyond = [] if limits is None else _beyond(limits, influence, given, job)
+    remarks = influence.remarks
+    influence = replace(influence, remarks=remarks._replace(warnings=(*beyond, *remarks.warnings)))
     chosen = None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
     remove = [name for name, plane in job.planes.items() if plane.remove]
     result = what_if(influence, given, runs, chosen, remove)
-    result = replace(result, worse=(*result.worse, *next_mode(job, result)))
-    verdict, limits = None, job.limits_of(influence.planes)
-    if limits is not None:
+    if job.rotor is not None:
+        from rotorid.commands.model_places import next_mode
+
+        result = replace(result, worse=(*result.worse, *next_mode(job, result)))
+    verdict = None
+    if limits is not None and limits.residual.min() < math.inf:
         kept = limits.pick(match_speeds(result.speeds, influence.speeds), range(len(result.planes)))
         verdict = verdict_of_readings(result.influence, result.after, result.after_covariance, kept)
     zones = zones_of(result, job.zones) if job.zones else None
@@ -147,6 +212,20 @@ def _what_if(job: Job, options: BalanceOptions) -> Outcome:
     )
 
 
+def _beyond(limits: Limits, influence: Influence, given: Mapping[str, complex], job: Job) -> list[str]:
+    """Where given weights are beyond the largest weight of a plane, or in an arc that is forbidden."""
+    words, labels = list[str](), influence.labels
+    for plane, most, arcs in zip(influence.planes, limits.max_weight, limits.forbidden, strict=True):
+        weight = given.get(plane, 0j)
+        put = f"{labels.weight_at(-weight if job.planes[plane].remove else weight)} in plane {plane!r}"
+        if abs(weight) > most * (1 + 1e-9):
+            words.append(f"{put} is more than the largest weight there, {labels.weight_words(most)}")
+        at = cmath.phase(weight)
+        if weight and any(1e-9 < (at - start) % math.tau < width - 1e-9 for start, width in arcs):
+            words.append(f"{put} stands where the job forbids weights (forbidden_deg)")
+    return words
+
+
 def corrected(
     read: Job, options: BalanceOptions, files: Sequence[Path] = (), again: Callable[..., Job] | None = None
 ) -> Balance:
@@ -154,31 +233,34 @@ def corrected(
 
     `files` make the workbook, `again` reads the job under other conventions.
     """
-    from balancing import compare_check, zones_of
+    from balancing import compare_check, mount, zones_of
 
     stated = read.check is None or read.check_mounted
-    if options.refine and stated:
-        solved = solve(read, options)
-    else:
-        solved = solve(read, replace(options, refine=False))
+    solved = solve(read, options if stated else replace(options, refine=False))
+    if not stated:
         read = as_proposed(read, solved.result, *solved.coefficients)
         solved = solve(read, options) if options.refine else solved
     influence, runs = solved.coefficients
     # what was proposed before a refinement was proposed by these conventions and no others
     result = with_other_conventions(solved, read, again if stated or not options.refine else None, options)
-    result = special(result, read, options.coefficients)
-    mounted, check, left = _pieces(read, result, solved, options), None, None
-    if read.check is not None and not options.refine:
+    if read.trials.special:
+        result = special(result, read, options.coefficients)
+    mounted, check, left = None, None, None
+    if read.check is None or options.refine:
+        if options.split and (read.holes or read.check_pieces is None):
+            mounted = mount(result, influence, runs, read.holes, on_top=options.refine)
+    else:
+        mounted = read.check_pieces if options.split else None  # the trim has its own
         compared = result, read.check, influence, runs
         if read.held is not None and result.parts is not None and (there := counted(read)) is not None:
             measured = as_measured(read, influence)
             compared = result.parts, there, measured, runs and read.held.of_runs(runs)
         check = replace(compare_check(*compared), as_proposed=not stated)
-    tolerance = _tolerance(result.planes, options)
-    verdict = _judge(result, influence, read, tolerance, mounted)
+    verdict = _judge(result, influence, read, options, mounted)
     if read.check is not None:
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
+        result = _also_warned(result, left.correction)
     zones = None
     if read.zones:
         zones = zones_of(result, read.zones, None if mounted is None else mounted.after, read.check)
@@ -201,7 +283,6 @@ def corrected(
     outcome = Balance(
         result=result,
         provenance=made,
-        keys=lambda: result.to_dict() | outcome.beside(),
         file=lambda: table_of((left or mounted or result).to_frame()),
         files={"influence.csv": coefficients, ".xlsx": workbook, ".json": coefficients},
         pictures={"": lambda: _picture(outcome)},
@@ -219,58 +300,29 @@ def corrected(
     return outcome
 
 
-def _check(options: BalanceOptions) -> None:
-    """Refuse options that are not known or do not go together, before anything is read."""
-    check_choices(options, choices())
-    if options.coefficients is not None:
-        one_of(options.coefficients, "--coefficients", KINDS)
-    if options.machine_type is not None and (options.coefficients or options.influence):
-        raise ValueError("--type has the coefficients: leave --coefficients and --influence away")
-    if options.ridge is not None and not 0 < options.ridge < math.inf:
-        raise ValueError(f"--ridge {options.ridge:g}: a strength above 0, such as 0.03")
-    if options.split and options.ridge is not None:
-        raise ValueError(
-            "--split takes the planes as they are, and would undo --ridge: use fewer --planes instead"
-        )
+def _also_warned(result: Correction, counted: Correction) -> Correction:
+    """With what only the correction with the check run counted warns of."""
+    warned = result.warnings
+    more = [
+        f"with the check run counted, {words}"
+        for words in counted.warnings[len(counted.contradictions) :]
+        if len(kinds((*warned, words))) > len(kinds(warned))
+    ]
+    decision = replace(result.decision, warnings=(*result.decision.warnings, *more))
+    return replace(result, decision=decision)
 
 
-def _pieces(job: Job, result: Correction, solved: Solved, options: BalanceOptions) -> Mounted | None:
-    """Pieces in holes: those that a check run had, or that are to be mounted; None: not asked for."""
-    from balancing import mount
+def _trim_tables(left: LeftToDo, labels: Labels) -> list[str]:
+    """Every reading now and with the trim, below its weights where pieces stand for them."""
+    from rotorid.report.balance import next_run, trim_table
 
-    if job.check is not None and not options.refine:  # the trim has its pieces
-        return job.check_pieces if options.split else None
-    if options.split and (job.holes or job.check_pieces is None):
-        influence, runs = solved.coefficients
-        return mount(result, influence, runs, job.holes, on_top=options.refine)
-    return None
-
-
-def _answer(made: Balance) -> Answer:
-    """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
-    result, mounted, check, left, job = made.result, made.mounted, made.check, made.left, made.job
-    weights, sound = result.answer, result.sound
-    if needs_trial_run(job, made.influence):
-        weights, sound = replace(weights, judgement=f"Make a trial run first: {NEEDS_TRIAL}."), False
-    limits, zone = ([] if part is None else [part.answer] for part in (made.verdict, made.zones))
-    if left is not None:  # the weights of the bare rotor are tables
-        first = [one.judgement for one in (left.answer, *limits)]
-        if check is not None:
-            first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
-        if job.check_pieces is not None:
-            pieces = job.check_pieces.in_holes()
-            first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
-        elif not (job.check_mounted or job.check_of_weights):
-            first.append("Taken to be mounted: the weights that were proposed; else state check_weights.")
-        first += [*result.decision.elsewhere, *(one.judgement for one in zone)]
-        tables = [_behind(part.answer) for part in (mounted, result) if part]
-        every = together([left.answer, *limits, *([check.answer] if check else []), *zone, *tables])
-        return replace(every, judgement=" ".join(first))
-    if mounted:
-        elsewhere = "\n".join(result.decision.elsewhere)
-        weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
-    judged = [*limits, *([mounted.answer] if mounted else [])]
-    return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
+    document, unit = {"left_to_do": left.to_dict()}, labels.vibration_in
+    blocks = [
+        f"Vibration{unit and f' in {unit}'}, now and with the trim\n{aligned(next_run(document, labels))}"
+    ]
+    if left.pieces is not None:
+        blocks.insert(0, f"The trim that the pieces make\n{aligned(trim_table(document, labels))}")
+    return blocks
 
 
 def _behind(answer: Answer) -> Answer:
@@ -285,11 +337,9 @@ def _picture(made: Balance) -> Figure:
     return correction_figure(made.result, made.mounted, made.check, made.left)
 
 
-def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
-    """Tolerance of one or two planes; None where no grade is given."""
+def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance:
+    """Tolerance of one or two planes."""
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
-    if grade is None and weight is None and speed is None:
-        return None
     if grade is None or weight is None or speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
     if len(planes) > 2:
@@ -305,14 +355,15 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
 
 
 def _judge(
-    result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
+    result: Correction, influence: Influence, job: Job, options: BalanceOptions, mounted: Mounted | None
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
-    import numpy as np
-
     from balancing import verdict_of_check, verdict_of_prediction
 
-    limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
+    tolerance = None
+    if any(getattr(options, name) is not None for name in _TOLERANCE):
+        tolerance = _tolerance(result.planes, options)
+    limited = result.limits is not None and result.limits.residual.min() < math.inf
     if tolerance is None and not limited:
         return None
     radii = None

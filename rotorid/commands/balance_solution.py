@@ -12,7 +12,6 @@ from warnings import catch_warnings
 
 from rotorid.base.text import listing
 from rotorid.commands.coefficients import choose, counted, of_planes, stored, unknowns_of
-from rotorid.commands.model_places import next_mode
 from rotorid.commands.option_quantities import Errors, limited, percent_and_degrees
 from rotorid.commands.quantities import Names, Speeds, names, speeds
 from rotorid.report.options import file_of, refuse
@@ -122,10 +121,6 @@ class BalanceOptions:
         ValueError
             Without a job; for a workbook beside one, a name that is no workbook's, and an existing file.
         """
-        from rotorid.commands.app import check_targets
-        from rotorid.files.disk import write_files
-        from rotorid.files.job_excel import template_bytes
-
         path = self.template
         if job and path is None:
             return None
@@ -134,6 +129,10 @@ class BalanceOptions:
                 "give a job (.toml, .xlsx) or a runs table and a weights table; --template, without a "
                 "job, writes a form"
             )
+        from rotorid.commands.app import check_targets
+        from rotorid.files.disk import write_files
+        from rotorid.files.job_excel import template_bytes
+
         check_targets([(path, (".xlsx",))])
         if path.exists():
             raise ValueError(f"{path}: exists already, and may be filled in; choose another name")
@@ -153,23 +152,18 @@ def job_of(job: JobGiven, options: BalanceOptions) -> tuple[Job, tuple[Path, ...
         "amplitude_error_percent": percent,
         "phase_error_deg": degrees,
     }
-    if isinstance(job, Job):
-        if any(value is not None for value in (stored, *stated.values())):
-            raise ValueError(
-                "the conventions of a job, its errors and coefficients are stated where it is read"
-            )
-        return _limited(job, options), (), None
-    several = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-    files = tuple(file_of(file, "a job") for file in several)
-    if len(files) == 1 and stored is None and files[0].suffix.lower() in (".toml", ".xlsx"):
-        read = partial(read_job, files[0], **stated)
-    else:
-        read = partial(job_from_files, files, influence=stored, **stated)
-    return _limited(read(), options), files, read
-
-
-def _limited(job: Job, options: BalanceOptions) -> Job:
-    """The job with the limits of the options, if these go with its runs."""
+    files: tuple[Path, ...] = ()
+    read: Callable[..., Job] | None = None
+    if not isinstance(job, Job):
+        several = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
+        files = tuple(file_of(file, "a job") for file in several)
+        if len(files) == 1 and stored is None and files[0].suffix.lower() in (".toml", ".xlsx"):
+            read = partial(read_job, files[0], **stated)
+        else:
+            read = partial(job_from_files, files, influence=stored, **stated)
+        job = read()
+    elif any(value is not None for value in (stored, *stated.values())):
+        raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
     relative, index = job.trials.relative, job.trials.index
     if relative:
         refuse(options, _ABSOLUTE, "does not go with it: the trial weights of this job are not known (?)")
@@ -183,7 +177,7 @@ def _limited(job: Job, options: BalanceOptions) -> Job:
         refuse(options, ("machine_type", "refine"), "does not go with it: this job has an index")
         if options.coefficients == "combined":
             raise ValueError("--coefficients combined does not go with it: this job has an index")
-    return limited(job, options.max_mass, options.limit)
+    return limited(job, options.max_mass, options.limit), files, read
 
 
 def special(result: Correction, job: Job, kind: str | None) -> Correction:
@@ -192,8 +186,6 @@ def special(result: Correction, job: Job, kind: str | None) -> Correction:
 
     if job.trials.relative is not None:
         return relative_to(result, job.trials.relative)
-    if job.trials.index is None:
-        return result
     return with_arbor(result, rotor_and_arbor(job.trials, stored(job, kind)))
 
 
@@ -217,10 +209,20 @@ def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None
     from balancing import UndeterminedError
 
     try:
-        return _solved(job, options, planes)
+        coefficients, of_type = coefficients_of(job, options)
+        planes = planes or names(options.planes) or unknowns_of(job, coefficients[0])
+        coefficients = of_planes(job, coefficients, planes)
+        result = correct_job(job, coefficients, planes, options)
     except UndeterminedError as error:
         words = _test(job).contradiction(job.trials.labels)
         raise UndeterminedError("\n".join((*words, str(error)))) from None
+    if job.rotor is not None:
+        from rotorid.commands.model_places import next_mode
+
+        decision = result.decision
+        elsewhere = *decision.elsewhere, *next_mode(job, result)
+        result = replace(result, decision=replace(decision, elsewhere=elsewhere))
+    return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)
 
 
 def _test(job: Job) -> ConventionTest:
@@ -249,17 +251,6 @@ def coefficients_of(
     trials = with_check_runs(job.trials, check) if check else job.trials
     of_type = type_coefficients(job, options.machine_type, trials)
     return (of_type.influence, None), of_type
-
-
-def _solved(job: Job, options: BalanceOptions, planes: Sequence[str] | None) -> Solved:
-    coefficients, of_type = coefficients_of(job, options)
-    planes = planes or names(options.planes) or unknowns_of(job, coefficients[0])
-    coefficients = of_planes(job, coefficients, planes)
-    result = correct_job(job, coefficients, planes, options)
-    if more := next_mode(job, result):
-        decision = replace(result.decision, elsewhere=(*result.decision.elsewhere, *more))
-        result = replace(result, decision=decision)
-    return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)
 
 
 def correct_job(
@@ -301,7 +292,8 @@ def with_other_conventions(
         other = labels.otherwise(assumed)
         try:
             with catch_warnings(action="ignore"):  # what is read was warned of when the job was read
-                again = _limited(read(phase=other.phase, angles=other.angles), options)
+                again = read(phase=other.phase, angles=other.angles)
+                again = limited(again, options.max_mass, options.limit)
                 correction = solve(again, options, solved.planes).result
         except ValueError:  # no answer, as where limits cannot be met
             continue
@@ -311,7 +303,7 @@ def with_other_conventions(
             same.append(words)
         elif not _alike(result, correction):
             others.append(([words], correction))
-    readings = tuple(one.otherwise(listing(words)) for words, one in others)
+    readings = tuple((listing(words), one) for words, one in others)
     return replace(result, convention_test=test, others=readings)
 
 

@@ -24,11 +24,6 @@ if TYPE_CHECKING:
 
 _ROWS = 6
 """Of the table that is printed with the answer."""
-_HEADINGS = {
-    **{"bearing": "bearing", "speed_rpm": "rpm", "load_N": "load, N", "eccentricity": "eccentricity"},
-    **{"attitude_deg": "attitude, °", "film_m": "least film, µm", "sommerfeld": "Sommerfeld"},
-}
-"""Of the printed tables."""
 _AXES = ("xx", "xy", "yx", "yy")
 
 
@@ -90,16 +85,16 @@ class BearingEquilibria:
         film = np.tile([one.wall for one in bearings], len(shown)) * (1 - e)
         columns = (
             Column("bearing", self.labels * len(shown)),
-            Column("node", [one.node for one in bearings] * len(shown)),
-            Column("speed_rad_s", speeds),
-            Column("speed_rpm", speeds * RPM, "{:.6g}".format),
-            Column("load_N", abs(load), figures),
+            Column("node", [one.node for one in bearings] * len(shown), None),
+            Column("speed_rad_s", speeds, None),
+            Column("speed_rpm", speeds * RPM, "{:.6g}".format, title="rpm"),
+            Column("load_N", abs(load), figures, title="load, N"),
             Column("eccentricity", e, "{:.4f}".format),
-            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format),
-            Column("film_m", film, lambda film: figures(1e6 * film)),
-            Column("sommerfeld", sommerfeld, figures),
-            *(Column(f"k{n}_N_per_m", values) for n, values in zip(_AXES, K, strict=True)),
-            *(Column(f"c{n}_N_s_per_m", values) for n, values in zip(_AXES, C, strict=True)),
+            Column("attitude_deg", np.degrees(attitude), "{:z.2f}".format, title="attitude, °"),
+            Column("film_m", film, lambda film: figures(1e6 * film), title="least film, µm"),
+            Column("sommerfeld", sommerfeld, figures, title="Sommerfeld"),
+            *(Column(f"k{n}_N_per_m", values, None) for n, values in zip(_AXES, K, strict=True)),
+            *(Column(f"c{n}_N_s_per_m", values, None) for n, values in zip(_AXES, C, strict=True)),
         )
         return Table("every speed", columns)
 
@@ -185,8 +180,8 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     return Outcome(
         result=result,
         sentences=(sentence(stability.sentence()) if stability else "One speed: no threshold is sought.",),
-        tables=(result.table(every).only(_HEADINGS),),
-        more=(table.only(_HEADINGS),) if every > 1 else (),
+        tables=(result.table(every),),
+        more=(table,) if every > 1 else (),
         short=every > 1,
         file=table,
         files={".toml": result.linear_files},

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
 from rotorid.commands.option_quantities import Errors, amplitude_errors
 from rotorid.report.options import file_of
@@ -102,7 +101,6 @@ def _at_best(model: HarmonicModel) -> Outcome:
         sentences=(f"Data can determine at best {listing(words, 'and')}.",),
         notes=(_NO_DATA,),
         keys={"combinations": words},
-        file=Table("combinations", (Column("combination", words),)),
-        lacking=_NO_DATA,
+        file=_NO_DATA,
         solved=model,
     )

@@ -72,8 +72,9 @@ def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPl
 
 
 def next_mode(job: Job, outlook: Correction | WhatIf) -> tuple[str, ...]:
-    """What the rotor model of a job says of the next mode beyond its readings; nothing without one."""
-    if job.rotor is None or not {*job.trials.sensors} <= job.sensor_places.keys():
+    """What the rotor model of a job says of the next mode beyond its readings, where that is made worse."""
+    assert job.rotor is not None
+    if not {*job.trials.sensors} <= job.sensor_places.keys():
         return ()
     from balancing import mode_made_worse, model_influence
     from fem import critical_speeds_below

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Excitation = Literal["force", "unbalance"]
 """What excites: the same, or as F, at every frequency; or growing with its square."""
-NO_MODES = Table("modes", (Column("mode", ()),))
 
 
 @dataclass(frozen=True)
@@ -86,10 +85,9 @@ def modes(data: Path | str, options: ModesOptions | None = None) -> Outcome:
         result=fit,
         sentences=(_sentence(fit),),
         tables=() if lacking else _tables(fit),
-        file=NO_MODES if lacking else fit.file_table(),
+        file=f"there is no table of modes: {lacking}" if lacking else fit.file_table(),
         keys=fit.to_dict(),
         pictures={"Readings and fit around each resonance.": picture},
-        lacking=lacking and f"there is no table of modes: {lacking}",
         title="Modes",
         warnings=fit.warnings,
         notes=() if lacking else fit.notes,

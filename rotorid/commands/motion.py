@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -336,15 +338,12 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
 
 def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     """Read "7=20um@90" as x + iy in m, by node."""
-    import numpy as np
-
-    from rotorid.commands.option_quantities import quantity
-    from rotorid.files import units
+    from rotorid.commands.option_quantities import length
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")
-        length = quantity(size, "--displaced", units.LENGTH, "20um")
-        return complex(length * np.exp(1j * np.radians(degrees(angle or "0", "--displaced"))))
+        turned = math.radians(degrees(angle or "0", "--displaced"))
+        return cmath.rect(length(size, "--displaced", "20um"), turned)
 
     return pairs(given or {}, "--displaced", read, "7=20um@90")
 

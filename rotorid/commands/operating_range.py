@@ -142,7 +142,7 @@ class Separation:
         return f"None lies in {within}; the nearest, {rpm_text(nearest)}, is {away:.1f} % away."
 
 
-def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
+def unsearched(first: float, last: float, operating: tuple[float, float]) -> str:
     """What keeps one from saying that nothing is in an operating range: speeds that were not searched.
 
     Parameters
@@ -150,12 +150,12 @@ def unsearched(first: float, last: float, operating: tuple[float, float] | None)
     first, last
         Between which speeds was searched, rad/s.
     operating
-        Operating range, rad/s; None: there is none.
+        Operating range, rad/s.
 
     Returns
     -------
     A clause; empty where all of the range was searched.
     """
-    if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
+    if first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6):
         return ""
     return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"

@@ -95,21 +95,21 @@ def speed_with_unit(given: Amount, what: str) -> float:
     return one_speed(given, what)
 
 
-def positions(given: Positions, what: str = "--planes") -> dict[str, float | None]:
+def positions(given: Positions) -> dict[str, float | None]:
     """Read "left=100mm,right=600mm" in m; None where there is no position."""
 
     def read(name: str, text: str) -> float | None:
-        return length(text, f"{what} {name}")
+        return length(text, f"--planes {name}")
 
-    return pairs(given, what, read, "left=100mm,right=600mm", lambda name: {name: None})
+    return pairs(given, "--planes", read, "left=100mm,right=600mm", lambda name: {name: None})
 
 
-def two_positions(given: str | tuple[float, float], what: str = "--bearings") -> tuple[float, float]:
+def two_positions(given: str | tuple[float, float]) -> tuple[float, float]:
     """Read "0mm,700mm" in m."""
     parts = given.split(",") if isinstance(given, str) else given
     if len(parts) != 2:
-        raise ValueError(f"{what} {given!r}: two positions are needed, such as 0mm,700mm")
-    first, second = (length(part, what, "0mm,700mm") for part in parts)
+        raise ValueError(f"--bearings {given!r}: two positions are needed, such as 0mm,700mm")
+    first, second = (length(part, "--bearings", "0mm,700mm") for part in parts)
     return first, second
 
 
@@ -234,7 +234,7 @@ def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
         weights = _limits(
             max_mass, "--max-mass", lambda w: units.weight(w or unit), si, example, "plane", planes, used
         )
-    amplitudes = _amplitudes(trials, limits)
+    amplitudes = _amplitudes(trials, limits) if limits else {}
     if not weights and not amplitudes:
         return job
     old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))

@@ -95,18 +95,13 @@ def _outcome(motion: PeriodicMotion, labels: Sequence[str], directions: FloatArr
         "warnings": motion.warnings,
         "reduction": reduction(motion.system),
     }
-    shown = {
-        name: _HEADINGS.get(name, f"{name[10:-2]}, µm")
-        for name in bifurcations.headings
-        if name != "speed_rad_s"
-    }
     return Outcome(
         result=motion,
         sentences=tuple(
             f"Branch {k}, {_judgement(branch, 1e6 * sizes[:, 0], first)}"
             for k, (branch, sizes) in enumerate(zip(branches, along, strict=True), 1)
         ),
-        tables=(bifurcations.only(shown) if bifurcations.rows else "No bifurcation.",),
+        tables=(bifurcations if bifurcations.rows else "No bifurcation.",),
         file=lambda: _points(branches, labels, along),
         keys=plain(document),
         pictures={
@@ -158,36 +153,23 @@ def _bifurcations(branches: Sequence[Branch], labels: Sequence[str], directions:
 
     each = [(k, branch, b) for k, branch in enumerate(branches, 1) for b in branch.bifurcations]
     sizes = amplitudes([b for _, _, b in each], directions)
+    # by the speed: the frequency that begins there, of a cycle its own; NaN where none begins
+    whirl = [(b.frequency if b.turns else math.tau / b.period) / b.speed for _, _, b in each]
     return Table(
         "bifurcations",
         (
             Column("branch", [k for k, _, _ in each]),
-            Column("kind", [branch.kind for _, branch, _ in each]),
+            Column("kind", [branch.kind for _, branch, _ in each], title="motion"),
             Column("bifurcation", [b.bifurcation for _, _, b in each]),
-            Column("speed_rad_s", [b.speed for _, _, b in each]),
-            Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format),
-            Column("whirl_ratio", [_whirl(b) for _, _, b in each], "{:.4f}".format),
+            Column("speed_rad_s", [b.speed for _, _, b in each], None),
+            Column("speed_rpm", [b.speed * RPM for _, _, b in each], "{:.6g}".format, title="rpm"),
+            Column("whirl_ratio", whirl, "{:.4f}".format, title="whirl/speed"),
             *(
-                Column(f"amplitude_{name}_m", values, lambda metres: f"{1e6 * metres:.4g}")
+                Column(f"amplitude_{name}_m", values, lambda x: f"{1e6 * x:.4g}", title=f"{name}, µm")
                 for name, values in zip(labels, sizes.T, strict=True)
             ),
         ),
     )
-
-
-_HEADINGS = {
-    "branch": "branch",
-    "kind": "motion",
-    "bifurcation": "bifurcation",
-    "speed_rpm": "rpm",
-    "whirl_ratio": "whirl/speed",
-}
-"""Of the bifurcations, in the answer."""
-
-
-def _whirl(orbit: Orbit) -> float:
-    """Frequency that begins there, of a cycle its own, by the speed; NaN where none begins."""
-    return (orbit.frequency if orbit.turns else math.tau / orbit.period) / orbit.speed
 
 
 def _period(branch: Branch, orbit: Orbit) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, error_figures, figures, listing
-from rotorid.commands.modes import NO_MODES, bands, frequencies
+from rotorid.commands.modes import bands, frequencies
 from rotorid.commands.quantities import Band, acceleration, one_of
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
@@ -122,9 +122,8 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
     return Outcome(
         result=modes,
         sentences=(_sentence(sweep.run, fit),),
-        tables=(*([_table(fit, steady)] if fit else []), *([_plain(slow, sweep)] if slow else [])),
-        file=fit.file_table("critical_speed_rpm", RPM) if fit else NO_MODES,
-        lacking=f"there is no table of modes: {doubts[0]}" if doubts else "",
+        tables=(*([_table(fit, steady)] if fit else []), *([slow] if slow else [])),
+        file=fit.file_table("critical_speed_rpm", RPM) if fit else f"there is no table of modes: {doubts[0]}",
         title="Run-up",
         keys=dict(plain(document)),
         pictures={"Vectors over speed, less the slow roll.": lambda: _figure(sweep, fit, roll)},
@@ -202,19 +201,11 @@ def _roll_table(sweep: Readings, vectors: ComplexArray, std: FloatArray) -> Tabl
     size, angle = labels.vibration(vectors)
     columns = (
         Column("sensor", sweep.sensors),
-        Column(f"amplitude{unit}", size, figures),
-        Column(f"std{unit}", labels.vibration_scale * std, error_figures),
-        Column("phase_deg", angle, "{:.1f}".format),
+        Column(f"amplitude{unit}", size, figures, title=f"slow roll, {labels.vibration_in}".rstrip(", ")),
+        Column(f"std{unit}", labels.vibration_scale * std, error_figures, title="±"),
+        Column("phase_deg", angle, "{:.1f}".format, title=f"phase ({labels.phase}), °"),
     )
     return Table("slow roll", columns)
-
-
-def _plain(table: Table, sweep: Readings) -> Table:
-    """With headings for people."""
-    labels = sweep.labels
-    words = {"amplitude": f"slow roll, {labels.vibration_in}".rstrip(", "), "std": "±"}
-    words["phase"] = f"phase ({labels.phase}), °"
-    return table.only({name: words.get(name.partition("_")[0], name) for name in table.headings})
 
 
 def _modes(fit: FittedModes, steady: FittedModes | None) -> list[dict[str, Any]]:
@@ -224,7 +215,7 @@ def _modes(fit: FittedModes, steady: FittedModes | None) -> list[dict[str, Any]]
     def named(values: FloatArray) -> dict[str, Any]:
         return dict(zip(names, values, strict=True))
 
-    k, ci95 = len(fit.ends), fit.fit.ci95
+    k, ci95 = len(fit.ends), fit.fit.estimate.ci95
     return [
         {
             "mode": r + 1,

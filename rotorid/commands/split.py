@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.base.tables import Column, Table
 from rotorid.commands.option_quantities import length, positions, size, vectors, weight, weights
 from rotorid.commands.quantities import degrees, pairs
 from rotorid.report.options import changed, refuse
@@ -121,8 +120,7 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     return Outcome(
         result=placed,
         sentences=(placed.sentence(labels), *below),
-        file=Table("weight", (Column("weight", ()),)),
-        lacking="there is no table of one weight: see to_dict()",
+        file="there is no table of one weight: see to_dict()",
         keys=placed.to_dict(labels),
         pictures={"": lambda: _figure(placed, labels, target)},
     )
@@ -153,7 +151,7 @@ def _at_two_angles(target: complex, labels: Labels, radius: float | None, option
 def _in_planes(given: list[complex], options: SplitOptions) -> OneWeight:
     from balancing.one_weight import TwoPlanes
 
-    planes = positions(options.planes or "", "--planes")
+    planes = positions(options.planes or "")
     places = {name: place for name, place in planes.items() if place is not None}
     if len(planes) != 2 or len({*places.values()}) != 2:
         raise ValueError("--planes needs two at different positions, such as left=100mm,right=600mm")

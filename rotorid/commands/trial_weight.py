@@ -176,15 +176,14 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
         )
     weights = []
     for name in names(options.plane) or used_planes(job, influence):
-        limit, radius = inf, None if unbalances else (job.radii.get(name) or stated)
-        if job.limits is not None and name in job.planes:
-            limit = float(job.limits.max_weight[list(job.planes).index(name)])
+        radius = None if unbalances else (job.radii.get(name) or stated)
+        limits = job.limits_of([name] if name in job.planes else [])
         weights.append(
             trial_from_coefficients(
                 today,
                 name,
                 share=(40.0 if options.share is None else options.share) / 100,
-                limit=limit,
+                limit=inf if limits is None else float(limits.max_weight.min(initial=inf)),
                 radius=radius,
                 trial_radius=stated or getattr(job.planes.get(name), "trial_radius", None)
                 if radius is not None

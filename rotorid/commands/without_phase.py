@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
+from rotorid.report.options import changed, option_name
 from rotorid.report.outcome import Outcome, Written, outcome_of, provenance
 
 if TYPE_CHECKING:
@@ -14,22 +17,11 @@ if TYPE_CHECKING:
     from rotorid.commands.balance_solution import BalanceOptions
     from rotorid.files import Job
 
-_REFUSED = {
-    "method": "--method",
-    "influence": "--influence",
-    "coefficients": "--coefficients",
-    "machine_type": "--type",
-    "planes": "--planes",
-    "speeds": "--speeds (leave rows out)",
-    "limit": "--limit",
-    "ridge": "--ridge",
-    "split": "--split (rotorid split puts a weight into holes)",
-    "refine": "--refine",
-    "weights": "--weights",
-    "grade": "--grade",
-    "rotor_mass": "--rotor-mass",
-    "service_speed": "--service-speed",
-}
+_REFUSED = (
+    *("method", "influence", "coefficients", "machine_type", "planes", "speeds", "limit", "ridge", "split"),
+    *("refine", "weights", "grade", "rotor_mass", "service_speed"),
+)
+_INSTEAD = {"speeds": " (leave rows out)", "split": " (rotorid split puts a weight into holes)"}
 
 
 def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
@@ -40,14 +32,11 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
     ValueError
         For options and parts of the job that need phases, all in one message; UndeterminedError.
     """
-    import numpy as np
-
     from balancing import balance_without_phase
 
-    given = [flag for name, flag in _REFUSED.items() if getattr(options, name) not in (None, False, ())]
-    limited = job.limits is not None and np.isfinite(job.limits.residual).any()
+    given = [option_name(name) + _INSTEAD.get(name, "") for name in changed(options) if name in _REFUSED]
+    limited = job.limits is not None and job.limits.residual.min() < inf
     of_job = {
-        "holes (rotorid split puts a weight into them)": job.holes,
         "limits of sensors": limited,
         "zones": job.zones,
         "the check run (add it to the runs, with its weights)": job.check is not None,
@@ -56,9 +45,14 @@ def balanced_without_phase(job: Job, options: BalanceOptions) -> Outcome:
         raise ValueError(f"the runs have no phases: leave {listing(given, 'and')} away")
     planes = job.trials.planes
     remove = [plane for plane in planes if job.planes[plane].remove]
+    limits = job.limits_of(planes)
     result = balance_without_phase(
-        job.trials, limits=job.limits_of(planes), row_weights=job.row_weights, remove=remove
+        job.trials, limits=limits, row_weights=job.row_weights, remove=remove, holes=job.holes
     )
+    if job.holes:
+        note = "the weights stand at any angle: rotorid split puts them into holes"
+        decision = replace(result.decision, notes=(*result.decision.notes, note))
+        result = replace(result, decision=decision)
 
     def coefficients(_: Path) -> Written:
         raise ValueError("amplitudes give no influence coefficients: write a table, .csv or .xlsx")

@@ -11,47 +11,37 @@ from rotorid.base.lazy_names import lazy_names
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from rotorid.files.influence import influence_frame, read_influence, write_influence
+    from rotorid.files.influence import read_influence, write_influence
     from rotorid.files.job import Job, job_from_files, read_job
-    from rotorid.files.job_models import Errors
-    from rotorid.files.layout import Conventions
     from rotorid.files.measurements import read_measurements, read_record
     from rotorid.files.model import HarmonicFile, read_harmonic_model, read_ode_model
     from rotorid.files.node_tables import (
-        MeasuredModes,
         read_bow,
         read_compliance,
         read_modes,
         read_unbalance,
     )
-    from rotorid.files.problems import InputError, Problem, TableWarning
+    from rotorid.files.problems import InputError, TableWarning
     from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
     from rotorid.files.runs import read_trials
     from rotorid.files.small_model import read_small_model
 
 _NAMES = {
-    "layout": "Conventions",
-    "influence": "influence_frame read_influence write_influence",
+    "influence": "read_influence write_influence",
     "job": "Job job_from_files read_job",
-    "job_models": "Errors",
     "measurements": "read_measurements read_record",
     "model": "HarmonicFile read_harmonic_model read_ode_model",
-    "node_tables": "MeasuredModes read_bow read_compliance read_modes read_unbalance",
-    "problems": "InputError Problem TableWarning",
+    "node_tables": "read_bow read_compliance read_modes read_unbalance",
+    "problems": "InputError TableWarning",
     "rotor": "read_rotor rotor_files write_rotor",
     "runs": "read_trials",
     "small_model": "read_small_model",
 }
 __all__ = [
-    "Conventions",
-    "Errors",
     "HarmonicFile",
     "InputError",
     "Job",
-    "MeasuredModes",
-    "Problem",
     "TableWarning",
-    "influence_frame",
     "job_from_files",
     "read_bow",
     "read_compliance",

@@ -20,7 +20,7 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
 from rotorid.files.problems import InputError, Problems
-from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed
+from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, optional
 from rotorid.files.units import one_of
 
 T = TypeVar("T")
@@ -68,10 +68,9 @@ class _SupportKeys(Place):
     )
     kind: Literal["bearing", "seal"] = key("which it is, where it is another one", default="bearing")
     pedestal_mass: NotNegative = key("mass of what it stands on", "pedestal_mass_kg", 0.0, units=units.MASS)
-    pedestal_stiffness: OneOrTwo = key(  # type: ignore[valid-type]
+    pedestal_stiffness: OneOrTwo = optional(  # type: ignore[valid-type]
         "its stiffness; one number, or two for x and y",
         "pedestal_stiffness_N_per_m",
-        None,
         units=units.STIFFNESS,
     )
     pedestal_damping: OneOrTwo = key(  # type: ignore[valid-type]
@@ -80,7 +79,7 @@ class _SupportKeys(Place):
         (0.0, 0.0),
         units=units.DAMPING,
     )
-    table: Text | None = key("a table of these coefficients over speed", default=None)
+    table: Text | None = optional("a table of these coefficients over speed")
 
     @property
     def constants(self) -> dict[str, Any]:
@@ -120,7 +119,7 @@ def _coefficient(name: str) -> Any:  # noqa: ANN401
         motion = "displacement" if name[0] == "k" else "velocity"
         about = f"force in {name[1]} against a {motion} in {name[2]}; also `{name}` alone, in SI"
         names += f" {name}"
-    return Number | None, key(about, names, None, units=_COEFFICIENTS[name][1])
+    return Number | None, optional(about, names, units=_COEFFICIENTS[name][1])
 
 
 SupportKeys = create_model(
@@ -278,10 +277,10 @@ def _over_speed(path: Path, kind: str) -> Table:
     """A table of coefficients."""
     problems = Problems()
     table = read_table(path, kind, COLUMNS, problems)
-    rising = ~(np.diff(table.numbers("speed"), prepend=-1e-300) <= 0)
-    table.must_be("speed", rising, "a speed of 0 or more, above that of the row before (each once)")
+    falling = np.diff(table.numbers("speed"), prepend=-1e-300) <= 0
+    table.complain_where(falling, "speed", "a speed of 0 or more, above that of the row before (each once)")
     for name in _DIAGONAL if kind == "bearing" else ():
-        table.must_be(name, table.numbers(name) >= 0, OUTWARDS)
+        table.complain_where(table.numbers(name) < 0, name, OUTWARDS)
     if len(table) == 1:
         table.complain(0, "speed", "two speeds at least: a table says how coefficients change")
     problems.stop()

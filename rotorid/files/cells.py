@@ -110,8 +110,6 @@ class Grid:
         Row number and cells, each as long as the header.
     separator
         Between the columns of a text file; empty for a sheet.
-    comments
-        Comment lines without `#`.
     complete
         False where a line could not be split into cells, so that nothing can be said about missing rows.
     named
@@ -123,7 +121,6 @@ class Grid:
     header: tuple[str, ...]
     rows: tuple[Row, ...]
     separator: str = ""
-    comments: tuple[str, ...] = ()
     complete: bool = True
     named: tuple[tuple[str, ...], ...] = ()
 
@@ -201,9 +198,14 @@ def parse_text(
             rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
             problems.add(f"{rule}: {error}", source, number)
             complete = False
-    place = start, names
     return make_grid(
-        source, rows, separator, problems, place=place, complete=complete, may_be_empty=may_be_empty
+        source,
+        rows,
+        separator,
+        problems,
+        place=(start, names),
+        complete=complete,
+        may_be_empty=may_be_empty,
     )
 
 
@@ -312,7 +314,7 @@ def make_grid(
                     )
                 problems.add(expected, source, number, None, show(cells[lost[-1]]))
         body = [(number, (cells + ("",) * width)[:width]) for number, cells in body]
-    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
+    return Grid(source, header_row, tuple(header), tuple(body), separator, complete)
 
 
 class NotANumber(ValueError):

@@ -27,7 +27,7 @@ from rotorid.files import units
 from rotorid.files.columns import Source, source_name
 from rotorid.files.layout import Conventions
 from rotorid.files.problems import Problems
-from rotorid.files.runs import make_trials, nearest_speed, show_speed, show_speeds
+from rotorid.files.runs import make_trials, nearest_speed, show_speeds
 
 if TYPE_CHECKING:
     from rotorid.files.job_models import Errors
@@ -56,10 +56,9 @@ def outside(
     for column, unit, other in pairs:
         if unit.kind != other.kind:
             yield column, unit.name or "no unit", f"{other.name or 'no unit'}, or a unit that converts to it"
-    rpm = units.SPEED[labels.speed_unit]
     for speed in part.speeds.tolist():
         if nearest_speed(whole.speeds, speed, tolerance_percent) is None:
-            yield "speed", show_speed(speed, rpm), show_speeds(whole.speeds, rpm)
+            yield "speed", labels.speed_words(speed), show_speeds(whole.speeds, labels)
 
 
 def make_slow_roll(
@@ -106,10 +105,9 @@ def make_slow_roll(
                 "unbalanced"
             )
     elif None in near:
-        unit = units.SPEED[trials.labels.speed_unit]
-        missing = show_speed(float(trials.speeds[near.index(None)]), unit)
+        missing = trials.labels.speed_words(trials.speeds[near.index(None)])
         expected = "one slow speed, whose vectors hold for all speeds, or vectors at every speed of the "
-        expected += f"job: {missing} is not among {show_speeds(runs.speeds, unit)}"
+        expected += f"job: {missing} is not among {show_speeds(runs.speeds, trials.labels)}"
         problems.add(expected, place, None, "speed")
     else:
         vectors = vectors[near]
@@ -180,7 +178,7 @@ def check_runs(
     near = [nearest_speed(job.speeds, v, band) for v in check.speeds.tolist()]
     for k, at in enumerate(near):
         if at is not None and at in near[:k]:
-            shown = show_speed(float(check.speeds[k]), units.SPEED[check.labels.speed_unit])
+            shown = check.labels.speed_words(check.speeds[k])
             problems.add("each speed of the job once", runs, None, "speed", shown)
     if len(problems) > before:
         return None

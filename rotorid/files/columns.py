@@ -31,7 +31,7 @@ from rotorid.files.cells import (
     show,
     thousands_or_decimals,
 )
-from rotorid.files.disk import is_workbook, read_bytes
+from rotorid.files.disk import file_content, is_workbook
 from rotorid.files.problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader
 
@@ -130,12 +130,29 @@ class Table:
         return values
 
     def steps(self, stem: str) -> FloatArray:
-        """Steps in SI in which the numbers of a column without problems are written, shape (rows,)."""
-        return np.asarray(written_steps(self.fields[stem].cells) * self.unit(stem).to_si(1.0))
+        """Steps in SI in which the numbers of a column without problems are written, shape (rows,).
+
+        98 is written in 1, 0.3 in 0.1, 1.2e-3 in 1e-4. Spreadsheets drop zeros at the end: beside 12.75 a
+        cell with 13 means 13.00. With D the most decimals and m the most significant digits of any number of
+        the column, a number whose first digit stands at 10^e and that has d decimals counts as written with
+        max(d, min(D, m − 1 − e)) of them, 0 with D. So columns with a fixed number of decimals and columns
+        with a fixed number of significant digits both come out right as soon as one number shows all its
+        digits, and a step is never smaller than that of the instrument. Zeros at the end of whole numbers are
+        not counted as significant. A number with more than 15 digits comes from a computation, and counts as
+        it is to 12. Cells of a workbook have the digits that their format shows, or as many as they need.
+        """
+        cells = self.fields[stem].cells
+        texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
+        digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
+        decimals, significant, first = np.array([digits[text] for text in texts], dtype=int).reshape(-1, 3).T
+        most = decimals.max(initial=-99)
+        fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
+        written = np.where(significant > 0, np.maximum(decimals, fixed), most)
+        return np.asarray(10.0**-written * self.unit(stem).to_si(1.0))
 
     def texts(self, stem: str) -> tuple[str, ...]:
-        """Values of a text column."""
-        return tuple(self.fields[stem].values)
+        """Values of a text column; blanks if the table has no such column."""
+        return tuple(self.fields[stem].values) if stem in self else ("",) * len(self)
 
     def unit(self, stem: str) -> Unit:
         """The unit of a column."""
@@ -156,7 +173,7 @@ class Table:
         self.problems.add(expected, self.grid.source, self.rows[index], name, self.shown(stem, index))
 
     def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
-        """Note a problem with each of these cells of a column."""
+        """Note a problem with each of these cells; a comparison is false of NaN, which has been reported."""
         for index in np.flatnonzero(wrong):
             self.complain(index, stem, expected)
 
@@ -169,20 +186,14 @@ class Table:
         field = self.fields.get(column or "")
         self.problems.add(expected, self.grid.source, row, field.name if field else column)
 
-    def must_be(self, stem: str, allowed: FloatArray | Iterable[bool], expected: str) -> None:
-        """Complain about every number of a column that is not allowed; unreadable ones have been reported."""
-        if stem in self:
-            bad = ~np.fromiter(allowed, dtype=bool, count=len(self))
-            self.complain_where(bad & ~np.isnan(self.numbers(stem)), stem, expected)
-
-    def only(self, stems: Sequence[str], usual: str, expected: str) -> str | None:
-        """The one column that there is of several (`usual`: the name of one); else None and a problem."""
+    def only(self, stems: Sequence[str], usual: str, expected: str) -> str:
+        """The one column that there is of several (`usual`: the name of one); else raises all problems."""
         present = [stem for stem in stems if stem in self]
-        if len(present) == 1:
-            return present[0]
-        if present or self.misspelt.isdisjoint(stems):
-            self.in_header(present[1] if present else usual, expected)
-        return None
+        if len(present) != 1:
+            if present or self.misspelt.isdisjoint(stems):
+                self.in_header(present[1] if present else usual, expected)
+            self.problems.stop()
+        return present[0]
 
     def once(self, stem: str, values: Iterable[Hashable], expected: str) -> None:
         """Complain about each row of a value that stood before; `expected` has {} for the row of the first.
@@ -252,11 +263,9 @@ def read_grid(
         from rotorid.files.excel_workbook import pick_sheet, read_workbook
 
         title, rows = pick_sheet(path, read_workbook(path, problems), sheet, first=first)
-        place = header_place(rows, find)
-        name = f"{path} (sheet {title!r})"
+        name, place = f"{path} (sheet {title!r})", header_place(rows, find)
         return make_grid(name, rows, "", problems, place=place, may_be_empty=may_be_empty)
-    data = read_bytes(path)
-    text = decode(str(path), data[:TOP] if top else data)
+    text = decode(str(path), file_content(path)[: TOP if top else None])
     return parse_text(str(path), text, problems, may_be_empty=may_be_empty, find=find)
 
 
@@ -396,41 +405,9 @@ def _value(cell: Cell, unit: Unit, separator: str, doubtful: set[str], *, comma:
     written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
     check_size(written)
     value = math.nan if unit is UNCLEAR else unit.to_si(written)
-    if math.isinf(value):
-        raise NotANumber("a finite number")
     if unit.kind == "angle" and abs(value) > FULL_TURN:
         raise NotANumber("an angle from -360 to 360 degrees")
     return value
-
-
-def written_steps(cells: Sequence[Cell]) -> FloatArray:
-    """Steps in which the numbers of a column are written, in its unit: 98 in 1, 0.3 in 0.1, 1.2e-3 in 1e-4.
-
-    Spreadsheets drop zeros at the end: beside 12.75 a cell with 13 means 13.00. With D the most decimals and
-    m the most significant digits of any number of the column, a number whose first digit stands at 10^e and
-    that has d decimals counts as written with max(d, min(D, m − 1 − e)) of them, 0 with D. So columns with
-    a fixed number of decimals and columns with a fixed number of significant digits both come out right as
-    soon as one number shows all its digits, and a step is never smaller than that of the instrument. Zeros
-    at the end of whole numbers are not counted as significant. A number with more than 15 digits comes from
-    a computation, and counts as it is to 12.
-
-    Parameters
-    ----------
-    cells
-        Of one column; all hold numbers. Those of a workbook have the digits that their format shows, or as
-        many as they need.
-
-    Returns
-    -------
-    ndarray
-        Shape (rows,), 10 to the power of minus the decimals.
-    """
-    texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
-    digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
-    decimals, significant, first = np.array([digits[text] for text in texts], dtype=int).reshape(-1, 3).T
-    most = decimals.max(initial=-99)
-    fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
-    return np.asarray(10.0 ** -np.where(significant > 0, np.maximum(decimals, fixed), most))
 
 
 def _digits(text: str) -> tuple[int, int, int]:

@@ -46,21 +46,24 @@ def file_content(path: Path) -> bytes:
 
     Raises
     ------
-    OSError
+    InputError
         If it cannot be read, is larger than 200 MB, or no regular file (a pipe could go on for ever).
     """
     contents, asked = _files.get() or ({}, {})
     asked[path] = None
     if path in contents:
         return contents[path]
-    if _files.get() is None or str(path) != STANDARD_INPUT:
-        data = first_bytes(path, MOST_BYTES + 1)
-    elif sys.stdin is None:
-        raise OSError(errno.EBADF, "it is closed", str(path))
-    else:
-        data = sys.stdin.buffer.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
+    try:
+        if _files.get() is None or str(path) != STANDARD_INPUT:
+            data = first_bytes(path, MOST_BYTES + 1)
+        elif sys.stdin is None:
+            raise OSError(errno.EBADF, "it is closed", str(path))
+        else:
+            data = sys.stdin.buffer.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
+    except (OSError, ValueError) as error:
+        raise refusal(path, why_unreadable(path, error)) from error
     log.debug("read %s, %d bytes", path, len(data))
     contents[path] = data
     return data
@@ -96,14 +99,6 @@ def sha256(path: Path) -> str:
         return hashlib.sha256(file_content(path)).hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def read_bytes(path: Path) -> bytes:
-    """The content of a file; InputError where it cannot be read."""
-    try:
-        return file_content(path)
-    except (OSError, ValueError) as error:
-        raise refusal(path, why_unreadable(path, error)) from error
 
 
 def is_workbook(path: Path) -> bool:

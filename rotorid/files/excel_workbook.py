@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.files.cells import MOST_CELLS, BadCell, Cell, Row, Shown, clean
-from rotorid.files.disk import read_bytes
+from rotorid.files.disk import file_content
 from rotorid.files.problems import InputError, Problems, refusal
 
 MOST_UNPACKED = 200_000_000
@@ -32,7 +32,7 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]]:
     Formulas count with the values that the spreadsheet program stored.
     """
     try:
-        return _sheets(path, read_bytes(path), problems)
+        return _sheets(path, file_content(path), problems)
     except InputError:
         raise
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class

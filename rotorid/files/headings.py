@@ -15,7 +15,6 @@ from functools import lru_cache
 
 from rotorid.base.choices import suggest
 from rotorid.files import units
-from rotorid.files.cells import MOST_ABOVE
 from rotorid.files.columns import REMARKS
 from rotorid.files.units import UnitError, one_of
 
@@ -178,7 +177,7 @@ def read_unit(stem: str, text: str) -> tuple[str, str]:
     if stem != "amplitude":
         return one_of(units.SPEED if stem == "speed" else units.ANGLE)(base).name, direction
     if f"{base}_pp" not in units.VIBRATION:
-        units.vibration(units.spelt(plain))
+        units.vibration(plain)
         raise UnitError(
             f"a unit of vibration, such as um pp or mm/s rms, not {plain!r} (a label: amplitude_div)"
         )
@@ -212,7 +211,7 @@ def find_header(
     That is the row with most of its columns, or several that make one: names over the columns of each
     sensor, `Bearing 1` over `mils` and `deg`, and a row of units.
     """
-    for at, cells in enumerate(rows[:MOST_ABOVE]):
+    for at, cells in enumerate(rows):
         names, last = cells, at
         for below in rows[at + 1 : at + 3]:
             if (both := _as_one(names, below, weights=weights)) is None:

@@ -24,17 +24,15 @@ from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.check_and_slow_roll import outside
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
-from rotorid.files.disk import read_bytes, write_files
+from rotorid.files.disk import file_content, write_files
 from rotorid.files.headings import read_headings, read_unit, readable
 from rotorid.files.layout import vector_in
 from rotorid.files.problems import MOST_LINES, Problems, refusal
-from rotorid.files.runs import SPEED, nearest_speed, show_speed
+from rotorid.files.runs import SPEED, nearest_speed, speed_words
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-    import pandas as pd
 
 _NAMED = re.compile(r"(?:influence|sensitivity|coefficient)s?[\s_]*[(\[]?(.+?)[)\]]?", re.IGNORECASE)
 _PATTERN = (
@@ -164,9 +162,9 @@ def _from_table(table: Table, labels: Labels) -> Influence:
     vibration, weight, reciprocal = _units(unit.name)
     keys = [*zip(table.numbers("speed").tolist(), table.texts("sensor"), table.texts("plane"), strict=True)]
     least = "a weight above 0" if reciprocal else "a coefficient of 0 or more"
-    table.must_be("influence", (size > 0) | (size == 0) & (not reciprocal), least)
-    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("std", table.numbers("std") >= 0, "a standard deviation of 0 or more")
+    table.complain_where((size < 0) | (size == 0) & reciprocal, "influence", least)
+    table.complain_where(table.numbers("speed") <= 0, "speed", "a speed above 0")
+    table.complain_where(table.numbers("std") < 0, "std", "a standard deviation of 0 or more")
     if reciprocal and (std or len({key[1:] for key in keys}) > 1):
         alone = "one sensor, one plane and no errors: a weight per vibration is of one alone"
         table.in_header("influence", alone)
@@ -176,9 +174,9 @@ def _from_table(table: Table, labels: Labels) -> Influence:
     table.problems.stop()
     speeds, sensors, planes = ([*dict.fromkeys(each)] for each in zip(*keys, strict=True))
     speeds.sort()
-    row = {key: k for k, key in enumerate(keys)}
+    row, shown = {key: k for k, key in enumerate(keys)}, speed_words(table)
     for place in islice((key for key in product(speeds, sensors, planes) if key not in row), MOST_LINES):
-        words = f"sensor {place[1]!r} and plane {place[2]!r} at {show_speed(place[0], table.unit('speed'))}"
+        words = f"sensor {place[1]!r} and plane {place[2]!r} at {shown(place[0])}"
         table.as_whole("plane", f"a coefficient of {words}")
     table.problems.stop()
     S, C, P = len(speeds), len(sensors), len(planes)
@@ -203,7 +201,7 @@ def _from_table(table: Table, labels: Labels) -> Influence:
 
 def _from_json(path: Path) -> Influence:
     """The coefficients of `_document`; InputError for anything else."""
-    data, problems = read_bytes(path), Problems()
+    data, problems = file_content(path), Problems()
     try:
         whole = json.loads(data)
         problems.refuse_newer(str(path), whole["schema_version"])
@@ -266,7 +264,7 @@ def _document(influence: Influence) -> dict[str, Any]:
     return plain({"schema_version": SCHEMA_VERSION, "influence": stored})
 
 
-def influence_frame(influence: Influence) -> pd.DataFrame:
+def influence_table(influence: Influence) -> tables.Table:
     """Influence coefficients as the table that `read_influence` reads, in their units and conventions.
 
     Parameters
@@ -276,18 +274,16 @@ def influence_frame(influence: Influence) -> pd.DataFrame:
 
     Returns
     -------
-    pandas.DataFrame
+    rotorid.base.tables.Table
         `speed_<unit>`, `sensor`, `plane`, `influence_<unit>`, `phase_lead_deg` or `phase_lag_deg`; where
         their errors are known, `std_<unit>`: one standard deviation, the same in every direction.
     """
-    import pandas as pd
-
     labels = influence.labels
     S, C, P = influence.W.shape
     speed = units.SPEED[labels.speed_unit]
     unit = "_".join(filter(None, (labels.vibration_unit, "per", labels.weight_unit)))
     size, phase = labels.vibration(influence.W / labels.weight_scale)
-    columns: dict[str, Any] = {
+    columns = {
         f"speed_{speed.name}": np.repeat(influence.speeds * speed.scale, C * P),
         "sensor": [name for _ in range(S) for name in influence.sensors for _ in range(P)],
         "plane": influence.planes * (S * C),
@@ -297,7 +293,7 @@ def influence_frame(influence: Influence) -> pd.DataFrame:
     if influence.known_errors:
         variance = np.einsum("scii->sci", influence.channels())[..., 2:].reshape(S, C, P, 2).mean(axis=-1)
         columns[f"std_{unit}"] = (np.sqrt(variance) * labels.vibration_scale / labels.weight_scale).ravel()
-    return pd.DataFrame(columns)
+    return tables.Table("influence", tuple(tables.Column(name, cells) for name, cells in columns.items()))
 
 
 def write_influence(path: str | Path, influence: Influence) -> None:
@@ -329,9 +325,7 @@ def influence_bytes(path: str | Path, influence: Influence) -> bytes:
         return json.dumps(_document(influence), ensure_ascii=False).encode()
     if kind not in (".csv", ".xlsx"):
         raise refusal(path, "a name that ends in .csv, .xlsx or .json")
-    frame = influence_frame(influence)
-    columns = (tables.Column(str(name), values.tolist()) for name, values in frame.items())
-    table = tables.Table("influence", tuple(columns))
+    table = influence_table(influence)
     return tables.csv(table) if kind == ".csv" else tables.excel(table)
 
 

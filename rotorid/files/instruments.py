@@ -75,9 +75,10 @@ def read_samples(path: Path) -> Sampled:
     """
     with _reading(path):
         first_bytes(path, 1)
-        if path.suffix.lower() not in READERS:
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
             raise refusal(path, f"waveforms in a file {listing(READERS)}")
-        sampled = READERS[path.suffix.lower()](path)
+        sampled = reader(path)
     lengths = {name: len(channel) for name, channel in sampled.channels.items()}
     if len({*lengths.values()}) != 1 or min(lengths.values()) < 2:
         shown = listing((f"{name} {length}" for name, length in lengths.items()), "and") or "none"
@@ -153,8 +154,8 @@ def _read_text(path: Path) -> Sampled:
     if bad := [name for name in names if not name or names.count(name) > 1]:
         expected = "a column a channel, a row a sample, and above them a name for each column, each once"
         raise refusal(path, expected, above or 1, None, bad[0])
-    body = text.split("\n", above)[-1]
-    stream = io.StringIO(body if separator == "," else body.replace(",", "."))
+    body = text.split("\n", above)[-1].encode()
+    stream = io.BytesIO(body if separator == "," else body.replace(b",", b"."))
     try:
         frame = pd.read_csv(stream, sep=separator, header=None, skip_blank_lines=False, skipinitialspace=True)
     except ValueError as error:  # a ParserError too

@@ -291,15 +291,14 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         from rotorid.files.check_and_slow_roll import check_runs
 
         sources = tables["check"], mounted
-        stated_errors = settings.errors
         check = check_runs(
-            sources, trials, [*planes], groups, conventions, stated_errors, slow_roll, problems
+            sources, trials, [*planes], groups, conventions, settings.errors, slow_roll, problems
         )
         if check is not None and mounted is not None:
             holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
     files = (written.path, *map(tables.get, TABLES), *model_files, *records)
-    sensors = {name: settings.sensors.get(name, Sensor()) for name in trials.sensors}
+    sensors = {name: settings.sensors.get(name, Sensor.model_construct()) for name in trials.sensors}
     key_phasor = trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0)
     # phases always matter, the direction of angles as soon as one is written other than 0° and 180°
     degrees = [angle for plane in planes.values() for angle in plane.angles]
@@ -366,15 +365,14 @@ def _readings(
         expected = 'the check runs too, check = "check.csv" (in a workbook a sheet check)'
         settings.complain(problems, "check_weights", expected)
     before, runs, influence, source = len(problems), tables["runs"], None, tables.get("influence")
-    phase, angles = settings.phase or stated_phase(runs), settings.angles
-    stated = dict[str, Any]()
+    phase, stated = settings.phase or stated_phase(runs), dict[str, Any]()
     settings = settings.model_copy(update={"phase": phase})
     if source is not None:
         from rotorid.files.influence import fit_to_readings, load_influence
 
-        resolved = None if angles is None else resolve_angles(angles, settings.rotation)
+        angles = resolve_angles(settings.angles, settings.rotation)
         try:
-            influence, stated = load_influence(source, phase, resolved)
+            influence, stated = load_influence(source, phase, angles)
         except InputError as error:
             problems.extend(error.problems)
     conventions = conventions_of(settings, stated)
@@ -398,7 +396,7 @@ def _readings(
         return None
     labels, its = conventions.labels, trials.labels if influence is None else influence.labels
     labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
-    notes = [] if source is None else _on_conventions(conventions, labels, source_name(source))
+    notes = [] if source is None else _on_conventions(conventions, stated, labels, source_name(source))
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
     vectors, slow_roll = tables.get("slow_roll"), None
     if vectors is not None:
@@ -410,34 +408,38 @@ def _readings(
     return trials, influence, conventions, slow_roll
 
 
-def _on_conventions(conventions: Conventions, labels: Labels, name: str) -> list[str]:
-    """What readings take from stored coefficients that state their conventions."""
-    usual = vars(Labels())
-    adopted = [key for key in conventions.unstated if getattr(labels, key) != usual[key]]
-    words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
-    note = f"nothing states the conventions of the readings: those of {name} are used for them too, {words}"
-    return [note] if adopted else []
+def _on_conventions(
+    conventions: Conventions, stated: Mapping[str, Any], labels: Labels, name: str
+) -> list[str]:
+    """What readings take from stored coefficients that state their conventions, or these from readings."""
+    usual, notes = vars(Labels()), list[str]()
+    each = (conventions.unstated, "the readings", name), ({"phase"} - {*stated}, name, "the readings")
+    for unstated, one, other in each:
+        adopted = [key for key in unstated if getattr(labels, key) != usual[key]]
+        words = " and ".join(f"{key} = {getattr(labels, key)}" for key in adopted)
+        words = f"nothing states the conventions of {one}: those of {other} are used for them too, {words}"
+        notes += [words] if adopted else []
+    return notes
 
 
-def conventions_of(settings: JobSettings, stored: Mapping[str, Any] | None = None) -> Conventions:
+def conventions_of(settings: JobSettings, stored: Mapping[str, Any]) -> Conventions:
     """What the numbers of the tables mean: as the job says, or the stored coefficients."""
-    usual: Mapping[str, Any] = stored or {}
     rotation, planes = settings.rotation, settings.planes.items()
     labels = Labels(
-        phase=settings.phase or usual.get("phase", "lead"),
-        angles=resolve_angles(settings.angles or usual.get("angles", "with rotation"), rotation),
+        phase=settings.phase or stored.get("phase", "lead"),
+        angles=resolve_angles(settings.angles or stored.get("angles", "with rotation"), rotation),
         rotation=rotation,
         view=settings.view if rotation else None,
         clock=settings.angles in ROTATIONS,
     )
-    speed, limits = settings.speed, [one.limit or one.zones for one in settings.sensors.values()]
+    limits = [one.limit or one.zones for one in settings.sensors.values()]
     limits += [] if settings.zones is None else [settings.zones.boundaries]
     return Conventions(
         labels,
         settings.speed_tolerance_percent,
         tuple(key for key in ("phase", "angles") if getattr(settings, key) is None),
         settings.exchanged,
-        None if speed is None else (speed.unit.name, speed.value),
+        settings.speed,
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
         any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),

@@ -16,7 +16,7 @@ from rotorid.base.tables import Column, Table, Value, excel
 from rotorid.base.text import listing
 from rotorid.files.cells import BadCell, Cell, Grid, header_place, make_grid, show
 from rotorid.files.columns import REMARKS
-from rotorid.files.disk import is_workbook, read_bytes
+from rotorid.files.disk import file_content, is_workbook
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.headings import find_header
 from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
@@ -163,13 +163,13 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
     InputError
         If the workbook of the job cannot be read any more.
     """
-    from rotorid.files.influence import influence_frame
+    from rotorid.files.influence import influence_table
 
     document = results.to_dict()
     tables: dict[str, list[Any]] = {"": document["corrections"], "summary": []}
     _collect({**document, "provenance": provenance}, (), tables)
     del tables["corrections"]
-    tables["influence"] = influence_frame(results.influence).to_dict("records")
+    tables["influence"] = influence_table(results.influence).records
     warned = "".join(f"\nwarning: {text}" for text in document.get("warnings", ()))
     book = _job_book(files[0]) if len(files) == 1 and is_workbook(files[0]) else None
     return excel(*(_table(name, rows, "" if name else warned) for name, rows in tables.items()), book=book)
@@ -181,7 +181,7 @@ def _job_book(path: Path) -> Any:  # noqa: ANN401  openpyxl has no types
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about parts that are not kept
-        book = openpyxl.load_workbook(io.BytesIO(read_bytes(path)))
+        book = openpyxl.load_workbook(io.BytesIO(file_content(path)))
     for sheet in book.worksheets:
         if sheet.title.strip().casefold().startswith(RESULTS):
             book.remove(sheet)

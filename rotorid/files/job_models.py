@@ -419,7 +419,9 @@ class JobSettings(Settings):
     machine: Label = key("its name or serial number, for the balancing sheet and `rotorid fleet`", default="")
     machine_type: Label = key("its type, for `rotorid fleet`", default="")
     date: Date | None = optional("when it was balanced", example="2026-03-17")
-    sheet: Sheet = key("the head of the balancing sheet and its polar plots, see below", default=Sheet())
+    sheet: Sheet = key(
+        "the head of the balancing sheet and its polar plots, see below", default=Sheet.model_construct()
+    )
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """A direction without the rotation that is seen against it."""

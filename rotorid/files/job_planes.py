@@ -103,7 +103,7 @@ def planes_of(
     measured = trials.planes if influence is None else unknowns(groups, influence.planes).planes
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
-    planes = {name: stated.get(name, Plane()) for name in (*measured, *more)}
+    planes = {name: stated.get(name, Plane.model_construct()) for name in (*measured, *more)}
     if not measured:
         masses = rotor is None or all(plane.radius is not None for plane in planes.values())
         unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
@@ -226,7 +226,7 @@ def _at_speeds(
             speed = unit.to_si(parse_number(word, comma="," in word))
             k = nearest_speed(trials.speeds, speed, settings.speed_tolerance_percent)
         if k is None or k in near:
-            there = show_speeds(trials.speeds, unit)
+            there = show_speeds(trials.speeds, trials.labels)
             expected = f"speeds of the runs table, each once, not {word}: there are {there}"
             part.complain(problems, field, expected)
         near[k] = numbers[word]

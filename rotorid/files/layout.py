@@ -34,7 +34,7 @@ from rotorid.files.headings import (
     readable,
 )
 from rotorid.files.problems import InputError, Problems, refusal
-from rotorid.files.units import UnitError, spelt
+from rotorid.files.units import Quantity, UnitError, spelt
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(NUMBER)
@@ -48,12 +48,9 @@ _BLANK = {"", "n.a.", "n/a", "na", "-", "--", "?", "none"}
 """Cells of a column of phases that nobody knows."""
 MOUNTED = "note of weights: "
 """Begins the name of a column of weights, which belong into a weights table."""
-_OF_READING = ("run", "speed", "repeat")
-_NO_DATA = ("", "note", "mounted")
 _NOTES = (*REMARKS, "amplitude_std", "phase_std")
 
 
-PHASES: tuple[Phase, ...] = get_args(Phase)
 ROTATIONS: tuple[Rotation, ...] = get_args(Rotation)
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
@@ -74,7 +71,7 @@ class Conventions:
     exchanged
         Whether amplitudes and phases stand in each other's columns of the runs tables; None: unstated.
     speed
-        Unit and number of the only speed, for runs tables without a column of speeds.
+        The only speed, for runs tables without a column of speeds.
     holes
         Angle in degrees, as the job counts, of each hole by its name, for each plane that has holes.
     removed
@@ -89,7 +86,7 @@ class Conventions:
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
     unstated: tuple[str, ...] = ()
     exchanged: bool | None = None
-    speed: tuple[str, float] | None = None
+    speed: Quantity | None = None
     holes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     removed: frozenset[str] = frozenset()
     rms: bool = False
@@ -98,6 +95,8 @@ class Conventions:
 
 def resolve_angles(stated: Any, rotation: str | None) -> Angles:  # noqa: ANN401  what `Labels` refuses too
     """With or against the rotation, of clockwise and short forms too; `rotation` is seen from the same end.
+
+    None stays None.
 
     Raises
     ------
@@ -155,20 +154,18 @@ def stated_phase(source: Source) -> Phase | None:
     """Whether the headings of a runs table say that phases lag or lead; None where none or both are said."""
     directions = set[str]()
     for file in source if isinstance(source, tuple) else files_of_runs(source) or (source,):
-        header: Sequence[str] = ()
         with warnings.catch_warnings(), suppress(InputError):
             warnings.simplefilter("ignore")  # of a file that is read once more
-            header = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True).header
-        for heading in read_headings(header):
-            if heading.stem == "phase" and readable("phase", heading.unit):
-                directions.add(read_unit("phase", heading.unit)[1])
-    return next((phase for phase in PHASES if directions - {""} == {phase}), None)
+            grid = read_grid(file, "runs", Problems(), first=True, find=find_header, top=True)
+            phases = [heading.unit for heading in read_headings(grid.header) if heading.stem == "phase"]
+            directions |= {read_unit("phase", unit)[1] for unit in phases if readable("phase", unit)}
+    return next((phase for phase in get_args(Phase) if directions - {""} == {phase}), None)
 
 
 def read_runs_grids(
     source: Source, conventions: Conventions, problems: Problems, *, first: bool = False
-) -> list[Grid] | None:
-    """The cells of a runs table, whatever its form in the file, of one file a run each; None and problems.
+) -> list[Grid]:
+    """The cells of a runs table, whatever its form in the file, of one file a run each; none and problems.
 
     Parameters
     ----------
@@ -191,10 +188,10 @@ def read_runs_grids(
             grids.append(long_rows(grid, read_headings(grid.header), READING, "sensor", conventions, run))
         except InputError as error:
             problems.extend(error.problems)
-    return grids if len(grids) == len(files or (source,)) else None
+    return grids if len(grids) == len(files or (source,)) else []
 
 
-def without_phases(grids: Sequence[Grid]) -> tuple[list[Grid], str]:
+def without_phases(grids: Sequence[Grid]) -> tuple[Sequence[Grid], list[str]]:
     """Long runs tables without their column of phases, and what to say, where these are no phases.
 
     All are blank (or n.a.), or all 0 in three runs or more.
@@ -209,7 +206,7 @@ def without_phases(grids: Sequence[Grid]) -> tuple[list[Grid], str]:
         runs |= {show(row[run]) for _, row in grid.rows} if run is not None else set()
     zero = len(runs) > 2 and all(_DECIMAL.fullmatch(cell) and float(cell) == 0 for cell in cells)
     if not (zero or cells <= _BLANK) or all(k is None for k in places):
-        return list(grids), ""
+        return grids, []
     cut = []
     for grid, k in zip(grids, places, strict=True):
         keep = [j for j in range(len(grid.header)) if j != k and not grid.header[j].startswith("phase_std")]
@@ -217,23 +214,21 @@ def without_phases(grids: Sequence[Grid]) -> tuple[list[Grid], str]:
         rows = tuple((number, tuple(row[j] for j in keep)) for number, row in grid.rows)
         cut.append(replace(grid, header=tuple(grid.header[j] for j in keep), rows=rows, named=named))
     words = "all phases are 0: they are taken as not known, and the amplitudes alone are used"
-    return cut, words if zero else ""
+    return cut, [words] if zero else []
 
 
-def joined(grids: Sequence[Grid] | None, problems: Problems) -> Grid | None:
-    """One runs table of several, with the columns of the first, or None and problems."""
-    if not grids or len(grids) == 1:
-        return grids[0] if grids else None
+def joined(grids: Sequence[Grid], problems: Problems) -> list[Grid]:
+    """One runs table of several, with the columns of the first, or none and problems."""
     first, rows = grids[0], list[Row]()
     for grid in grids:
         if {*grid.header} != {*first.header}:
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
             problems.add(expected, grid.source, grid.header_row, None, listing(grid.header, "and"))
-            return None
+            return []
         places = [grid.header.index(name) for name in first.header]
         rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
     source = listing([grid.source for grid in grids], "and")
-    return replace(first, source=source, rows=tuple(rows), named=())
+    return [replace(first, source=source, rows=tuple(rows), named=())]
 
 
 def long_rows(
@@ -269,10 +264,12 @@ def long_rows(
     if run and "run" not in stems:
         common.insert(0, _Column(Heading(0, "run"), "run", "", [run] * n))
     if key == "sensor" and "speed" not in stems and conventions.speed is not None:
-        unit, speed = conventions.speed
-        common.append(_Column(Heading(0, grid.header[0]), "speed", unit, [speed] * n))
+        speed = conventions.speed
+        common.append(_Column(Heading(0, grid.header[0]), "speed", speed.unit.name, [speed.value] * n))
     if key == "sensor" and "sensor" not in stems and len(sensors.get("", ())) == 2:
-        readings = [*zip(*(map(show, c.cells) for c in common if c.stem in _OF_READING), strict=True)]
+        readings = [
+            *zip(*(map(show, c.cells) for c in common if c.stem in ("run", "speed", "repeat")), strict=True)
+        ]
         if len({*readings}) == len(readings):  # no run has two readings of one speed
             sensors = {"1": sensors[""]}
     groups = []
@@ -385,7 +382,7 @@ def _by_name(
     """Both columns of each sensor or plane; the name is empty where a column has the names."""
     sensors: dict[str, dict[str, _Column]] = defaultdict(dict)
     listed = any(column.stem == key for column in columns)
-    for column in (column for column in columns if column.stem not in _NO_DATA):
+    for column in (column for column in columns if column.stem not in ("", "note", "mounted")):
         heading, stem = column.heading, column.stem
         sensor = heading.sensor if stem in pair and not (listed and heading.stem in ("", "vector")) else ""
         if sensor and listed:

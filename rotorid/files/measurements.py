@@ -74,7 +74,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     errors, unmeasured = None, set[str]()
     if isinstance(model, HarmonicFile):
         errors, unmeasured, model = model.errors, {*model.unmeasured}, model.model
-    grid, problems = _grid(path)
+    problems = Problems()
+    grid = read_grid(path, "measurements", problems, first=True)
     if {"mode", "node", "shape"} <= {*grid.header}:
         return _free_vibrations(path, model, errors)
     table, rows = _rows(grid, problems, model.signals, model.varying)
@@ -119,7 +120,8 @@ def read_amplitudes(path: str | Path) -> Experiments:
             axis=speed_axis("frequency", "Hz"),
             units=dict.fromkeys(points, microns),
         )
-    grid, problems = _grid(path)
+    problems = Problems()
+    grid = read_grid(path, "measurements", problems, first=True)
     names = dict.fromkeys(match[1] for name in grid.header if (match := _AMPLITUDE.fullmatch(name)))
     table, rows = _rows(grid, problems, [*names])
     if not {*names} - {"F"}:
@@ -146,11 +148,6 @@ def measurement_columns(data: Experiments, signals: Sequence[str]) -> dict[str, 
         if not data.free.all():
             columns[f"{name}_im"] = data.signals[name].imag
     return columns
-
-
-def _grid(path: str | Path) -> tuple[Grid, Problems]:
-    problems = Problems()
-    return read_grid(path, "measurements", problems, first=True), problems
 
 
 def _unread(model: HarmonicModel) -> dict[str, Any]:
@@ -220,8 +217,8 @@ def _rows(
     )
     table = problems.need(make_table(grid, columns, problems))
     expected = "one column frequency_rad_s, frequency_Hz or speed_rpm"
-    stem = problems.need(table.only(("frequency", "speed"), "frequency_rad_s", expected))
-    table.must_be(stem, table.numbers(stem) >= 0, "a frequency of 0 or more")
+    stem = table.only(("frequency", "speed"), "frequency_rad_s", expected)
+    table.complain_where(table.numbers(stem) < 0, stem, "a frequency of 0 or more")
     problems.stop()
     labels = tuple(map(str, range(1, len(table) + 1)))
     if "experiment" in table:
@@ -260,7 +257,7 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
         table.as_whole(size, "a number in at least one row, or no such column")
     if not is_polar:
         return np.asarray(first + 1j * np.where(blank, np.nan, second))
-    table.must_be(size, first >= 0, "an amplitude of 0 or more (a real part may be negative)")
+    table.complain_where(first < 0, size, "an amplitude of 0 or more (a real part may be negative)")
     return polar(first, second)
 
 
@@ -331,10 +328,13 @@ def read_record(
     taken = {*model.outputs, *model.inputs}
     deviations = {name: name + STD for name in model.outputs if name + STD not in taken}
     problems, needed = Problems(), measured and not allow_missing
-    columns = [Column("t", one_of(TIME), ("t_s",)), *(Column(name, ratio) for name in model.inputs)]
-    for names, required in ((model.outputs, needed), (deviations.values(), False)):
-        more = [name for name in names if name not in model.inputs]
-        columns += [Column(name, ratio, (), required, blank=True) for name in more]
+    outputs_alone = [name for name in model.outputs if name not in model.inputs]
+    columns = [
+        Column("t", one_of(TIME), ("t_s",)),
+        *(Column(name, ratio) for name in model.inputs),
+        *(Column(name, ratio, (), needed, blank=True) for name in outputs_alone),
+        *(Column(name, ratio, (), required=False, blank=True) for name in deviations.values()),
+    ]
     grid = read_grid(path, "record", problems, first=True)
     if allow_missing:
         rows = ((n, ("" if show(c).casefold() in MISSING else c for c in cells)) for n, cells in grid.rows)

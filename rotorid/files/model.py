@@ -29,6 +29,7 @@ from rotorid.files.settings import (
     Settings,
     key,
     listed,
+    optional,
     read_settings,
     read_toml,
 )
@@ -117,10 +118,9 @@ class ModelFile(Settings):
     states: Texts = key('name = "its rate of change", with the time as `t`', default={})
     estimate: Estimates = key("names, or name = starting value", expected=_ESTIMATE)
     known: dict[str, Number] = key("names with their numbers", default={})
-    inputs: list[str] | None = key(
+    inputs: list[str] | None = optional(
         "amplitudes that excite, or measured inputs in time (columns of the record); of equations by default "
         "those that stand only on right sides",
-        default=None,
     )
     varying: list[str] = key(
         "known quantities that change from row to row, such as a speed; without it names that stand only as "
@@ -144,11 +144,9 @@ class ModelFile(Settings):
         expected="two numbers: [value, standard deviation above 0]",
     )
     start: dict[str, Number] = key("guesses, for output error, and models with several solutions", default={})
-    errors: AmplitudeErrorKeys | None = key("of readings of amplitudes, one standard deviation", default=None)
+    errors: AmplitudeErrorKeys | None = optional("of readings of amplitudes, one standard deviation")
     speed: NotNegative = key("the speed at which matrices of a rotor hold", "speed_rad_s", 0.0)
-    nuisance: Nuisance | None = key(
-        "what sensors add to every output, estimated anew for every record", default=None
-    )
+    nuisance: Nuisance | None = optional("what sensors add to every output, estimated anew for every record")
 
     def wrong(self) -> Iterator[tuple[str, str]]:
         """Two forms in one, matrices of several sizes."""

@@ -21,7 +21,6 @@ Node = int | str
 """The number of a node; without a rotor also any label."""
 RECIPROCAL = 1e-3
 """So far, relative, the two entries of a pair of nodes may differ: rounding, not a contradiction."""
-FREQUENCIES = ("frequency", "critical_speed")
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": Unit("percent", "ratio", 1.0, 100.0)})
 
@@ -124,7 +123,7 @@ def _vectors(
 ) -> list[tuple[int, complex]]:
     """Nodes of the rows, and products of sizes with their angles; raises all problems."""
     for stem in sizes:
-        table.must_be(stem, table.numbers(stem) >= 0, "a number of 0 or more")
+        table.complain_where(table.numbers(stem) < 0, stem, "a number of 0 or more")
     nodes, size = _nodes(table, where, rotor), np.prod([table.numbers(stem) for stem in sizes], axis=0)
     table.problems.stop()
     return list(zip(map(int, nodes), polar(size, table.numbers("angle")).tolist(), strict=True))
@@ -195,12 +194,12 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     problems = Problems()
     table = read_table(path, "modes", MODE_COLUMNS, problems)
     expected = "one column frequency_rad_s (or _Hz, _rpm) or critical_speed_rpm"
-    stem = problems.need(table.only(FREQUENCIES, "frequency_rad_s", expected))
+    stem = table.only(("frequency", "critical_speed"), "frequency_rad_s", expected)
     nodes, number, values = _nodes(table, "node", rotor), table.numbers("mode"), table.numbers(stem)
-    table.must_be("mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …")
-    table.must_be(stem, values > 0, "a frequency above 0")
+    table.complain_where((number < 1) | (number % 1 > 0), "mode", "a mode number: 1, 2, …")
+    table.complain_where(values <= 0, stem, "a frequency above 0")
     for name in ("frequency_std", "shape_std"):
-        table.must_be(name, table.numbers(name) >= 0, "a standard deviation of 0 or more")
+        table.complain_where(table.numbers(name) < 0, name, "a standard deviation of 0 or more")
     problems.stop()
     modes, heads, of = np.unique(number, return_index=True, return_inverse=True)
     first = heads[of] == np.arange(len(table))
@@ -227,9 +226,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     shapes = by_node("shape")
     for lost, head in zip(np.isnan(shapes).T, heads, strict=True):
         if lost.any():
-            names = listing(
-                (str(node) for node, is_lost in zip(distinct, lost, strict=True) if is_lost), "and"
-            )
+            names = listing((str(distinct[k]) for k in np.flatnonzero(lost)), "and")
             table.complain(head, "mode", f"the same nodes in every mode; it lacks {names}")
     still = first & ~np.take(shapes.any(axis=0), of)
     table.complain_where(still, "shape", "a shape that is not 0 at every node of its mode")
@@ -279,8 +276,8 @@ def read_compliance(
     problems.stop()
     values, (p, q) = table.numbers("compliance"), ([*map(order.index, named)] for named in ends.values())
     table.once("force_node", zip(p, q, strict=True), "another pair of nodes than in row {}")
-    moves = (values > 0) | (np.array(p) != q)
-    table.must_be("compliance", moves, "a number above 0: a node moves in the direction of a force on it")
+    expected = "a number above 0: a node moves in the direction of a force on it"
+    table.complain_where((values <= 0) & (np.array(p) == q), "compliance", expected)
     problems.stop()
     one = np.full((len(order), len(order)), np.nan)
     one[p, q] = values

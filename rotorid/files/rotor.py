@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -50,11 +50,12 @@ from rotorid.files.settings import (
     Text,
     key,
     listed,
+    optional,
     read_settings,
     read_toml,
     toml_bytes,
+    unwritten,
 )
-from rotorid.files.small_model import is_small, is_small_model, read_small_model
 from rotorid.files.units import one_of
 
 USUAL = {
@@ -105,26 +106,24 @@ class Station(Place):
 class DiscKeys(Place):
     """A disc by its mass, or by its geometry."""
 
-    mass: NotNegative | None = key(
-        "mass; with moments of inertia or alone", "mass_kg", None, units=units.MASS
+    mass: NotNegative | None = optional("mass; with moments of inertia or alone", "mass_kg", units=units.MASS)
+    polar_inertia: NotNegative | None = optional(
+        "about the shaft's line", "polar_inertia_kg_m2", units=units.INERTIA
     )
-    polar_inertia: NotNegative | None = key(
-        "about the shaft's line", "polar_inertia_kg_m2", None, units=units.INERTIA
+    diametral_inertia: NotNegative | None = optional(
+        "across it", "diametral_inertia_kg_m2", units=units.INERTIA
     )
-    diametral_inertia: NotNegative | None = key(
-        "across it", "diametral_inertia_kg_m2", None, units=units.INERTIA
+    width: Positive | None = optional(
+        "of a disc by geometry, with `outer_diameter_m`", "width_m", units=units.LENGTH
     )
-    width: Positive | None = key(
-        "of a disc by geometry, with `outer_diameter_m`", "width_m", None, units=units.LENGTH
+    outer_diameter: Positive | None = optional(
+        "of a disc by geometry", "outer_diameter_m", units=units.LENGTH
     )
-    outer_diameter: Positive | None = key(
-        "of a disc by geometry", "outer_diameter_m", None, units=units.LENGTH
+    inner_diameter: NotNegative | None = optional(
+        "bore of a disc by geometry; default: none", "inner_diameter_m", units=units.LENGTH
     )
-    inner_diameter: NotNegative | None = key(
-        "bore of a disc by geometry; default: none", "inner_diameter_m", None, units=units.LENGTH
-    )
-    density: NotNegative | None = key(
-        "of a disc by geometry; default: the material's", "density_kg_per_m3", None, units=units.DENSITY
+    density: NotNegative | None = optional(
+        "of a disc by geometry; default: the material's", "density_kg_per_m3", units=units.DENSITY
     )
 
     def wrong(self) -> Iterator[tuple[str, str]]:
@@ -180,14 +179,14 @@ class RotorFile(Attached):  # type: ignore[misc, valid-type]
         "the rotor table, relative to this file; required",
         expected='the file of the shaft, shaft = "shaft.csv"',
     )
-    material: Material = key("of elements whose row says nothing", default=Material())
+    material: Material = key("of elements whose row says nothing", default=Material.model_construct())
     model: Effects = key(
         "effects that count, true or false; an inertia that is thereby ignored gives a warning",
-        default=Effects(),
+        default=Effects.model_construct(),
     )
     disc: list[DiscKeys] = key("a disc, as many as there are", default=[])
     station: list[Station] = key("a name for a node", default=[])
-    calibration: CalibrationKeys | None = key("what a fit to readings found, with its errors", default=None)
+    calibration: CalibrationKeys | None = optional("what a fit to readings found, with its errors")
 
 
 def _column(stem: str, of: dict[str, units.Unit], *usual: str) -> Column:
@@ -239,14 +238,16 @@ def read_rotor(path: str | Path) -> Rotor:
         About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
     path, problems = Path(path), Problems()
-    data: Mapping[str, Any] = {"shaft": "the table itself"}
-    if is_file := path.suffix.lower() == ".toml":
+    file, shaft, stations = unwritten(RotorFile, str(path)), path, dict[str, int]()
+    if path.suffix.lower() == ".toml":
+        from rotorid.files.small_model import is_small
+
         data = read_toml(path)
         if is_small(data):
             expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
             raise refusal(path, expected, column="shaft")
-    file = read_settings(RotorFile, data, str(path))
-    shaft, stations = path.parent / file.shaft if is_file else path, dict[str, int]()
+        file = read_settings(RotorFile, data, str(path))
+        shaft = path.parent / file.shaft
     parts = _shaft(shaft, file.material)
     at = places(range(1, len(parts["length"]) + 2), stations)
 
@@ -283,6 +284,8 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     -------
     The file itself first, then the tables that it names.
     """
+    from rotorid.files.small_model import is_small_model, read_small_model
+
     path = Path(path)
     with each_file_once() as asked, suppress(InputError), warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -300,27 +303,30 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
         values[stem] = np.where(table.is_blank(stem), default, table.numbers(stem, default))
     elements, last = values["length"] != 0, np.arange(len(table)) == len(table) - 1
     expected = "a length above 0 (0 only in the last row, which attaches to the right end)"
-    table.must_be("length", (values["length"] > 0) | (last & ~elements), expected)
+    table.complain_where((values["length"] < 0) | ~(elements | last), "length", expected)
     if not elements.any():
         table.in_header("length", "at least one row with a length above 0")
     # blank only in a last row without an element
     table.complain_where(elements & table.is_blank("diameter"), "diameter", "a number")
     for stem in ("diameter", "youngs_modulus"):
-        table.must_be(stem, (values[stem] > 0) | ~elements, "a number above 0")
-    ratio, thick = values["poisson_ratio"], values["inner_diameter"] >= table.numbers("diameter")
-    table.must_be("poisson_ratio", (ratio > -1) & (ratio <= 0.5) | ~elements, "a number above -1, up to 0.5")
-    table.must_be("inner_diameter", ~thick | ~elements, "less than the outer diameter")
+        table.complain_where(elements & (table.numbers(stem) <= 0), stem, "a number above 0")
+    ratio, thick = values["poisson_ratio"], table.numbers("inner_diameter") >= table.numbers("diameter")
+    outside = elements & ((ratio <= -1) | (ratio > 0.5))
+    table.complain_where(outside, "poisson_ratio", "a number above -1, up to 0.5")
+    table.complain_where(elements & thick, "inner_diameter", "less than the outer diameter")
     for stem in ("inner_diameter", "density", "material_damping", *(column.stem for column in OF_NODES)):
-        table.must_be(stem, values[stem] >= 0, OUTWARDS if "support" in stem else "a number of 0 or more")
+        expected = OUTWARDS if "support" in stem else "a number of 0 or more"
+        table.complain_where(values[stem] < 0, stem, expected)
     problems.stop()
     for stem, (low, high, of) in USUAL.items():
         odd = elements & (values[stem] > 0) & (np.clip(values[stem], low, high) != values[stem])
+        written = ~np.isnan(table.numbers(stem))
         for value in values[stem][odd][:1].tolist():
-            written = value * (table.unit(stem).scale if stem in table else 1.0)
-            meant = [name for name, unit in of.items() if low <= unit.to_si(written) <= high]
+            shown = value * (table.unit(stem).scale if stem in table else 1.0)
+            meant = [name for name, unit in of.items() if low <= unit.to_si(shown) <= high]
             expected = f"{low:g} to {high:g} {next(iter(of))}; is this in {[*meant, 'another unit'][0]}?"
-            replace(table, problems=doubts).must_be(stem, ~odd, expected)
-            if np.isnan(table.numbers(stem)[odd]).any():
+            replace(table, problems=doubts).complain_where(odd & written, stem, expected)
+            if (odd & ~written).any():
                 material.complain(doubts, stem, expected)
     if len(doubts):
         warnings.warn(str(InputError(doubts)), TableWarning, stacklevel=3)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -33,7 +33,7 @@ from rotorid.files.layout import (
     without_phases,
 )
 from rotorid.files.problems import MOST_LINES, Problems
-from rotorid.files.units import Unit, one_of
+from rotorid.files.units import one_of
 from rotorid.files.weights import read_weights
 
 if TYPE_CHECKING:
@@ -41,21 +41,19 @@ if TYPE_CHECKING:
     from rotorid.identify.modes_result import Readings
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
-PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
-_UNKNOWN = replace(PHASE, required=False)
 COLUMNS = (
     Column("run"),
     SPEED,
     Column("sensor"),
     Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
-    PHASE,
+    Column("phase", one_of(units.ANGLE), ("phase_deg",)),
     Column("index", one_of(units.ANGLE), ("index_deg",), required=False),
     Column("repeat", required=False),
     Column("time_s", required=False, blank=True),
     Column("amplitude_std", units.vibration, ("amplitude_std_um_pp",), required=False),
     Column("phase_std", one_of(units.ANGLE), ("phase_std_deg",), required=False),
 )
-AMPLITUDES = tuple(_UNKNOWN if column is PHASE else column for column in COLUMNS)
+AMPLITUDES = tuple(replace(one, required=one.required and one.stem != "phase") for one in COLUMNS)
 """Those of a runs table that may have no phases."""
 OVER_SPEED = (
     *(column for column in COLUMNS if column.stem not in ("repeat", "time_s")),
@@ -78,14 +76,14 @@ def nearest_speed(speeds: FloatArray, speed: float, tolerance_percent: float) ->
     return near if same_speed(float(speeds[near]), speed, tolerance_percent) else None
 
 
-def show_speed(speed: float, unit: Unit) -> str:
-    """A speed in the unit of the table, for messages."""
-    return f"{speed * unit.scale:.6g} {unit.name.replace('rad_s', 'rad/s')}"
+def speed_words(table: Table) -> Callable[[float], str]:
+    """What shows a speed in the unit of a table."""
+    return Labels(speed_unit=table.unit("speed").name).speed_words
 
 
-def show_speeds(speeds: FloatArray, unit: Unit) -> str:
-    """All of some speeds in the unit of a table, for messages."""
-    return listing((show_speed(float(speed), unit) for speed in speeds), "and")
+def show_speeds(speeds: FloatArray, labels: Labels) -> str:
+    """All of some speeds, for messages."""
+    return listing(map(labels.speed_words, speeds), "and")
 
 
 def read_trials(
@@ -132,7 +130,6 @@ def read_trials(
     labels = Labels(phase=phase or "lead", angles=angles or "with rotation")
     conventions = Conventions(labels, speed_tolerance_percent)
     trials = problems.need(make_trials(runs, weights, conventions, errors, problems))
-    problems.stop()
     assumed: tuple[str, ...] = ("phase",) if phase is None else ()
     if angles is None and trials.weights.imag.any():
         assumed += ("angles",)
@@ -151,7 +148,7 @@ def make_trials(
     """Put both tables together, or None and problems."""
     names, trials = read_runs(runs, conventions, problems)
     mounted = None if weights is None else read_weights(weights, names, conventions, problems)
-    if trials is None or (mounted is None and weights is not None) or len(problems):
+    if trials is None or len(problems):
         return None
     if isinstance(errors, ReadingErrors):
         trials = replace(trials, errors=errors)
@@ -159,9 +156,9 @@ def make_trials(
         trials = errors.stated_in(trials)
     if mounted is None:
         return trials
+    trials = replace(trials, planes=mounted.planes, weights=mounted.weights, relative=mounted.relative)
     labels = replace(trials.labels, weight_unit=mounted.unit.name, weight_scale=mounted.unit.scale)
-    trials = replace(trials, labels=labels, relative=mounted.relative)
-    return replace(trials, planes=mounted.planes, weights=mounted.weights)
+    return replace(trials, labels=labels)
 
 
 def read_runs(
@@ -178,15 +175,8 @@ def read_runs(
     problems
         Collects the complaints.
     """
-    grids = read_runs_grids(source, conventions, problems)
-    grids, blank = (None, "") if grids is None else without_phases(grids)
-    columns = AMPLITUDES
-    if grids is None or (
-        len(grids) > 1 and not all(readings_table(grid, problems, columns) for grid in grids)
-    ):
-        return None, None
-    grid = None if len(grids) > 1 and len(problems) else joined(grids, problems)
-    table = None if grid is None else readings_table(grid, problems, columns)
+    grids, noted = without_phases(read_runs_grids(source, conventions, problems))
+    table = readings_table(grids, AMPLITUDES, problems)
     if table is None:
         return None, None
     has_phases = "phase" in table
@@ -195,7 +185,7 @@ def read_runs(
     start, band = len(problems), conventions.speed_tolerance_percent
     speeds, index, words = _merge_speeds(table, usable, band)
     runs, sensors = (tuple(name for name in dict.fromkeys(names) if name) for names in (run, sensor))
-    repeat = table.texts("repeat") if "repeat" in table else ("",) * len(table)
+    repeat = table.texts("repeat")
     order, run_at, sensor_at = (
         {name: k for k, name in enumerate(dict.fromkeys(of))} for of in (repeat, runs, sensors)
     )
@@ -205,7 +195,7 @@ def read_runs(
         place = run_at[run[i]], index[i], sensor_at[sensor[i]]
         places.append((readings[place], *place))
         readings[place] += 1
-    if len(problems) == start:  # with unclear speeds all the rest would be noise
+    if len(problems) == start and len(readings) < len(rows):  # with unclear speeds the rest would be noise
         _complain_about_twins(table, dict(zip(rows, places, strict=True)), repeat, band)
     if table.grid.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, (runs, speeds, sensors), readings, band)
@@ -219,8 +209,7 @@ def read_runs(
 
     def placed(values: NDArray[Any]) -> NDArray[Any]:
         """Values (…, rows of the table) among repeats, runs, speeds, sensors; NaN elsewhere."""
-        nothing = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
-        out = np.full((*values.shape[:-1], *shape), nothing)
+        out = np.full((*values.shape[:-1], *shape), np.nan, values.dtype)
         out[..., *np.transpose(places)] = values[..., rows]
         return out
 
@@ -241,8 +230,7 @@ def read_runs(
         for name in table.grid.header
         if name.startswith(MOUNTED)
     ]
-    stated = np.moveaxis(covariances(table, vectors), 0, -1) if has_phases and "phase_std" in table else None
-    nothing, noted = np.zeros(len(table)), [blank] if blank else []
+    nothing, stated = np.zeros(len(table)), has_phases and "phase_std" in table
     return runs, Trials(
         runs,
         speeds,
@@ -251,9 +239,9 @@ def read_runs(
         placed(vectors),
         np.zeros((len(runs), 0), dtype=complex),
         labels=labels,
-        warnings=(*words, *passed_over, *_which_mm_s(table, exchanged=bool(conventions.exchanged)), *noted),
+        warnings=(*words, *passed_over, *_which_mm_s(table, conventions), *noted),
         steps=placed(np.array([table.steps("amplitude"), table.steps("phase") if has_phases else nothing])),
-        covariance=None if stated is None else placed(stated),
+        covariance=placed(np.moveaxis(covariances(table, vectors), 0, -1)) if stated else None,
         index=turn,
         amplitudes_only=not has_phases,
     )
@@ -290,7 +278,7 @@ def _merge_speeds(
     speeds, index, words
         rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
-    values, unit, band = table.numbers("speed"), table.unit("speed"), tolerance_percent
+    values, in_unit, band = table.numbers("speed"), speed_words(table), tolerance_percent
     runs = table.texts("run")
     distinct = np.unique(values[usable])
     apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
@@ -305,8 +293,8 @@ def _merge_speeds(
         merged.append(one)
         if same_speed(speeds[0], speeds[-1], UNSAID):
             continue
-        shown = [show_speed(speed, unit) for speed in speeds]
-        alike.append(f"{', '.join(words.split()[0] for words in shown)} as {show_speed(one, unit)}")
+        shown = [*map(in_unit, speeds)]
+        alike.append(f"{', '.join(words.split()[0] for words in shown)} as {in_unit(one)}")
         if not same_speed(speeds[0], speeds[-1], band):
             chain = f"{len(shown)} speeds from {shown[0]} to {shown[-1]}"
             words = (
@@ -336,30 +324,34 @@ def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
     return turned(vectors, along**2, across**2)
 
 
-def readings_table(grid: Grid, problems: Problems, columns: Sequence[Column] = COLUMNS) -> Table | None:
-    """The columns of a runs table, with numbers that can be; None and problems."""
-    table = make_table(grid, columns, problems)
+def readings_table(grids: Sequence[Grid], columns: Sequence[Column], problems: Problems) -> Table | None:
+    """The columns of a runs table, of one file a run maybe, with numbers that can be; None and problems."""
+    if len(grids) > 1:
+        for grid in grids:  # whose problems are in a file of their own
+            readings_table([grid], columns, problems)
+        grids = [] if len(problems) else joined(grids, problems)
+    table = make_table(grids[0], columns, problems) if grids else None
     if table is None:
         return None
-    table.must_be("speed", table.numbers("speed") > 0, "a speed above 0")
-    table.must_be("amplitude", table.numbers("amplitude") >= 0, "an amplitude of 0 or more")
+    table.complain_where(table.numbers("speed") <= 0, "speed", "a speed above 0")
+    table.complain_where(table.numbers("amplitude") < 0, "amplitude", "an amplitude of 0 or more")
     stems = [stem for stem in ("amplitude_std", "phase_std") if stem in table]
     if len(stems) == 1:
         expected = "amplitude_std_… and phase_std_deg together: one alone does not tell how a reading errs"
         table.in_header(stems[0], expected)
         return table
     for stem in stems:
-        allowed = table.numbers(stem) > 0
-        table.must_be(stem, allowed, "a standard deviation above 0: nothing is measured exactly")
+        expected = "a standard deviation above 0: nothing is measured exactly"
+        table.complain_where(table.numbers(stem) <= 0, stem, expected)
     if stems and (unit := table.unit("amplitude")).kind != table.unit("amplitude_std").kind:
         expected = f"a unit that converts to that of the amplitude, {unit.name or 'none'}"
         table.in_header("amplitude_std", expected)
     return table
 
 
-def _which_mm_s(table: Table, *, exchanged: bool) -> list[str]:
+def _which_mm_s(table: Table, conventions: Conventions) -> list[str]:
     """How mm/s alone are read, below a heading that does not say it."""
-    heading = table.fields["phase" if exchanged else "amplitude"].names[0]
+    heading = table.fields["phase" if conventions.exchanged else "amplitude"].names[0]
     unit = table.unit("amplitude").name
     if unit not in ("mm_s", "mm_s_rms") or re.search("mm_s|rms|peak|pk", heading, re.IGNORECASE):
         return []
@@ -408,18 +400,17 @@ def _complain_about_gaps(
     tolerance_percent: float,
 ) -> None:
     """Every run needs every sensor at every speed: influence coefficients compare runs."""
-    runs, speeds, sensors = names
-    unit = table.unit("speed")
+    (runs, speeds, sensors), in_unit = names, speed_words(table)
     read = {(r, s) for r, s, _ in present}
     shape = len(runs), len(speeds), len(sensors)
-    gaps = (key for key in np.ndindex(shape) if key not in present) if len(present) < np.prod(shape) else ()
+    gaps = (key for key in np.ndindex(shape) if key not in present)
     for r, s, c in islice(gaps, MOST_LINES):
-        place = f"run {runs[r]!r} at {show_speed(float(speeds[s]), unit)}, as every run needs at every speed"
+        place = f"run {runs[r]!r} at {in_unit(float(speeds[s]))}, as every run needs at every speed"
         if (r, s) in read:
             table.as_whole("sensor", f"a reading of sensor {sensors[c]!r} in {place}")
         elif c == 0:
             near = min((speeds[k] for q, k in read if q == r), key=lambda speed: abs(speed - speeds[s]))
-            hint = f"its nearest speed is {show_speed(near, unit)}, speeds count as one within "
+            hint = f"its nearest speed is {in_unit(near)}, speeds count as one within "
             hint += f"{tolerance_percent:g} %"
             table.as_whole("speed", f"readings of {place}; {hint}")
 
@@ -443,8 +434,7 @@ def read_vectors(source: Source, phase: Phase) -> tuple[Readings, ...]:
     problems = Problems()
     files = source if isinstance(source, (Grid, tuple)) else (Path(source),)
     grids = read_runs_grids(files, Conventions(Labels(phase=phase)), problems, first=True)
-    grid = problems.need(joined(grids, problems))
-    table = problems.need(readings_table(grid, problems, OVER_SPEED))
+    table = problems.need(readings_table(grids, OVER_SPEED, problems))
     instants = _instants(table)
     problems.stop()
     unit, sweeps = table.unit("amplitude"), []

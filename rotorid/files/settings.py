@@ -39,7 +39,7 @@ from rotorid.base.choices import did_you_mean, suggest
 from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
-from rotorid.files.disk import read_bytes
+from rotorid.files.disk import file_content
 from rotorid.files.problems import InputError, Problem, Problems, refusal
 from rotorid.files.units import Quantity, Unit
 
@@ -47,7 +47,6 @@ MOST_BYTES = 2_000_000
 _DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
 """A key of so many parts; the time that tomllib takes grows with their square."""
 MOST_NAMES = 1_000
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
 Place = tuple[str, int, str]
 """Sheet, row and column of a setting of a workbook."""
 _Model = TypeVar("_Model", bound="Settings")
@@ -209,8 +208,9 @@ class Settings(BaseModel):
 
     def problem(self, field: str, expected: str) -> Problem:
         """A problem with a field: file, row, key as written, its value, what is expected."""
-        value = self._table.data.get(self.written(field))
-        return self._table.problem(self.written(field), expected, None if isinstance(value, dict) else value)
+        key = self.written(field)
+        value = self._table.data.get(key)
+        return self._table.problem(key, expected, None if isinstance(value, dict) else value)
 
     def complain(self, problems: Problems, field: str, expected: str) -> None:
         """Note a problem with a field."""
@@ -353,6 +353,13 @@ def read_settings(
         raise InputError(error.errors(include_url=False)[0]["ctx"]["error"].args) from None
 
 
+def unwritten(model: type[_Model], source: str) -> _Model:
+    """Settings of which nothing is written, without what reading some would take."""
+    made = model.model_construct()
+    made._table = _Table(source)
+    return made
+
+
 def _plain(value: object) -> object:
     """A number, also as its text."""
     if isinstance(value, str):
@@ -435,12 +442,12 @@ def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
         "const": SCHEMA_VERSION,
         "description": "of the keys of this file; unstated: this one",
     }
-    return {"$schema": DRAFT, **schema, "title": title}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": title}
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The content of a TOML file without its `schema_version`; InputError where it is none."""
-    data, problems = read_bytes(path), Problems()
+    data, problems = file_content(path), Problems()
     try:
         if len(data) > MOST_BYTES:
             raise ValueError(f"at most {MOST_BYTES // 10**6} MB")

@@ -27,7 +27,16 @@ from rotorid.files.attached import (
     whole,
 )
 from rotorid.files.problems import InputError, Problems, refusal
-from rotorid.files.settings import NotNegative, Number, Turn, key, read_settings, read_toml, toml_bytes
+from rotorid.files.settings import (
+    NotNegative,
+    Number,
+    Turn,
+    key,
+    optional,
+    read_settings,
+    read_toml,
+    toml_bytes,
+)
 from rotorid.reduction import SmallModel
 
 FORCE = "f_"
@@ -56,7 +65,7 @@ class SmallModelFile(Attached):  # type: ignore[misc, valid-type]
     masses: list[Number] = key(
         "mass at each node; 0 where only a force acts", "masses_kg", expected="a mass for each node"
     )
-    weight: list[Number] | None = key("what weighs at each node; default: the masses", "weight_N", None)
+    weight: list[Number] | None = optional("what weighs at each node; default: the masses", "weight_N")
     stiffness: list[list[Number]] = key(
         "of the shaft without supports, one plane, symmetric",
         "shaft_stiffness_N_per_m",

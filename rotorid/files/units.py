@@ -172,11 +172,11 @@ def vibration(name: str) -> Unit:
         Where a known unit was meant but is misspelt (`MM`, `um_pk`): as a label it would lose its meaning.
     """
     name = spelt(name)
-    if name in VIBRATION or name in UNBALANCE:  # the latter are readings of a calibrated balancing machine
-        return (VIBRATION | UNBALANCE)[name]
-    for unit in VIBRATION:
-        if name.casefold() == unit.casefold():
-            raise UnitError(f"the unit written {unit}, not {name}")
+    if unit := (VIBRATION | UNBALANCE).get(name):  # the latter: readings of a calibrated balancing machine
+        return unit
+    for other in VIBRATION:
+        if name.casefold() == other.casefold():
+            raise UnitError(f"the unit written {other}, not {name}")
     base = max((unit for unit in _PEAK if name.startswith(f"{unit}_")), key=len, default=None)
     if base is not None:
         raise UnitError(

@@ -33,6 +33,7 @@ from rotorid.files.settings import (
     Whole,
     key,
     listed,
+    optional,
     read_settings,
     read_toml,
 )
@@ -58,19 +59,17 @@ else:
 class ChannelKeys(Settings):
     """A sensor: `[channels.NAME]`."""
 
-    channel: Text | None = key(
-        "its name in the records, default that of the sensor; in a WAV file `1`, `2`, …", default=None
+    channel: Text | None = optional(
+        "its name in the records, default that of the sensor; in a WAV file `1`, `2`, …"
     )
-    unit: Vibration | None = key(
+    unit: Vibration | None = optional(
         "unit of its numbers after `scale`, peak values: `um`, `mm_s`, `g`, … or any label",
-        default=None,
         example="um",
     )
     scale: Number = key("how much of the unit one number of the record is, default 1", default=1.0)
-    high_pass: Positive | None = key(
+    high_pass: Positive | None = optional(
         "corner of an AC coupling (Butterworth), taken off again",
         "high_pass_Hz",
-        None,
         units={name: units.SPEED[name] for name in ("Hz", "rad_s")},
     )
     high_pass_order: Whole = key("its order, default 1", default=1, ge=1, le=10)
@@ -82,26 +81,23 @@ class ChannelKeys(Settings):
 class WaveformsFile(Settings):
     """A waveforms file."""
 
-    tacho: Text | None = key("channel of the tacho", default=None)
+    tacho: Text | None = optional("channel of the tacho")
     pulses: Whole = key("pulses a turn, default 1", default=1, ge=1, le=10_000, expected="pulses a turn")
     edge: Edge = key(
         'what of the mark is angle 0, default `"leading"`: where it begins, whatever its polarity',
         default="leading",
     )
-    tacho_level: Number | None = key(
-        "where an edge is, in numbers of the record; default: half-way", default=None
-    )
-    phase: Phase | None = key("whether phases that are written lead or lag, as in a job", default=None)
-    unit: Vibration | None = key("unit of all channels that state none", default=None, example="um")
-    amplitude: Vibration | None = key(
-        "unit in which vectors are written, default that of the first channel", default=None, example="um"
+    tacho_level: Number | None = optional("where an edge is, in numbers of the record; default: half-way")
+    phase: Phase | None = optional("whether phases that are written lead or lag, as in a job")
+    unit: Vibration | None = optional("unit of all channels that state none", example="um")
+    amplitude: Vibration | None = optional(
+        "unit in which vectors are written, default that of the first channel", example="um"
     )
     orders: listed(Count) = key("orders, default 1", default=(1,), example="orders = [1, 2]")  # type: ignore[valid-type]
-    rate: Positive | None = key("samples a second, where the records do not say", "rate_Hz", None)
-    speeds: listed(Positive) | None = key(  # type: ignore[valid-type]
+    rate: Positive | None = optional("samples a second, where the records do not say", "rate_Hz")
+    speeds: listed(Positive) | None = optional(  # type: ignore[valid-type]
         "speeds at which vectors are wanted",
         "speeds_rpm",
-        None,
         units=units.SPEED,
         example="speeds_rpm = [900, 1200]",
     )
@@ -263,8 +259,7 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
     ValueError
         As `find_vectors`, and for records of which only some tell where a turn begins.
     """
-    unit = VIBRATION.get(waveforms.labels.vibration_unit)
-    derivative = None if unit is None else DERIVATIVE[unit.kind]
+    derivative = DERIVATIVE.get(units.vibration(waveforms.labels.vibration_unit).kind)
     speeds = None if waveforms.speeds is None else np.array(waveforms.speeds)
     each = tuple(
         find_vectors(record, waveforms.tacho, waveforms.orders, derivative=derivative, speeds=speeds)

@@ -93,10 +93,11 @@ def read_weights(
         return None
     size, plane, stem = table.numbers("mass"), table.texts("plane"), "run" if "run" in table else "plane"
     expected = "a weight above 0 (a run without weights has no row here; what was removed is one 180° away)"
-    table.must_be("mass", size > 0, expected)
+    table.complain_where(size <= 0, "mass", expected)
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
-    folded = {name.casefold(): name for name in runs or ()}
-    run = [name if name in (runs or ()) else folded.get(name.casefold(), name) for name in names]
+    run_names = runs or ()
+    folded = {name.casefold(): name for name in run_names}
+    run = [name if name in run_names else folded.get(name.casefold(), name) for name in names]
     values = conventions.labels.weight_from(size, _angles(table, conventions)).tolist()
     rows: dict[tuple[str, str, complex], int] = {}
     for i, row in enumerate(zip(run, plane, values, strict=True)):
@@ -106,13 +107,13 @@ def read_weights(
         elif rows.setdefault(row, i) != i and all(row):
             table.complain(i, stem, f"each weight once (row {table.rows[rows[row]]} says the same)")
     planes = tuple(dict.fromkeys(filter(None, plane)))
-    total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
+    total = np.zeros((len(run_names), len(planes)), dtype=complex)
     for name, its, value in rows if runs and len(problems) == before else ():
-        total[(runs or ()).index(name), planes.index(its)] += value
+        total[run_names.index(name), planes.index(its)] += value
     made = Weights(planes, total, table.unit("mass"), tuple(rows))
     if not unknown or len(problems) > before:
         return made
-    total, relative = _relative_weights(table, unknown, run, runs or (), total)
+    total, relative = _relative_weights(table, unknown, run, run_names, total)
     return replace(made, weights=total, unit=Unit(TRIAL_WEIGHTS, "multiple"), relative=relative)
 
 
@@ -145,7 +146,7 @@ def _angles(table: Table, conventions: Conventions) -> FloatArray:
         except NotANumber as error:
             table.complain(i, stem, str(error))
     table.complain_where(np.abs(angle) > FULL_TURN, places[0], "an angle from -360 to 360 degrees")
-    for i, action in enumerate(table.texts("action") if "action" in table else ()):
+    for i, action in enumerate(table.texts("action")):
         if action.casefold() in ("remove", "removed"):
             angle[i] = degree.to_si((angle[i] * degree.scale + 180.0) % 360.0)
         elif action.casefold() not in ("", "add", "added"):

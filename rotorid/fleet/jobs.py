@@ -21,7 +21,7 @@ from balancing import Influence, Labels, UndeterminedError, estimate_influence
 from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
 from rotorid.files import read_job
-from rotorid.files.disk import each_file_once, read_bytes
+from rotorid.files.disk import each_file_once, file_content
 from rotorid.files.problems import printable, refusal
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
@@ -144,7 +144,7 @@ def parquet(table: pa.Table) -> bytes:
 
 def read_parquet(path: Path, what: str) -> pa.Table:
     """The table of a Parquet file; InputError, that `what` was expected, where it is not there or damaged."""
-    pa, data = arrow(what), read_bytes(path)
+    pa, data = arrow(what), file_content(path)
     try:
         return pa.parquet.read_table(io.BytesIO(data), page_checksum_verification=True)
     except pa.ArrowException as error:

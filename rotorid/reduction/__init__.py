@@ -6,7 +6,7 @@ from rotorid.reduction.comparison import (
     compare_response,
     compare_stability,
 )
-from rotorid.reduction.condensation import Method, Methods, compare_methods
+from rotorid.reduction.condensation import Method, Methods, compare_methods, guyan
 from rotorid.reduction.masses import (
     Separated,
     design,
@@ -44,6 +44,7 @@ __all__ = [
     "compare_stability",
     "design",
     "equivalent_masses",
+    "guyan",
     "held_nodes",
     "held_rigidly",
     "keep_supports",

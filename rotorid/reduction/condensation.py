@@ -18,21 +18,21 @@ Sources: R. J. Guyan, AIAA J. 3 (1965) 380; J. O'Callahan, Proc. 7th IMAC (1989)
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import fem
-from fem import Pencil, whole_rotor
+from fem import Pencil, finite_modes, lowest_modes, whole_rotor
 from fem.assembly import assemble, multiply
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, text
 from rotorid.base.text import counted, percent
-from rotorid.reduction.masses import like, mac
+from rotorid.reduction.masses import like, mac, mass_nodes, plane_at_rest
 from rotorid.reduction.reduce import Reduction
 
 MASSLESS = 1e-12
@@ -43,8 +43,9 @@ def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
     """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
     free = np.ones(band.shape[1])
     free[unknowns] = 0.0
-    above = range(len(band) - 1, -1, -1)
-    K = np.asfortranarray([row * free * np.roll(free, off) for off, row in zip(above, band, strict=True)])
+    K = band * free
+    for off, row in enumerate(K[::-1]):
+        row *= np.roll(free, off)
     K[-1, unknowns] = 1.0
     return K
 
@@ -70,7 +71,7 @@ def static_shapes(
         force[masters] = 0.0
         return np.asarray(dpbtrs(factor, force)[0])
 
-    unit = np.zeros((band.shape[1], len(masters)), order="F")
+    unit = np.zeros((band.shape[1], len(masters)))
     unit[masters, np.arange(len(masters))] = 1.0
     return unit + carried(-multiply(band, unit)), carried
 
@@ -230,29 +231,58 @@ def compare_methods(reduction: Reduction) -> Methods:
     if full is None:
         raise ValueError("methods are compared at a rotor, not at measured modes alone")
     places = np.array(reduction.nodes, dtype=int)
-    n, at_masters = len(places), full.shapes[places - 1]
+    at_masters = full.shapes[places - 1]
     pencil = whole_rotor(full.rotor, assemble(full.rotor))
     static, carried = static_shapes(pencil.stiffness, pencil.waves[0][places - 1])
-    motion, guyan = reduction.equations_of_motion, _ritz(pencil, static)
-    improved: _Model
+    motion, of_guyan = reduction.equations_of_motion, _ritz(pencil, static)
+    models: dict[str, _Model] = {"Guyan": of_guyan}
     try:
-        improved = _ritz(pencil, _improved(pencil, static, carried, *guyan[:2]))
+        models["IRS"] = _ritz(pencil, _improved(pencil, static, carried, *of_guyan[:2]))
     except ValueError as failure:
-        improved = None, None, None, np.full(n, np.nan), np.full((n, n), np.nan), str(failure)
-    models: dict[str, _Model] = {
-        "Guyan": guyan,
-        "IRS": improved,
-        f"regression, {counted(reduction.modes, 'mode')}": (
-            *(motion.M, motion.K, None, reduction.frequencies, reduction.shapes, ""),
-        ),
-    }
-    table = []
-    for name, (M, K, T, frequencies, shapes, reason) in models.items():
-        agreement = np.where(np.isfinite(frequencies), np.diag(mac(shapes, at_masters)), np.nan)
-        scaled, error = like(shapes, at_masters), frequencies / full.frequencies - 1
-        table.append(Method(name, M, K, T, frequencies, scaled, error, agreement, reason))
+        nothing = np.full_like(motion.M, np.nan)
+        models["IRS"] = None, None, None, nothing[0], nothing, str(failure)
+    masses = motion.M, motion.K, None, reduction.frequencies, reduction.shapes, ""
+    models[f"regression, {counted(reduction.modes, 'mode')}"] = masses
+    table = [_beside(name, model, full.frequencies, at_masters) for name, model in models.items()]
     warnings = tuple(f"{row.name}: {row.reason}" for row in table if row.reason)
     return Methods(full.rotor, tuple(places.tolist()), full.frequencies, tuple(table), warnings)
+
+
+def guyan(rotor: fem.Rotor, nodes: Sequence[int | str]) -> Method:
+    """Guyan's model of a rotor at some nodes alone: its plane x at rest, tables at their lowest speed.
+
+    Parameters
+    ----------
+    rotor
+        On supports.
+    nodes
+        Masters: different node numbers from 1, or names of stations.
+
+    Returns
+    -------
+    The model beside the rotor's own modes; `reason` says what of the rotor it leaves out.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not exist or repeat, more nodes than the rotor has modes, a rotor free to move, or
+        a support of negative stiffness.
+    """
+    places = np.array(mass_nodes(rotor, nodes))
+    plane, remarks = plane_at_rest(rotor, None)
+    pencil = whole_rotor(plane, assemble(plane))
+    if pencil.rigid.size or finite_modes(pencil) < len(places):
+        raise ValueError("the rotor is not held, or has fewer modes than there are nodes")
+    masters, full = pencil.waves[0][places - 1], lowest_modes(pencil, len(places))
+    reduced = _ritz(pencil, static_shapes(pencil.stiffness, masters)[0], "; ".join(remarks))
+    return _beside("Guyan", reduced, np.sqrt(full.squares), full.vectors[masters])
+
+
+def _beside(name: str, model: _Model, frequencies: FloatArray, at_masters: FloatArray) -> Method:
+    """A row: the model beside frequencies and shapes of the rotor."""
+    M, K, T, omega, shapes, reason = model
+    agreement = np.where(np.isfinite(omega), np.diag(mac(shapes, at_masters)), np.nan)
+    return Method(name, M, K, T, omega, like(shapes, at_masters), omega / frequencies - 1, agreement, reason)
 
 
 _Model = tuple[FloatArray | None, FloatArray | None, FloatArray | None, FloatArray, FloatArray, str]
@@ -273,19 +303,19 @@ def _improved(
             "Guyan's mass matrix is singular at these nodes, and IRS needs its inverse: some motion of the "
             "masters moves no mass; choose nodes with mass or fewer of them"
         )
-    return static + carried(multiply(pencil.mass, np.asfortranarray(static @ np.linalg.solve(M, K))))
+    return static + carried(multiply(pencil.mass, static @ np.linalg.solve(M, K)))
 
 
 def _ritz(
-    pencil: Pencil, T: FloatArray
+    pencil: Pencil, T: FloatArray, reason: str = ""
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, str]:
     """The model whose rotor moves as T."""
     from scipy.linalg import eigh
 
-    M, K = T.T @ multiply(pencil.mass, np.asfortranarray(T)), pencil.energy(T)  # from strains
+    M, K = T.T @ multiply(pencil.mass, T), pencil.energy(T)  # from strains
     M = (M + M.T) / 2
     mu, shapes = eigh(M, K)  # μ = 1/ω²: the inverse form keeps the digits of the low modes
     mu, shapes = mu[::-1], shapes[:, ::-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = np.where(mu > 1e-15 * mu[0], 1 / np.sqrt(mu), np.nan)
-    return M, K, T[pencil.waves[0]], frequencies, shapes, ""
+    return M, K, T[pencil.waves[0]], frequencies, shapes, reason

@@ -330,8 +330,10 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
         for support in rotor.supports
     ]
     model = dataclasses.replace(rotor.model, gyroscopic=False)
-    plane = dataclasses.replace(rotor, supports=supports, model=model)
+    plane = rotor
     remarks = []
+    if (*supports, model) != (*rotor.supports, rotor.model):
+        plane = dataclasses.replace(rotor, supports=supports, model=model)
     pedestals = any(s.pedestal and s.pedestal.mass for s in rotor.supports)
     if rotor.model.gyroscopic or not rotor.symmetric or any(s.coupled for s in rotor.supports) or pedestals:
         remarks.append(

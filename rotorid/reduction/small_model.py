@@ -484,7 +484,8 @@ def _shaft_shapes(rotor: fem.Rotor, band: FloatArray, at: IndexArray) -> FloatAr
     T, _ = static_shapes(band, at)
     X = T.copy()
     X[at] = 0.0
-    if (rounding_error(held(band, at), X[:, X.any(axis=0)]) > LOST).any():
+    K = held(band, at)
+    if (rounding_error(K, X, (X.T @ multiply(K, X)).diagonal()) > LOST).any():
         raise ValueError(
             f"the static shapes of {rotor.n_elements} elements are lost in float64; join neighbouring "
             "elements (50 to 200 are ample for a rotor)"

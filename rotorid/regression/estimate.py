@@ -16,7 +16,7 @@ import numpy as np
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import AnyArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.tables import Column, records
+from rotorid.base.tables import Column, rows
 from rotorid.base.text import aligned, error_figures, listing, percent, sentence
 
 WORD_TOLERANCE = 1e-7
@@ -104,8 +104,7 @@ def parameter_columns(names: Sequence[str], numbers: Uncertain) -> tuple[Column,
 def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, str]) -> str:
     """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
-    for row in records(parameter_columns(names, numbers)):
-        name, value, std, *ends = row.values()
+    for name, value, std, *ends in rows(parameter_columns(names, numbers)):
         digits = 6
         if value and std:  # two digits of the standard deviation show
             first, last = np.floor(np.log10((abs(value), std)))
@@ -121,10 +120,9 @@ def parameter_text(names: Sequence[str], numbers: Uncertain, why: Mapping[str, s
 
 def parameter_dict(names: Sequence[str], numbers: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
-    each = (row.values() for row in records(parameter_columns(names, numbers)))
     return {
         name: {"value": value, "std": std, "ci95": None if low is None else [low, high]}
-        for name, value, std, low, high in each
+        for name, value, std, low, high in rows(parameter_columns(names, numbers))
     }
 
 

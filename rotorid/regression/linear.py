@@ -167,9 +167,7 @@ def least_squares(
     x = x + inverse @ (white_y - white @ x)
     left = white_y - white @ x
     chi_square, dof = float(left @ left), m - rank
-    covariance: FloatArray | None = None
-    if stated or dof > 0:
-        covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof)
+    covariance = inverse @ inverse.T * (1.0 if stated else chi_square / dof) if stated or dof > 0 else None
     # length of each unit vector's part outside the row space
     lost = np.linalg.norm(np.eye(n) - Vt[:rank].T @ Vt[:rank], axis=0) > WORD_TOLERANCE
     return Estimate(

@@ -47,7 +47,7 @@ class NonlinearEstimate:
     estimate
         Values, covariance, rank and null space at the minimum; `residuals` are those of the given function.
         The values of combinations are of the model linearised there. No covariance where the search did not
-        converge.
+        converge, NaN in it at a bound.
     history
         Parameters at the start and after each accepted step, polishing included, shape (iterations + 1, n).
     costs
@@ -76,18 +76,11 @@ class NonlinearEstimate:
         return self.estimate.values
 
     @property
-    def ci95(self) -> FloatArray | None:
-        """95 % intervals (n, 2); NaN at a bound; None where errors are unknown."""
-        return self.estimate.ci95
-
-    @property
     def bound_warning(self) -> str:
         """What stands at a bound, in words, or nothing."""
         stand = "stands at its bound" if len(self.at_bounds) == 1 else "stand at their bounds"
-        words = (
-            f"{', '.join(self.at_bounds)} {stand}: no standard deviation is given, and those of the others"
-        )
-        return f"{words} hold it fixed" if self.at_bounds else ""
+        words = "no standard deviation is given, and those of the others hold it fixed"
+        return f"{', '.join(self.at_bounds)} {stand}: {words}" if self.at_bounds else ""
 
 
 def nonlinear_least_squares(  # noqa: PLR0913

@@ -84,6 +84,7 @@ def balance_report(
     answers = [part.answer for part in (verdict, zones) if part]
     judged = [words for one in answers for words in (one.numbers, *one.tables) if words]
     plain, head = left is None and mounted is None, job.settings.sheet
+    trim = left is not None and left.word == "trim"
     return render_report(
         "balance.html",
         document,
@@ -109,7 +110,7 @@ def balance_report(
         unsplit=[plane for plane in result.planes if plain and plane in job.holes],
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
-        next_run=_next_run(document, labels) if left is not None and left.word == "trim" else "",
+        next_run=html(_with_blanks(next_run(document, labels)), LONG) if trim else "",
         verdict=block("\n\n".join(judged)) if judged else "",
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
         runs=block(_runs(job), LONG),
@@ -134,11 +135,13 @@ def to_do(
     left, plain = document.get("left_to_do"), not ({"left_to_do", "mounting"} & document.keys())
     part = "mounting" if left is None else "left_to_do"
     pieces = not plain and document[part]["holes"]
+    unit = result.labels.weight_in
+    holes = _work(document, f"{part}.holes", unit, hole="hole", pieces="pieces") if pieces else ()
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
-        "trim": "" if left is None else shown(_trim(document, result.labels)),
-        "holes": shown(_holes(document, result.labels, part)) if pieces else nothing,
+        "trim": "" if left is None else shown(trim_table(document, result.labels)),
+        "holes": shown(Table("", tuple(holes))) if pieces else nothing,
     }
 
 
@@ -207,7 +210,7 @@ def _weights(document: Mapping[str, Any], c: Correction, job: Job) -> Table:
     return Table("", tuple(columns), note)
 
 
-def _trim(document: Mapping[str, Any], labels: Labels) -> Table:
+def trim_table(document: Mapping[str, Any], labels: Labels) -> Table:
     """What is mounted, and what is to come on top."""
     there: Headings = {"mass": (f"mounted, {labels.weight_in}", _FOUR), "angle_deg": ("at", degrees)}
     plane, *work = _work(document, "left_to_do.add", f"trim, {labels.weight_in}")
@@ -215,15 +218,9 @@ def _trim(document: Mapping[str, Any], labels: Labels) -> Table:
     return Table("", (plane, *mounted, *work))
 
 
-def _holes(document: Mapping[str, Any], labels: Labels, part: str) -> Table:
-    """What goes into each hole."""
-    work = _work(document, f"{part}.holes", labels.weight_in, hole="hole", pieces="pieces")
-    return Table("", tuple(work))
-
-
 def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison | None) -> Markup:
     """Readings before and predicted, with room for those of a check run; or with these."""
-    path, more = "residuals", []
+    path = "residuals"
     numbers: Headings = {"before": ("before", _THREE), "before_phase_deg": ("at", degrees)}
     if check is not None:
         path = "check.readings"
@@ -247,12 +244,12 @@ def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison
         if c.limits is not None and np.isfinite(c.limits.residual).any():
             limits = document["limits"]["amplitude"]
             more.append(Column("limit", limits, _FOUR, "limits.amplitude.*"))
-        more += _blank(columns[0])
-    return html(Table("", (*columns, *more)), LONG)
+        return html(_with_blanks(Table("", (*columns, *more))), LONG)
+    return html(Table("", tuple(columns)), LONG)
 
 
-def _next_run(document: Mapping[str, Any], labels: Labels) -> Markup:
-    """Readings now and predicted with the trim, with room for those of the next run."""
+def next_run(document: Mapping[str, Any], labels: Labels) -> Table:
+    """Readings now and predicted with the trim."""
     path = "left_to_do.readings"
     now: Headings = {
         "sensor": ("sensor", str),
@@ -262,15 +259,14 @@ def _next_run(document: Mapping[str, Any], labels: Labels) -> Markup:
         "after_phase_deg": ("at ", degrees),
         "within": ("95 % within ±", _TWO),
     }
-    columns = _speed(document, path, labels), *_columns(document, path, now)
-    return html(Table("", (*columns, *_blank(columns[0]))), LONG)
+    return Table("", (_speed(document, path, labels), *_columns(document, path, now)))
 
 
-def _blank(beside: Column) -> list[Column]:
-    """Columns to fill in by hand."""
-    return [
-        Column(name, ["\N{NO-BREAK SPACE}"] * len(beside.values)) for name in ("amplitude read", "phase read")
-    ]
+def _with_blanks(table: Table) -> Table:
+    """With columns to fill in by hand."""
+    nothing = ["\N{NO-BREAK SPACE}"] * len(table.columns[0].values)
+    blank = [Column(name, nothing) for name in ("amplitude read", "phase read")]
+    return replace(table, columns=(*table.columns, *blank))
 
 
 def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:

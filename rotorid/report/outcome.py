@@ -53,9 +53,7 @@ class Outcome(Answered):
     to_mount
         Whether the first table is what to mount, which is shown whole.
     file
-        What `--output` writes and `to_frame` gives.
-    lacking
-        Why there is no such file and no picture; empty: there are.
+        What `--output` writes and `to_frame` gives; a text: why there is none.
     files
         What makes other files of `--output`, by the ending of their name.
     keys
@@ -75,15 +73,14 @@ class Outcome(Answered):
 
     result: Any
     sentences: tuple[str, ...] = ()
-    keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+    keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()
     more: tuple[Table | str, ...] = ()
     beyond: str = ""
     short: bool = False
     to_mount: bool = False
-    file: Table | Callable[[], Table]
-    lacking: str = ""
+    file: Table | Callable[[], Table] | str
     files: Mapping[str, Callable[[Path], Written]] = dataclasses.field(default_factory=dict)
     pictures: Mapping[str, Callable[[], Figure]] = dataclasses.field(default_factory=dict)
     title: str = ""
@@ -98,11 +95,11 @@ class Outcome(Answered):
         names = [table.name for table in self.more if isinstance(table, Table)]
         return Answer(
             "\n".join(self.sentences),
-            "\n\n".join(map(_aligned, self.tables)),
+            "\n\n".join(map(aligned, self.tables)),
             self.warnings,
             self.notes,
             tuple(
-                f"{capital(each.name)}:\n{_aligned(each)}" if isinstance(each, Table) else each
+                f"{capital(each.name)}:\n{aligned(each)}" if isinstance(each, Table) else each
                 for each in self.more
             ),
             self.beyond or listing(names, "and"),
@@ -124,9 +121,9 @@ class Outcome(Answered):
         return dict(self.keys() if callable(self.keys) else self.keys)
 
     def table(self) -> Table:
-        """The main table; ValueError where it is lacking."""
-        if self.lacking:
-            raise ValueError(self.lacking)
+        """The main table; ValueError where there is none."""
+        if isinstance(self.file, str):
+            raise ValueError(self.file)
         return self.file if isinstance(self.file, Table) else self.file()
 
     def to_frame(self) -> pd.DataFrame:
@@ -147,7 +144,7 @@ class Outcome(Answered):
     def figure(self) -> Figure:
         """The main picture; ValueError where there is none."""
         if not self.pictures:
-            raise ValueError(self.lacking or "there is no picture of this")
+            raise ValueError(self.file if isinstance(self.file, str) else "there is no picture of this")
         return next(iter(self.pictures.values()))()
 
     @property
@@ -163,8 +160,8 @@ class Outcome(Answered):
         """To print or to send, one HTML file."""
         from rotorid.report.page import block, drawn, render_report
 
-        if self.lacking and not self.pictures:
-            raise ValueError(self.lacking)
+        if isinstance(self.file, str) and not self.pictures:
+            raise ValueError(self.file)
         return render_report(
             "outcome.html",
             self.to_dict(),
@@ -178,7 +175,8 @@ class Outcome(Answered):
         )
 
 
-def _aligned(table: Table | str) -> str:
+def aligned(table: Table | str) -> str:
+    """For a terminal."""
     return terminal(table, COLUMNS) if isinstance(table, Table) else table
 
 

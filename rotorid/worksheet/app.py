@@ -11,28 +11,24 @@ import asyncio
 import hmac
 import json
 import multiprocessing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.types import Receive, Scope, Send
 
 from rotorid.base.worker_processes import worker_pool
-from rotorid.worksheet.calculation import Results, answered
+from rotorid.worksheet.calculation import Results, answered, drawn, trial, whole_job
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.job_text import Conflict
 from rotorid.worksheet.page import page
 
 TOKEN = "X-Rotorid-Token"
-PAGE = {
-    "/": ("index.html", "text/html"),
-    "/worksheet.js": ("worksheet.js", "text/javascript"),
-    "/worksheet.css": ("worksheet.css", "text/css"),
-}
+PAGE = {"/": "text/html", "/worksheet.js": "text/javascript", "/worksheet.css": "text/css"}
 _LARGEST = 30_000_000
 """Bytes of a request."""
 HEADERS = {
@@ -48,40 +44,82 @@ GRACE = 0.3
 """Seconds that a computation may go on when nobody wants it: a new process takes longer to start."""
 
 
-class Session:
-    """A job that all windows share, and a process that computes in its folder, one request at a time."""
+class Worksheet:
+    """Answers all windows of one job; a process computes in its folder, one request at a time.
 
-    def __init__(self, files: JobFiles) -> None:
-        self._files, self._results = files, Results()
-        self._notice = ""
+    Requests must have a token, and be for an address and port, as browsers send them.
+    """
+
+    def __init__(self, files: JobFiles, token: str, address: str) -> None:
+        self._files, self._token, self._address = files, token, address
+        self._results, self._notice = Results(), ""
         self._version = 0  # grows with every change that a window should see
         self._computing: asyncio.Task[None] | None = None
         self._lock = asyncio.Lock()
         self._pool: Executor | None = None
 
-    async def answer(self, path: str, given: Mapping[str, Any]) -> dict[str, Any] | str:
-        """What a window asks for: JSON, or HTML; ValueError where that is impossible."""
-        match path:
-            case "/state":
-                return await self._state(int(given.get("after", 0)))
-            case "/edit":
-                self._files.apply(given["edits"])
-            case "/undo":
-                self._files.undo()
-            case "/trial":
-                return str(await self._ask("trial", self._files.job.name, {**given}))
-            case "/picture" | "/sheet" if "asked" in self._results:
-                return str(await self._ask("drawn", path[1:], *self._results["asked"]))
-            case _:
-                raise ValueError(f"there is no {path[1:]} yet")
-        self._changed()
-        return {}
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request; everything that is wrong is answered by one sentence."""
+        request = Request(scope, receive)
+        why, status = self._refusal(request), 403
+        if not why:
+            try:
+                answer = await self._answer(request)
+            except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
+                why, status = f"the page asked for what there is not: {wrong}", 400
+            except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
+                why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
+        if why:
+            answer = JSONResponse({"error": why}, status)
+        answer.headers.update(HEADERS)
+        await answer(scope, receive, send)
 
     def stop(self) -> None:
         """End the process that computes."""
         self._pool = None
         for process in multiprocessing.active_children():
             process.terminate()
+
+    def _refusal(self, request: Request) -> str:
+        """Why a request is refused; empty where it is not."""
+        if request.headers.get("host") != self._address:
+            return "this name of the computer is not that of the worksheet"
+        if request.headers.get("origin", f"http://{self._address}") != f"http://{self._address}":
+            return "another page may not use the worksheet"
+        key = request.headers.get(TOKEN, "").encode()
+        if request.url.path not in PAGE and not hmac.compare_digest(key, self._token.encode()):
+            return "the address lacks the key of this worksheet: open the one that the program shows"
+        return ""
+
+    async def _answer(self, request: Request) -> Response:
+        """A file of the page, or what is asked for by the query or the body."""
+        path, asked = request.url.path, self._results.get("asked")
+        if path in PAGE:
+            file = Path(__file__).with_name("page") / (path[1:] or "index.html")
+            return Response(file.read_bytes(), media_type=PAGE[path])
+        given: Mapping[str, Any] = request.query_params
+        if request.method != "GET":
+            body = bytearray()
+            async for part in request.stream():  # a body in chunks does not say its size before
+                body += part
+                if len(body) > _LARGEST:
+                    raise ValueError(f"at most {_LARGEST // 10**6} MB")
+            given = json.loads(body)
+        match path:
+            case "/state":
+                return JSONResponse(await self._state(int(given.get("after", 0))))
+            case "/trial":
+                return HTMLResponse(await self._ask(trial, self._files.job.name, {**given}))
+            case "/picture" | "/sheet" if asked:
+                return HTMLResponse(await self._ask(drawn, path[1:], *asked))
+            case "/edit":
+                self._files.apply(given["edits"])
+            case "/undo":
+                self._files.undo()
+            case _:
+                raise ValueError(f"there is no {path[1:]} yet")
+        self._changed()
+        return JSONResponse({})
 
     async def _state(self, after: int) -> dict[str, Any]:
         """The page, as soon as it is newer than the version that a window has, or after a second."""
@@ -109,14 +147,14 @@ class Session:
         seen = Results()
         if self._files.now.text is not None:
             try:
-                seen = await self._ask("whole_job", self._files.job.name, self._version)
+                seen = await self._ask(whole_job, self._files.job.name, self._version)
             except ValueError as error:
                 seen = {"refused": str(error)}
         self._results = seen
         self._version += 1
 
-    async def _ask(self, do: str, *given: object) -> Any:  # noqa: ANN401 - what the request gives
-        """What a request of `calculation` gives, or a ValueError; ended when nobody waits for it any more."""
+    async def _ask(self, do: Callable[..., Any], *given: object) -> Any:  # noqa: ANN401  what it gives
+        """What a function of `calculation` gives, or ValueError; ended when nobody waits for it any more."""
         async with self._lock:
             self._pool = self._pool or worker_pool(1)
             request = self._pool.submit(answered, str(self._files.job.parent), do, *given)
@@ -136,56 +174,3 @@ class Session:
         if "refused" in answer:
             raise ValueError(answer["refused"])
         return answer["value"]
-
-
-def application(session: Session, token: str, address: str) -> ASGIApp:
-    """The page of one job, for requests with a token to an address and port, as browsers send them."""
-
-    async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        request = Request(scope, receive)
-        why, status = _refusal(request, token, address), 403
-        if not why:
-            try:
-                answer = await _answer(session, request)
-            except (KeyError, TypeError, AttributeError, RecursionError) as wrong:
-                why, status = f"the page asked for what there is not: {wrong}", 400
-            except (ValueError, OSError, ClientDisconnect) as wrong:  # who has gone reads no answer
-                why, status = str(wrong), 409 if isinstance(wrong, Conflict) else 400
-        if why:
-            answer = JSONResponse({"error": why}, status)
-        answer.headers.update(HEADERS)
-        await answer(scope, receive, send)
-
-    return app
-
-
-def _refusal(request: Request, token: str, address: str) -> str:
-    """Why a request is refused; empty where it is not."""
-    if request.headers.get("host") != address:
-        return "this name of the computer is not that of the worksheet"
-    if request.headers.get("origin", f"http://{address}") != f"http://{address}":
-        return "another page may not use the worksheet"
-    key = request.headers.get(TOKEN, "").encode()
-    if request.url.path not in PAGE and not hmac.compare_digest(key, token.encode()):
-        return "the address lacks the key of this worksheet: open the one that the program shows"
-    return ""
-
-
-async def _answer(session: Session, request: Request) -> Response:
-    """A file of the page, or what is asked for by the query or the body."""
-    path = request.url.path
-    if path in PAGE:
-        name, kind = PAGE[path]
-        return Response(Path(__file__).with_name("page").joinpath(name).read_bytes(), media_type=kind)
-    given: Mapping[str, Any] = request.query_params
-    if request.method != "GET":
-        body = bytearray()
-        async for part in request.stream():  # a body in chunks does not say its size before
-            body += part
-            if len(body) > _LARGEST:
-                raise ValueError(f"at most {_LARGEST // 10**6} MB")
-        given = json.loads(body)
-    made = await session.answer(path, given)
-    if isinstance(made, dict):
-        return JSONResponse(made)
-    return Response(made, media_type="image/svg+xml" if made.startswith("<svg") else "text/html")

@@ -23,31 +23,29 @@ if TYPE_CHECKING:
 Results = dict[str, Any]
 """What a window shows beside the files: the `answer` that `balanced` gives, and of what it was `asked`; else
 the `problems` of files, as `Problem` with their `text`, or why it is `refused`."""
-_read: dict[str, Stamp] = {}
-"""Names of the files that were read, each with its stamp before that."""
 
 
-def answered(folder: str, do: str, *given: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Do what is asked for in a folder: its `value`, or why it is `refused`; which files were `read`."""
+def answered(folder: str, do: Callable[..., Any], *given: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Do what is asked for in a folder: its `value`, or why it is `refused`; stamps of what was `read`."""
     from rotorid.files.disk import reading
 
-    reading.set(_note)
-    answer: dict[str, Any]
+    answer, read = dict[str, Any](), dict[str, Stamp]()
+
+    def note(path: Path) -> None:
+        if not is_inside(path, "."):  # by whatever file it is named
+            why = "it is outside the folder of the job, where the worksheet reads nothing"
+            raise OSError(errno.EACCES, why)
+        read[str(path)] = stamp(path)
+
+    reading.set(note)
     try:
         os.chdir(folder)  # each time: another one may have been put in its place
-        answer = {"value": REQUESTS[do](*given)}
+        answer["value"] = do(*given)
     except (ValueError, OSError, ArithmeticError) as error:
-        answer = {"refused": str(error)}
+        answer["refused"] = str(error)
     except Exception as error:  # a defect of the program, of which the page must not wait for ever
-        answer = {"refused": f"the calculation failed, {type(error).__name__}: {error}"}
-    return {**answer, "read": dict(_read)}
-
-
-def _note(path: Path) -> None:
-    """Refuse a file outside of the folder, by whatever file it is named."""
-    if not is_inside(path, "."):
-        raise OSError(errno.EACCES, "it is outside the folder of the job, where the worksheet reads nothing")
-    _read[str(path)] = stamp(path)
+        answer["refused"] = f"the calculation failed, {type(error).__name__}: {error}"
+    return {**answer, "read": read}
 
 
 def whole_job(job: str, version: int) -> Results:
@@ -117,18 +115,18 @@ def balanced(job: str, version: int, checked: bool) -> dict[str, Any]:
     shown = {
         "judgement": answer.judgement,
         "warnings": [*warned, *answer.warnings],
-        "notes": [*answer.notes],
-        "to_mount": [],
+        "notes": answer.notes,
     }
     if read.trials.special or read.trials.amplitudes_only:  # the columns of these are others
         return {**shown, "numbers": answer.numbers}
-    if "left_to_do" not in document:
-        shown["parts"] = document["parts"]
-        shown["notes"].insert(0, f"For {document['corrections_refer_to']}.")
+    trim = "left_to_do" in document
+    refer = "" if trim else f"For {document['corrections_refer_to']}. "
     return {
         **shown,
         "tables": [*to_do(document, made.result, read, boxes=False).values()],
-        "conventions": f"Angles count {labels.angles}, phase {labels.phase}.",
+        "unit": labels.weight_in,
+        "parts": [] if trim else document["parts"],
+        "conventions": f"{refer}Angles count {labels.angles}, phase {labels.phase}.",
         "to_mount": document["mounting"]["holes"] if "mounting" in document else document["corrections"],
     }
 
@@ -155,6 +153,3 @@ def trial(job: str, fields: Mapping[str, str]) -> str:
     answer = made.answer
     lines = [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]
     return "".join(f"<p>{escape(line)}</p>" for line in lines if line)
-
-
-REQUESTS: Mapping[str, Callable[..., Any]] = {one.__name__: one for one in (whole_job, drawn, trial)}

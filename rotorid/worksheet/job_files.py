@@ -14,16 +14,12 @@ from rotorid.files.disk import MOST_BYTES, SUFFIXES, file_content, first_bytes, 
 from rotorid.files.job import open_job
 from rotorid.files.job_models import named_tables
 from rotorid.files.problems import InputError, Problems
-from rotorid.worksheet.job_text import KEYS, Job, Table, read_table, settings_in, shown
+from rotorid.worksheet.job_text import KEYS, Conflict, Job, Table, read_table, settings_in, shown
 
 MOST_STEPS, MOST_TRIES = 200, 5
 Files = dict[Path, bytes | None]
 """What files hold; None: there is none."""
 Stamp = tuple[int, ...]
-
-
-class _OutsideError(ValueError):
-    """A file was changed while it was about to be replaced."""
 
 
 class JobFiles:
@@ -66,7 +62,7 @@ class JobFiles:
             except (LookupError, TypeError, AttributeError) as error:
                 raise ValueError(f"an edit of an unknown form: {error}") from error
             changed = {table.path: table.data() for table in draft.tables.values() if table.changed}
-            with suppress(_OutsideError):
+            with suppress(Conflict):
                 if step := self._write({**changed, self.job: draft.text}):
                     self.done = [*self.done[1 - MOST_STEPS :], step]
                 return
@@ -168,7 +164,7 @@ class JobFiles:
         def last_look() -> None:
             for path in files:
                 if self._read(path) != before[path]:
-                    raise _OutsideError(f"{path.name} was changed by another program")
+                    raise Conflict(f"{path.name} was changed by another program")
 
         write_files({path: data for path, data in files.items() if data is not None}, last_look)
         for path, data in files.items():
@@ -183,11 +179,10 @@ def is_inside(path: Path, folder: Path | str) -> bool:
 
 def stamp(path: Path) -> Stamp:
     """What tells that a file is as it was; empty: there is none."""
-    try:
+    with suppress(OSError):
         at = path.stat()
-    except OSError:
-        return ()
-    return at.st_mtime_ns, at.st_ctime_ns, at.st_size, at.st_ino
+        return at.st_mtime_ns, at.st_ctime_ns, at.st_size, at.st_ino
+    return ()
 
 
 def _job_in(given: Path) -> Path:

@@ -182,21 +182,6 @@ def _one(word: str) -> float | str:
     return int(number) if number.lstrip("+-").isdigit() else float(number)
 
 
-def with_setting(data: bytes, key: Sequence[str], new: Any) -> bytes:  # noqa: ANN401
-    """The job file with a setting changed, added, or (None) removed; ValueError where that is impossible."""
-    import tomlkit
-
-    settings = settings_in(data)
-    with suppress(ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over odd files
-        document = tomlkit.parse(data.decode("utf-8-sig"))
-        _change(settings, key, new)
-        _change(document, key, new)
-        written = tomlkit.dumps(document).encode()
-        if settings_in(written) == settings:
-            return written
-    raise ValueError(f"{'.'.join(key)} cannot be changed here: change it in the job file itself")
-
-
 def _change(table: Any, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
     """Change one setting, or (None) remove it and the tables that are empty then."""
     first, *rest = key
@@ -225,9 +210,17 @@ class Job:
         return inner
 
     def _set(self, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
-        """Change a setting; None: remove it."""
-        self.text = with_setting(self.text or b"", key, new)
-        self.settings = settings_in(self.text)
+        """Change a setting, add it, or (None) remove it; comments and order of the file stay."""
+        import tomlkit
+
+        with suppress(ValueError, TypeError, AttributeError, LookupError):  # tomlkit stumbles over odd files
+            document = tomlkit.parse((self.text or b"").decode("utf-8-sig"))
+            _change(self.settings, key, new)
+            _change(document, key, new)
+            self.text = tomlkit.dumps(document).encode()
+            if settings_in(self.text) == self.settings:
+                return
+        raise ValueError(f"{'.'.join(key)} cannot be changed here: change it in the job file itself")
 
     def edit(self, edit: Mapping[str, Any], folder: Path) -> None:
         """Carry out one edit; a table that is made gets a name that is free in the folder."""

@@ -4,42 +4,35 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rotorid.base.text import SPEEDS, vibration_unit_words, weight_unit_words
+from jinja2 import Environment, PackageLoader
+
+from rotorid.base.text import figures, vibration_unit_words, weight_unit_words
 from rotorid.files.problems import quote
 from rotorid.worksheet.calculation import Results
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.job_text import Table, content, text_of
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-
+_PAGES = Environment(
+    loader=PackageLoader("rotorid.worksheet", "page"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+)
+_PAGES.filters["figures"] = figures
 Row = dict[str, str]
-"""Cells of a table by what they hold, and of the row its `id` and `place`."""
+"""Cells of a table by what they hold, and of the row its `id`, where it is `at`, and its `place`."""
 
 
 def page(files: JobFiles, results: Results, notice: str, busy: str) -> str:
     """The page as it is now."""
     view = View(files, results)
-    return _template().render(results, view=view, job=files.now, path=files.job, notice=notice, busy=busy)
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, PackageLoader
-
-    loader = PackageLoader("rotorid.worksheet", "page")
-    pages = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    return pages.get_template("body.html")
+    return _PAGES.get_template("body.html").render(results, view=view, notice=notice, busy=busy)
 
 
 class View:
     """What the page shows of a job, part by part."""
 
     def __init__(self, files: JobFiles, results: Results) -> None:
-        self._job, tables = files.now, files.now.tables
+        self.path, self.job, tables = files.job, files.now, files.now.tables
         self.names = {key: table.columns() for key, table in tables.items()}
         self.rows = {key: [*_rows(key, table)] for key, table in tables.items()}
         self.sensors = self.values("sensor", "runs", "check")
@@ -51,13 +44,9 @@ class View:
         self.baseline = next((run for run in self.runs if run not in others), "baseline")
         self.trials = [run for run in self.runs if run != self.baseline]
         self.problems = defaultdict[str, list[str]](list)
-        rows = {
-            (table.path, line.number): f"{key}|{line.id}"
-            for key, table in tables.items()
-            for line in table.rows()
-        }
+        ids = {row["at"]: row["id"] for rows in self.rows.values() for row in rows}
         for one in results.get("problems", ()):
-            text, cell = self._problem(one, rows.get((files.job.parent / one["file"], one["row"])))
+            text, cell = self._problem(one, ids.get(f"{files.job.parent / one['file']} {one['row']}"))
             self.problems[text].append(cell)
 
     def values(self, what: str, *keys: str) -> list[str]:
@@ -78,9 +67,9 @@ class View:
     def unit(self, what: str, key: str = "runs") -> str:
         """The unit of a column, as people write it."""
         unit = self.column(what, key).partition("_")[2]
-        if what == "speed":
-            return SPEEDS[unit][0] if unit in SPEEDS else unit
-        return (weight_unit_words if what == "weight" else vibration_unit_words)(unit)
+        if what == "weight":
+            return weight_unit_words(unit)
+        return vibration_unit_words(unit).replace("rad_s", "rad/s")
 
     def column(self, what: str, key: str = "runs") -> str:
         """The name of a column in the file."""
@@ -99,7 +88,7 @@ class View:
 
     def _stated(self, *path: str) -> Mapping[str, Any]:
         """Settings of a table of the job, none where there is no table."""
-        its = self._job.setting(path)
+        its = self.job.setting(path)
         return its if isinstance(its, dict) else {}
 
     def _problem(self, one: Mapping[str, Any], row: str | None) -> tuple[str, str]:
@@ -121,7 +110,8 @@ def _rows(key: str, table: Table) -> Iterable[Row]:
         row = {what: line.cells[name] for what, name in table.columns().items()}
         time = line.id.rpartition("|")[2]
         place = row.get("speed", "") + f" ({time})" * (time != "1")
-        yield {"run": "", "sensor": "", **row, "id": f"{key}|{line.id}", "place": place}
+        at = {"id": f"{key}|{line.id}", "at": f"{table.path} {line.number}", "place": place}
+        yield {"run": "", "sensor": "", **row, **at}
 
 
 def _each(values: Iterable[str]) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-import logging
 import os
 import secrets
 import signal
@@ -28,10 +27,11 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
         import tomlkit  # noqa: F401
         import uvicorn
 
-        from rotorid.worksheet.app import Session, application
+        from rotorid.worksheet.app import Worksheet
     except ImportError as error:
-        needed = "starlette uvicorn tomlkit"
-        raise ValueError(f"the worksheet needs {error.name}: pip install {needed}") from error
+        raise ValueError(
+            f"the worksheet needs {error.name}: pip install starlette uvicorn tomlkit"
+        ) from error
     from rotorid.worksheet.job_files import JobFiles
 
     if hasattr(signal, "SIGPIPE"):  # a process that was ended reads no more; Windows has none
@@ -52,16 +52,15 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
             listening.bind((HOST, 0))
         listening.listen()
         address = f"{HOST}:{listening.getsockname()[1]}"
-        # a worker that Ctrl+C finds half started may be reaped by two; the program ends it anyway
-        logging.getLogger("asyncio").setLevel(logging.ERROR)
-        session = Session(files)
-        options = {"log_level": "warning", "access_log": False, "lifespan": "off", "ws": "none"}
-        config = uvicorn.Config(application(session, token, address), timeout_graceful_shutdown=2, **options)
+        app = Worksheet(files, token, address)
+        config = uvicorn.Config(
+            app, log_level="warning", lifespan="off", ws="none", timeout_graceful_shutdown=2
+        )
         show(f"http://{address}/#{token}")  # who opens it now waits for an answer
         try:
             uvicorn.Server(config).run(sockets=[listening])
         finally:
-            session.stop()
+            app.stop()
 
 
 def _secret() -> bytes:

@@ -33,8 +33,9 @@ from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands.balance import Balance, balance
 from rotorid.commands.unknown_numbers import unknowns
-from rotorid.files import Conventions, Job
+from rotorid.files import Job
 from rotorid.files.job_models import Plane, Sensor
+from rotorid.files.layout import Conventions
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]

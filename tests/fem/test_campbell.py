@@ -88,7 +88,7 @@ def test_a_mode_that_ceases_to_oscillate():
 @pytest.mark.parametrize(
     ("speeds", "n", "message"),
     [
-        ([100.0, 50.0], 2, "must ascend, each once"),
+        ([100.0, 50.0], 2, "must ascend, each once: sort them; 50 rad/s follows 100 rad/s"),
         ([-1.0, 50.0], 2, "not negative"),
         ([], 2, "at least one"),
         ([1.0, float("nan")], 2, "finite"),

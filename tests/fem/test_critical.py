@@ -165,3 +165,15 @@ def test_an_element_of_a_thousandth_of_its_neighbour_is_computed():
 def test_much_shorter_elements_are_refused(lengths):
     with pytest.raises(ValueError, match=r"element [12]: length .* 1/3000 of its longer neighbour"):
         on_ends(lengths)
+
+
+@pytest.mark.parametrize("higher", [1e8, 2e8])
+def test_a_seal_that_pushes_outwards_at_a_bearing_leaves_the_rotor_held(higher):
+    """Their stiffnesses add up, they do not cancel."""
+    k, push = np.diag((1e8, higher)), 1e6 * np.eye(2)
+    both = [fem.Support(n, k) for n in (1, 5)] + [fem.Support(n, -push, kind="seal") for n in (1, 5)]
+    sums = [fem.Support(n, k - push) for n in (1, 5)]
+    speeds, expected = (
+        fem.critical_speeds(fem.Rotor([0.2] * 4, 0.05, supports=s), 4).frequencies for s in (both, sums)
+    )
+    np.testing.assert_allclose(speeds, expected, rtol=1e-9)

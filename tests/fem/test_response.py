@@ -173,7 +173,7 @@ def test_a_peak_on_constant_springs_is_refined_without_a_word_of_numpy():
     ("rotor", "arguments", "message"),
     [
         (rotor23(1e4), {"speeds": []}, "at least one"),
-        (rotor23(1e4), {"speeds": "fast"}, "string to float: 'fast'"),
+        (rotor23(1e4), {"speeds": "fast"}, "numbers in rad/s"),
         (rotor23(1e4), {"planes": [25]}, "node 25 does not exist: the rotor has nodes 1 to 24"),
         (rotor23(1e4), {"sensors": ["left"]}, "no station is called 'left'"),
         (rotor23(1e4), {"sensors": []}, "name at least one plane and one sensor"),

@@ -135,7 +135,7 @@ def test_a_rotor_that_runs_away_is_told():
     ("speed", "n", "message"),
     [
         (-1.0, 2, "not negative"),
-        ("fast", 2, "string to float: 'fast'"),
+        ("fast", 2, "numbers in rad/s"),
         (10.0, 1000, "1 to 96"),
         (600.0, 2, "front.*100 to 500 rad/s, not 600"),
     ],

@@ -39,6 +39,7 @@ class Tolerance:
 _CONSTRAINED = "what an active limit counts follows from the last multipliers of the solver"
 _CERTIFICATE = "the gap at which the solver stops is rounding, divided by what it began with"
 _EXACT = "the data have no errors: residuals, and the deviations that follow from them, are rounding"
+_NOTHING = "as many readings as weights leave nothing"
 _CHOSEN = (
     "the penalty of a stiff filter is chosen where its likelihood is flat; far below the errors, and 3.7e-4 "
     "of what is left between two kinds of processors"
@@ -56,7 +57,8 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("bearings*", "*log_decrement", "0 where the mode begins to grow", absolute=1e-10),
     Tolerance("motion*", "position_error", "the difference of two integrations", absolute=1e-9),
     Tolerance("motion*", "reduction.frequency_error*", "rounding of frequencies", absolute=1e-10),
-    Tolerance("bk*", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
+    *(Tolerance(case, "*chi_square*", _NOTHING, absolute=1e-20) for case in ("bk*", "static*", "index")),
+    Tolerance("no-phase", "*after", _NOTHING, absolute=1e-12),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
     Tolerance("turbo-max-mass", "*", "along limits that χ² hardly tells apart", relative=1e-5),

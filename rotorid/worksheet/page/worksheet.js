@@ -20,7 +20,8 @@ const WORDS = {
   check_weights: "weights of the check run",
   max_weight: "largest",
 };
-const inWords = (text) => Object.entries(WORDS).reduce((all, [key, words]) => all.replaceAll(key, `“${words}”`), text);
+const inWords = (text) => (
+  Object.entries(WORDS).reduce((all, [key, words]) => all.replaceAll(key, `“${words}”`), text));
 
 /* Make elements as they come from the server; focus stays, and what is being typed. */
 function morph(old, now) {
@@ -170,7 +171,7 @@ async function draw() {
   if (!svg) slot.drawn = null; // the next state asks again
 }
 
-/* Edits of a form, where {form_field} stands for what is typed there: its own, its rows, those of its ticked boxes. */
+/* Edits of a form, of its rows, and of its ticked boxes; {form_field} stands for what is typed there. */
 function editsOf(form, fields) {
   const typedIn = (_, value) => (value?.form_field ? fields[value.form_field].trim() : value);
   const read = ({ dataset }) => JSON.parse(dataset.edits ?? "[]", typedIn);
@@ -179,14 +180,15 @@ function editsOf(form, fields) {
   return [...read(form), ...rowsOf(rows, fields), ...boxes.flatMap(read)];
 }
 
-/* Rows of runs at the places of other rows, or at each speed and sensor that is typed; the first make a table. */
+/* Rows of runs at the places of other rows, or at each speed and sensor that is typed: they make a table. */
 function rowsOf({ table, columns, runs, like }, fields) {
   const { run, speed, sensor } = columns ?? { run: "run", speed: fields.speed, sensor: "sensor" };
-  const each = (name) => fields[name].split(/[,;]/).map((word) => word.trim()).filter(Boolean);
+  const each = (name) => [...new Set(fields[name].split(/[,;]/).map((word) => word.trim()).filter(Boolean))];
   const places = like
     ? like.filter((row) => row.place === row.speed).map((row) => [row.speed, row.sensor])
     : each("speeds").flatMap((at) => each("sensors").map((name) => [at, name]));
-  const cells = runs.flatMap((name) => places.map(([at, where]) => ({ [run]: name, [speed]: at, [sensor]: where })));
+  const cells = runs.flatMap((name) => (
+    places.map(([at, where]) => ({ [run]: name, [speed]: at, [sensor]: where }))));
   const header = [run, speed, sensor, fields.amplitude, ...(fields.no_phase ? [] : ["phase_deg"])];
   return [...(columns ? [] : [{ create: table, header }]), ...cells.map((row) => ({ table, cells: row }))];
 }

@@ -128,3 +128,14 @@ def test_errors_between_runs_are_told_as_they_were_stated(cli, tmp_path):
     path = turbo_job(tmp_path, "run_percent = 1\nrun_floor = 0.25\n")
     said = " ".join(cli("balance", path, "--table").out.split())
     assert "from run to run: 1 %, 0.25 µm pp (stated)" in said
+
+
+def test_weights_beyond_what_the_job_allows_are_warned_of(cli, tmp_path):
+    limits = "[planes.left]\nmax_unbalance_g_mm = 400\nforbidden_deg = [[160, 175]]\n"
+    job = zoned(tmp_path, limits)
+    beyond = "423 g·mm at 168.9° in plane 'left' is more than the largest weight there, 400 g·mm"
+    arc = "423 g·mm at 168.9° in plane 'left' stands where the job forbids weights (forbidden_deg)"
+    given = "--weights", "left=423@168.9"
+    assert cli("balance", job, *given, "--json").json["warnings"][:2] == [beyond, arc]
+    assert "is more than the largest weight" in " ".join(cli("balance", job, *given).out.split())
+    assert cli("balance", job, "--weights", "left=400@175;right=999@170", "--json").json["warnings"] == []

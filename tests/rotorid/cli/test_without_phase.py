@@ -100,7 +100,6 @@ def test_other_commands_need_phases(command, tmp_path, monkeypatch, cli):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("[planes.fan]\nholes = 12", "holes"),
         ("[sensors.fan]\nlimit_mm_s = 1", "limits of sensors"),
         ("[zones]\nboundaries_mm_s = [1, 2, 3]", "zones"),
     ],
@@ -112,3 +111,13 @@ def test_parts_of_a_job_without_meaning_are_refused(line, words, tmp_path, cli):
     ran = cli("balance", job)
     assert ran.code == 2
     assert words in ran.err
+
+
+def test_a_further_run_has_its_weight_in_a_hole_that_had_none(tmp_path, cli):
+    for name, kept in (("runs.csv", 4), ("weights.csv", 3), ("job.toml", 9)):
+        lines = (sample_data() / "no_phase" / name).read_text().splitlines()[:kept]
+        (tmp_path / name).write_text("\n".join([*lines, ""]))
+    job = tmp_path / "job.toml"
+    job.write_text(f"{job.read_text()}[planes.fan]\nholes_deg = [0, 100, 200, 300]\n")
+    assert "Make this run: 4.5 g at 200.0° (hole 3) in plane 'fan' alone." in cli("balance", job).out
+    assert document(cli, job)["next_run"]["hole"] == "3"

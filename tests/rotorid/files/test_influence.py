@@ -18,7 +18,8 @@ from balancing import (
     correct,
     estimate_influence,
 )
-from rotorid.files import influence_frame, job_from_files, read_influence, read_trials, write_influence
+from rotorid.files import job_from_files, read_influence, read_trials, write_influence
+from rotorid.files.influence import influence_table
 from rotorid.regression import stretch
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
@@ -54,7 +55,7 @@ def test_meaning(stored):
     assert (influence.has_baseline, influence.known_errors) == (False, False)
     np.testing.assert_array_equal(stored(phase="lag").W, influence.W.conj())
     np.testing.assert_array_equal(stored(angles="against rotation").W, influence.W)
-    assert list(influence_frame(influence).columns) == [*HEADER[:4], "phase_lead_deg"]
+    assert influence_table(influence).headings == [*HEADER[:4], "phase_lead_deg"]
 
 
 @each_of("suffix, phase, angles", [(".csv", "lag", "against rotation"), (".xlsx", "lag", "with rotation")])
@@ -228,3 +229,13 @@ def test_stored_conventions_hold_for_the_readings_unless_others_are_stated(folde
         np.testing.assert_allclose(c.weights, expected, rtol=1e-9)
         assert c.to_dict()["conventions"]["angles"] == "against rotation"
         assert any(words in w for w in c.warnings) or not words
+
+
+def test_a_table_that_states_no_phase_counts_as_the_readings_do_and_says_so(folder):
+    trials = read_trials(folder / "runs.csv", folder / "weights.csv", phase="lag")
+    write_influence(folder / "w.csv", estimate_influence(trials))
+    now = write_csv(folder / "now.csv", RUNS[:3])
+    for heading, phase, words in (("_lag_", "lag", 0), ("_", "lag", 1), ("_", "lead", 0)):
+        (folder / "w.csv").write_text((folder / "w.csv").read_text().replace("phase_lag_", f"phase{heading}"))
+        warned = job_from_files([now], influence=folder / "w.csv", phase=phase, angles="with").trials.warnings
+        assert sum("w.csv: those of the readings are used" in each for each in warned) == words

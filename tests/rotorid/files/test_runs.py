@@ -11,7 +11,8 @@ from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors
-from rotorid.files import Errors, read_trials
+from rotorid.files import read_trials
+from rotorid.files.job_models import Errors
 
 
 @pytest.fixture

@@ -195,7 +195,7 @@ def test_complex_modes_are_told_as_such():
     result = fitted(omega, amplitudes(omega, [1.0, 0.3], np.eye(2), K2, C2), 0.005, 1)
     values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-K2, -C2]]))
     values = values[values.imag > 0][np.argsort(np.abs(values[values.imag > 0]))]
-    low, high = result.fit.ci95.T
+    low, high = result.fit.estimate.ci95.T
     truth = np.concatenate([np.abs(values), -values.real / np.abs(values)])
     assert ((2 * low - high < truth) & (truth < 2 * high - low)).all()
     assert [words[:17] for words in result.warnings] == ["mode 1 is complex", "mode 2 is complex"]

@@ -125,6 +125,7 @@ def test_what_no_steady_response_follows_is_said():
         ([10.0, 5.0], {}, "ascend"),
         ([10.0], {"bands": 1.0}, "part of the critical speed"),
         ([0.0, 135.0], {}, "other speeds, or narrower bands"),
+        ([200.0, 100.0], {}, "must ascend, each once: sort them; 100 rad/s follows 200 rad/s"),
     ],
 )
 def test_bad_speeds_and_bands_are_refused(speeds, options, message):

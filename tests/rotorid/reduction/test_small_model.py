@@ -177,7 +177,7 @@ def test_speeds_are_checked(rotor):
     small = small_model(full_machine(), (4, 8), (30.0, 20.0))
     with pytest.raises(ValueError, match="its table holds 0 to 500"):
         eigenvalues(small, 600.0)
-    for bad in (-1.0, np.inf):
+    for bad in (-1.0, np.inf, "fast"):
         with pytest.raises(ValueError, match="speeds must be"):
             small.response(bad, {4: 1e-3})
     for plane, words in (("z", "it is"), ("x", "coupled: take both")):

@@ -94,7 +94,7 @@ def test_a_linear_model_gives_the_linear_kernel(seed, stated, sigma):
     )
     np.testing.assert_allclose(fit.values, linear.values, rtol=1e-9, atol=1e-12 * sigma)
     np.testing.assert_allclose(fit.estimate.covariance, linear.covariance, rtol=1e-9)
-    np.testing.assert_allclose(fit.ci95, linear.ci95, rtol=1e-8, atol=1e-10 * sigma)
+    np.testing.assert_allclose(fit.estimate.ci95, linear.ci95, rtol=1e-8, atol=1e-10 * sigma)
 
 
 def test_a_parameter_at_its_bound_is_named_and_held():

@@ -82,6 +82,7 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
         ("/edit", {}),
         ("/do", {"do": "no such"}),
         ("/do", {"do": "check_run", "of": "another answer"}),
+        ("/edit", {"edits": [{"create": "no such", "header": ["run"]}]}),
         ("/trial", {"no_such": "1"}),
         ("/edit", "[" * 100_000),
         ("/edit", '{"edits": null}'),
