@@ -54,26 +54,31 @@ def sheet_of(path, **options):
     return sheet.text, sheet, found, job
 
 
-def hard(folder, drop=""):
-    for name in ("runs.csv", "weights.csv"):
+def turbo_job(folder, more="", job="job.toml"):
+    """The sample in another folder, its job with more keys."""
+    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
         (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    path = folder / "job.toml"
+    path.write_text((DATA / "turbo_job" / job).read_text() + more)
+    return path
+
+
+def hard(folder):
+    turbo_job(folder)
     slow = "speed_rpm,sensor,amplitude_um_pp,phase_deg\n150,probe 1,0.3,35\n"
     (folder / "slow.csv").write_text(slow)
-    (folder / "hard.toml").write_text(SETTINGS.replace(drop, "") if drop else SETTINGS)
+    (folder / "hard.toml").write_text(SETTINGS)
     return folder / "hard.toml"
 
 
 def on_top(folder):
     """A trial run again as a check run, whose weight stays: further pieces in other holes."""
-    for name in ("runs.csv", "weights.csv"):
-        (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    planes = "".join(
+        f"[planes.{p}]\nholes = 12\navailable_g_mm = [100, 200]\n" for p in ("left", "middle", "right")
+    )
+    path = turbo_job(folder, planes + "taken = { '1' = 800 }\n", "checked.toml")
     head, *lines = (folder / "runs.csv").read_text().splitlines(keepends=True)
     again = [line.replace("trial 3", "check") for line in lines if line.startswith("trial 3")]
     (folder / "check.csv").write_text("".join([head, *again]))
     (folder / "check_weights.csv").write_text("run,plane,unbalance_g_mm,angle_deg\ncheck,right,800,0\n")
-    planes = "".join(
-        f"[planes.{p}]\nholes = 12\navailable_g_mm = [100, 200]\n" for p in ("left", "middle", "right")
-    )
-    job = (DATA / "turbo_job" / "checked.toml").read_text()
-    (folder / "job.toml").write_text(job + planes + "taken = { '1' = 800 }\n")
-    return folder / "job.toml"
+    return path

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from balancing import Gaussian, Influence, Labels, Limits, Trials, with_parameters
+from balancing import Gaussian, Influence, Labels, Limits, Trials
 
 GRAM = 1e-3
 
@@ -64,15 +64,14 @@ def noisy(rng, Y, errors, shape=()):
     return Y + unit * np.abs(Y) * (errors.amplitude * radial + 1j * errors.phase * tangential) + floor
 
 
-def stored(W, baseline=None, speeds=None, *, relative=0.0, planes=None, labels=None, errors=None):
-    """Coefficients (S, C, P) as they are read from a file; `relative` error of each, or none known."""
+def stored(W, baseline=None, speeds=None, *, planes=None, labels=None):
+    """Coefficients (S, C, P) as they are read from a file, without errors."""
     W = np.asarray(W, dtype=complex)
     S, C, P = W.shape
     baseline = np.full((S, C), np.nan) if baseline is None else baseline
     speeds = 100.0 * np.arange(1, S + 1) if speeds is None else speeds
     names = tuple(f"s{c}" for c in range(C)), tuple(planes or "ABCDEFGH"[:P])
-    known = Influence(speeds, *names, W, baseline, errors or Gaussian.none(S, C, P), labels or Labels())
-    return with_parameters(known, np.zeros((0, S, C, P)), relative) if relative else known
+    return Influence(speeds, *names, W, baseline, Gaussian.none(S, C, P), labels or Labels())
 
 
 def rms(z):

@@ -4,6 +4,9 @@ import re
 
 import pytest
 
+WIDEST, SMALLEST = 7.0, 9.0  # inches, points
+SLACK = 1.5  # pixels
+
 
 def same(found, printed):
     """The same document but for the provenance, numbers to 1e-9."""
@@ -20,7 +23,7 @@ def plain(value, *left_out):
     return value
 
 
-def check_hygiene(figure, *, legends=1, unitless=(), smallest=9.0, widest=7.0):
+def check_hygiene(figure, *, unitless=()):
     """What every picture keeps: its size, letters, names of axes with their units, legends, nothing cut off.
 
     `unitless`: names of axes that count or compare and have no unit ("node"); words on an axis need none.
@@ -29,17 +32,17 @@ def check_hygiene(figure, *, legends=1, unitless=(), smallest=9.0, widest=7.0):
 
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw_without_rendering()
-    assert figure.get_figwidth() <= widest + 1e-9, f"{figure.get_figwidth():g} in wide"
+    assert figure.get_figwidth() <= WIDEST + 1e-9, f"{figure.get_figwidth():g} in wide"
     hidden = undrawn(figure)
     written = [text for text in figure.findobj(is_text) if text not in hidden]
     small = {
-        text.get_text(): text.get_fontsize() for text in written if text.get_fontsize() < smallest - 1e-9
+        text.get_text(): text.get_fontsize() for text in written if text.get_fontsize() < SMALLEST - 1e-9
     }
-    assert not small, f"letters below {smallest:g} pt: {small}"
+    assert not small, f"letters below {SMALLEST:g} pt: {small}"
     cut = [text.get_text() for text in written if not _inside(text.get_window_extent(renderer), figure.bbox)]
     assert not cut, f"cut off at the edge: {cut}"
     found = legends_of(figure)
-    assert len(found) <= legends, f"{len(found)} legends"
+    assert len(found) <= 1, f"{len(found)} legends"
     for ax in _axes(figure):
         if ax.axison and ax.get_visible():
             _check_names(ax, unitless)
@@ -95,12 +98,12 @@ def _drawn(axis):
     return [label for tick in ticks for label in _of(tick) if label.get_visible()]
 
 
-def _inside(box, frame, slack=1.5):
+def _inside(box, frame):
     return (
-        box.x0 >= frame.x0 - slack
-        and box.y0 >= frame.y0 - slack
-        and box.x1 <= frame.x1 + slack
-        and box.y1 <= frame.y1 + slack
+        box.x0 >= frame.x0 - SLACK
+        and box.y0 >= frame.y0 - SLACK
+        and box.x1 <= frame.x1 + SLACK
+        and box.y1 <= frame.y1 + SLACK
     )
 
 

@@ -52,9 +52,9 @@ def decay(**options):
     return ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0}, **options)
 
 
-def decay_record(n=41, error=0.01, seed=0, **options):
+def decay_record(n=41, error=0.01, **options):
     t = np.linspace(0.0, 4.0, n)
-    noise = error * np.random.default_rng(seed).standard_normal(n)
+    noise = error * np.random.default_rng(0).standard_normal(n)
     return Record(t, {"x": 2.0 * np.exp(-0.8 * t) + noise}, **options)
 
 

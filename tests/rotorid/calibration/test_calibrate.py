@@ -19,10 +19,10 @@ from rotorid.regression import nonlinear
 ERRORS = ReadingErrors(0.02, 0.02)
 
 
-def off(rotor, values, by=0.2):
+def off(values):
     """Unknowns that start so far off the truth, now to one side, now to the other."""
     signs = [1 if k % 2 else -1 for k in range(len(values))]
-    start = [v * (1 + s * by) if v else s * by * 1e6 for v, s in zip(values.values(), signs, strict=True)]
+    start = [v * (1 + 0.2 * s) if v else 2e5 * s for v, s in zip(values.values(), signs, strict=True)]
     return [Unknown(path, start=first) for path, first in zip(values, start, strict=True)]
 
 
@@ -103,7 +103,7 @@ def test_exact_data_give_the_numbers_back(rotor, values, more):
     truth = with_parameters(rotor, values)
     readings = truth_of(runs, values).readings(truth)
     data = runs.data(np.stack((readings, readings)), errors=ERRORS)  # repeats
-    found = calibrate(rotor, off(rotor, values), [data])
+    found = calibrate(rotor, off(values), [data])
     assert found.fit.converged
     assert found.values == pytest.approx(list(values.values()), rel=1e-6)
     assert found.chi_square < 1e-6

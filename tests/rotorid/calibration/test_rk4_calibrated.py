@@ -33,14 +33,14 @@ def example():
 
 
 @cache
-def found(speeds, span=560, stiffness=1e6):
-    return example().calibration(speeds, span, stiffness)
+def found(speeds):
+    return example().calibration(speeds, 560, 1e6)
 
 
-def estimates(rpm, kind, rotor=None, method="weighted"):
+def estimates(rpm, kind, rotor=None):
     """Of the eight other runs, and errors of disc 1, disc 2 and their sum, g·mm rms."""
     coefficients = example().known(rpm, kind, rotor)
-    all_ = [example().estimated(coefficients, one, method) for one in example().others(rpm).values()]
+    all_ = [example().estimated(coefficients, one, "weighted") for one in example().others(rpm).values()]
     assert len(all_) == 8
     return all_, np.sqrt(np.mean([each.errors**2 for each in all_], axis=0))
 

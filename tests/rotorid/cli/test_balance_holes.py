@@ -6,25 +6,17 @@ import re
 
 import pandas as pd
 import pytest
+from balance_sheets import turbo_job
 
 from rotorid.samples import sample_data
 
-TURBO = sample_data() / "turbo_job"
-HOLES = TURBO / "holes.toml"
-
-
-def job_with(tmp_path, text):
-    for name in ("runs.csv", "weights.csv"):
-        (tmp_path / name).write_text((TURBO / name).read_text())
-    path = tmp_path / "job.toml"
-    path.write_text((TURBO / "job.toml").read_text() + text)
-    return path
+HOLES = sample_data() / "turbo_job/holes.toml"
 
 
 def test_material_removed_is_on_the_other_side(cli, tmp_path):
     hole = "holes = 12\navailable_g_mm = [150]\nper_hole = 2\nstock = [5]\n"
     added = cli("balance", HOLES, "--split", "--json").json
-    path = job_with(
+    path = turbo_job(
         tmp_path, "".join(f"[planes.{p}]\n{hole}remove = true\n" for p in ("left", "middle", "right"))
     )
     gone = cli("balance", path, "--split", "--json").json
@@ -45,10 +37,7 @@ def test_material_removed_is_on_the_other_side(cli, tmp_path):
 
 def test_the_table_says_where_to_take_material_away(cli, tmp_path):
     """`angle_deg` of a plane with `remove` is the place to drill, not where weight would be added."""
-    for name in ("runs.csv", "weights.csv"):
-        (tmp_path / name).write_bytes((TURBO / name).read_bytes())
-    job, table = tmp_path / "job.toml", tmp_path / "weights_out.csv"
-    job.write_text((TURBO / "job.toml").read_text() + "\n[planes.left]\nremove = true\n")
+    job, table = turbo_job(tmp_path, "\n[planes.left]\nremove = true\n"), tmp_path / "weights_out.csv"
     rows = cli("balance", job, "--json", "--output", table).json["corrections"]
     frame = pd.read_csv(table)
     assert frame.columns[:2].tolist() == ["plane", "action"]
@@ -62,7 +51,7 @@ def test_the_table_says_where_to_take_material_away(cli, tmp_path):
 @pytest.mark.parametrize("remove", [False, True])
 def test_a_split_says_how_sure_it_is_and_which_hole_is_the_first(cli, tmp_path, remove):
     holes = f"holes = 12\navailable_g_mm = [150]\nremove = {str(remove).lower()}\n"
-    job = job_with(tmp_path, "".join(f"[planes.{p}]\n{holes}" for p in ("left", "middle", "right")))
+    job = turbo_job(tmp_path, "".join(f"[planes.{p}]\n{holes}" for p in ("left", "middle", "right")))
     sheet, table = tmp_path / "s.html", tmp_path / "pieces.csv"
     outcome = cli("balance", job, "--split", "--angles", "against", "--report", sheet, "--output", table)
     words, page = " ".join(outcome.out.split()), sheet.read_text("utf-8")

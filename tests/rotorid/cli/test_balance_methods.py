@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from balance_sheets import turbo_job
 
 from rotorid.samples import sample_data
 
@@ -27,9 +28,9 @@ def test_limits_that_leave_a_plane_nothing_ask_to_leave_it_out(cli, answers, tmp
     outcome = cli("balance", JOB, "--max-mass", "middle=0")
     assert outcome.code == 2
     assert "leave the plane out" in outcome.err
-    without = answers(job_with(tmp_path, "[planes.middle]\nuse = false\n"))["corrections"]
+    without = answers(turbo_job(tmp_path, "[planes.middle]\nuse = false\n"))["corrections"]
     assert without == answers(JOB, "--planes", "left,right")["corrections"]
-    circle = cli("balance", job_with(tmp_path, "[planes.middle]\nforbidden_deg = [[0, 180], [180, 360]]\n"))
+    circle = cli("balance", turbo_job(tmp_path, "[planes.middle]\nforbidden_deg = [[0, 180], [180, 360]]\n"))
     assert circle.code == 2
     assert "leave plane 'middle' no angle: leave it out" in circle.err
 
@@ -48,22 +49,11 @@ def test_limits_that_cannot_be_met_name_the_conflict_and_the_way_out(cli, tmp_pa
     assert cli("balance", JOB, "--max-mass", "100", "--limit", f"{4.95 * factor}").code == 2
 
 
-def job_with(tmp_path, text, weights=None):
-    """The turbo job in another folder with more keys."""
-    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
-        (tmp_path / name).write_text((TURBO / name).read_text())
-    if weights:
-        (tmp_path / "weights.csv").write_text(weights)
-    path = tmp_path / "job.toml"
-    path.write_text(JOB.read_text() + text)
-    return path
-
-
 def test_forbidden_angles_run_in_the_direction_of_the_job(answers, tmp_path):
     free = answers(JOB)["corrections"]
     at = free[0]["angle_deg"]
     arc = f"[planes.left]\nforbidden_deg = [[{at - 20:.3f}, {at + 30:.3f}]]\n"
-    moved = answers(job_with(tmp_path, arc))["corrections"][0]
+    moved = answers(turbo_job(tmp_path, arc))["corrections"][0]
     ends = [(at - 20) % 360, (at + 30) % 360]
     assert min(abs((moved["angle_deg"] - end + 180) % 360 - 180) for end in ends) < 1e-3
 
@@ -71,7 +61,7 @@ def test_forbidden_angles_run_in_the_direction_of_the_job(answers, tmp_path):
     rows = (TURBO / "weights.csv").read_text()
     assert ",0\n" in rows  # all trial weights at 0°, the same in both directions
     against = JOB.read_text().replace("with rotation", "against rotation")
-    path = job_with(tmp_path, "")
+    path = turbo_job(tmp_path, "")
     path.write_text(against + f"[planes.left]\nforbidden_deg = [[{-at - 30:.3f}, {-at + 20:.3f}]]\n")
     mirrored = answers(path)["corrections"][0]
     assert mirrored["mass"] == pytest.approx(moved["mass"], rel=1e-6)
@@ -81,7 +71,7 @@ def test_forbidden_angles_run_in_the_direction_of_the_job(answers, tmp_path):
 
 
 def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):
-    job = job_with(tmp_path, '[sensors."probe 4"]\nlimit = 0.2\n')
+    job = turbo_job(tmp_path, '[sensors."probe 4"]\nlimit = 0.2\n')
     found = answers(job, "--speeds", "1220,3600", "--method", "least-squares")
     assert any("predicted to pass its limit" in w for w in found["warnings"])
 
@@ -90,7 +80,7 @@ def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):
 @pytest.mark.parametrize("weights", ['[sensors."probe 4"]\nweight = 0\n', "speed_weights"])
 @pytest.mark.parametrize("method", FEW_DRAWS)
 def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, weights):
-    job = job_with(tmp_path, "" if weights == "speed_weights" else weights)
+    job = turbo_job(tmp_path, "" if weights == "speed_weights" else weights)
     if weights == "speed_weights":
         job.write_text('speed_weights = { "5400" = 0 }\n' + job.read_text())
 

@@ -16,8 +16,8 @@ SPEEDS = ("--speeds", "1000:9000:1000rpm")
 BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.02}
 
 
-def shaft(forces, supports=()):
-    return fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, forces=forces, supports=supports)
+def shaft(forces):
+    return fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, forces=forces)
 
 
 def test_the_threshold_does_not_depend_on_the_steps(cli):

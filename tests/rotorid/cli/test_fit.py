@@ -23,9 +23,9 @@ def saved(folder, name, text):
     return path
 
 
-def decay(x0=1.0, a=1.3, n=30, step=0.1):
-    t = step * np.arange(n)
-    x = x0 * np.exp(-a * t) + 1e-3 * np.random.default_rng(1).standard_normal(n)
+def decay(x0=1.0):
+    t = 0.1 * np.arange(30)
+    x = x0 * np.exp(-1.3 * t) + 1e-3 * np.random.default_rng(1).standard_normal(30)
     return "t_s,x\n" + "".join(f"{s:.3f},{v:.6f}\n" for s, v in zip(t, x, strict=True))
 
 
@@ -65,8 +65,8 @@ def test_the_same_record_twice(cli, tmp_path):
     refused(cli("fit", model, missing, missing), "given twice")
 
 
-def with_std(rows, header="t_s,y,z,y_std,z_std"):
-    return f"{header}\n" + "".join(f"{row}\n" for row in rows)
+def with_std(rows):
+    return "t_s,y,z,y_std,z_std\n" + "".join(f"{row}\n" for row in rows)
 
 
 ROWS = ["0,1,2,0.1,0.2", "1,0.5,1,0.1,0.3", "2,0.26,0.5,0.2,0.2", "3,0.12,0.25,0.1,0.2"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from balance_sheets import turbo_job
 
 from rotorid.samples import sample_data
 
@@ -76,18 +77,10 @@ def test_a_check_run_counts_with_refine_or_not_at_all(cli):
     assert plain["residuals"] == ignored["residuals"] != counted["residuals"]
 
 
-def zoned(tmp_path, text, job="job.toml"):
-    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
-        (tmp_path / name).write_text((TURBO / name).read_text())
-    path = tmp_path / "zoned.toml"
-    path.write_text((TURBO / job).read_text() + text)
-    return path
-
-
 def test_zones_before_predicted_and_of_the_check_run(cli, tmp_path):
     boundaries = "[zones]\nboundaries_um_rms = [1.76776695297, 10, 15]\n"  # 5, 28.3 and 42.4 µm pp
     own = '[sensors."probe 1"]\nzones_um_pp = [0.1, 0.5, 20]\n'
-    path = zoned(tmp_path, boundaries + own, "checked.toml")
+    path = turbo_job(tmp_path, boundaries + own, "checked.toml")
     found = cli("balance", path, "--json", "--report", tmp_path / "sheet.html").json
     rows = zip(found["zones"]["readings"], found["residuals"], found["check"]["readings"], strict=True)
     for zones, predicted, check in rows:
@@ -102,7 +95,7 @@ def test_zones_before_predicted_and_of_the_check_run(cli, tmp_path):
     assert now == "D"
     assert said in " ".join(cli("balance", path).out.split())
     assert "Zone D now" in (tmp_path / "sheet.html").read_text()
-    what_if = cli("balance", zoned(tmp_path, boundaries), "--weights", "left=423@168.9")
+    what_if = cli("balance", turbo_job(tmp_path, boundaries), "--weights", "left=423@168.9")
     assert "Zone D now, C predicted" in what_if.out
 
 
@@ -114,7 +107,7 @@ def test_zones_before_predicted_and_of_the_check_run(cli, tmp_path):
     ],
 )
 def test_zones_that_cannot_be(cli, tmp_path, text, words):
-    ran = cli("balance", zoned(tmp_path, f"[zones]\n{text}\n"))
+    ran = cli("balance", turbo_job(tmp_path, f"[zones]\n{text}\n"))
     assert (ran.code, ran.err.count("\n")) == (2, 1)
     assert words in ran.err
 
@@ -132,7 +125,7 @@ def test_a_check_run_typed_as_a_run_is_named_with_its_place(cli, tmp_path):
 
 
 def test_errors_between_runs_are_told_as_they_were_stated(cli, tmp_path):
-    path = zoned(tmp_path, "run_percent = 1\nrun_floor = 0.25\n")
+    path = turbo_job(tmp_path, "run_percent = 1\nrun_floor = 0.25\n")
     said = " ".join(cli("balance", path, "--table").out.split())
     assert "from run to run: 1 %, 0.25 µm pp (stated)" in said
 

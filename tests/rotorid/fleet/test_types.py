@@ -121,8 +121,8 @@ def test_the_first_shot_needs_nothing_but_a_baseline(fleet, tmp_path):
 def test_jobs_of_the_machine_count_but_never_the_same_runs(fleet, tmp_path):
     folder, machines = fleet
 
-    def knowledge(job, table=""):
-        return coefficients_of(job, table or address(fleet))
+    def knowledge(job):
+        return coefficients_of(job, address(fleet))
 
     own = folder / "tree" / "fan" / "F2" / "2026-01-01" / "job.toml"
     assert knowledge(own).earlier == 2

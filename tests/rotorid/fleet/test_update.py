@@ -9,27 +9,25 @@ from balancing_data import complex_normal, stored
 from balancing import ReadingErrors, Trials, with_parameters
 from rotorid.fleet.machine_type import update
 
-TWO = np.array([100.0, 200.0])
+SPEED = np.array([100.0])
 
 
-def prior(std=0.3, S=1, C=1, P=1, seed=1, alike=False):
+def prior(C=1, P=1, alike=False):
     """Coefficients with independent errors, or one error for all."""
-    rng = np.random.default_rng(seed)
-    W = complex_normal(rng, (S, C, P))
+    W = complex_normal(np.random.default_rng(1), (1, C, P))
     n = W.size
-    columns = std * np.concatenate((np.eye(n), 1j * np.eye(n))).reshape(2 * n, S, C, P)
+    columns = 0.3 * np.concatenate((np.eye(n), 1j * np.eye(n))).reshape(2 * n, 1, C, P)
     if alike:
-        columns = std * np.array([1, 1j])[:, None, None, None] * np.ones((S, C, P))
-    expected = replace(stored(W, speeds=TWO[:S], planes="PQ"[:P]), sensors=tuple("abc"[:C]))
+        columns = 0.3 * np.array([1, 1j])[:, None, None, None] * np.ones((1, C, P))
+    expected = replace(stored(W, speeds=SPEED, planes="PQ"[:P]), sensors=tuple("abc"[:C]))
     return with_parameters(expected, columns, 0.0)
 
 
 def of_runs(expected, W, D, T, rng, floor=0.05):
-    S = len(W)
     Y = np.einsum("scp,rp->rsc", W, np.asarray(T) - D)
     Y = Y + floor * complex_normal(rng, Y.shape)
     names = tuple(f"run {r}" for r in range(len(Y)))
-    return Trials(names, TWO[:S], expected.sensors, expected.planes, Y, T, errors=ReadingErrors(floor=floor))
+    return Trials(names, SPEED, expected.sensors, expected.planes, Y, T, errors=ReadingErrors(floor=floor))
 
 
 def test_one_trial_run_is_the_weighted_mean():

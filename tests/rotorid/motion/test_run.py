@@ -165,12 +165,12 @@ def test_what_dies_down_and_what_grows_are_told_apart(damping, trend):
     assert (end.steady, end.trend) == (False, trend)
 
 
-def end_of_curve(z, rate=64, turns=100.0, speed=100.0):
+def end_of_curve(z, rate=64):
     """The end of a motion of one node that was not computed, z over the angle of rotation."""
-    angle = np.linspace(0, 2 * np.pi * turns, int(rate * turns) + 1)
+    angle = np.linspace(0, 200 * np.pi, 100 * rate + 1)
     values = np.asarray(z(angle), dtype=complex)[:, None]
     made = one_mass(1.0, 0.0, 1.0, unbalance=1.0)
-    return steady_end(MotionRun(made, (1,), angle / speed, (speed, speed), values, *REST, 0.0, 1, 1e-6, ""))
+    return steady_end(MotionRun(made, (1,), angle / SPEED, (SPEED, SPEED), values, *REST, 0.0, 1, 1e-6, ""))
 
 
 @pytest.mark.parametrize(

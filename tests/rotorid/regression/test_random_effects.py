@@ -8,15 +8,12 @@ from rotorid.regression.random_effects import oddness, random_effects, shrunk
 RNG = np.random.default_rng(5)
 
 
-def several(M=12, k=4, n=2, between=2.0, within=0.5, error=0.1, seed=3):
-    rng = np.random.default_rng(seed)
+def several(M=12, k=4, between=2.0):
+    rng = np.random.default_rng(3)
     group = np.repeat(np.arange(M), k)
-    y = (
-        3
-        + between * rng.standard_normal((M, n))[group]
-        + np.hypot(within, error) * rng.standard_normal((M * k, n))
-    )
-    return y, np.tile(error**2 * np.eye(2), (M * k, n // 2, 1, 1)), group
+    y = 3 + between * rng.standard_normal((M, 2))[group]
+    y += np.hypot(0.5, 0.1) * rng.standard_normal((M * k, 2))
+    return y, np.tile(0.1**2 * np.eye(2), (M * k, 1, 1, 1)), group
 
 
 def test_variances_are_those_of_the_analysis_of_variance():

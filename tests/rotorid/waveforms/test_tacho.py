@@ -13,8 +13,8 @@ TURNS = START + 12 * T + T**2
 """12 to 52 turns a second."""
 
 
-def pulses(at=(0.0,), wide=0.05, high=5.0):
-    return high * np.any([(TURNS - place) % 1 < wide for place in at], axis=0)
+def pulses(at=(0.0,), wide=0.05):
+    return 5.0 * np.any([(TURNS - place) % 1 < wide for place in at], axis=0)
 
 
 def read(samples, **settings):
