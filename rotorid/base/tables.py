@@ -25,7 +25,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import TYPE_CHECKING, Any
@@ -114,12 +114,6 @@ class Table:
         moved = (replace(each, key=each.key and f"{place}.{each.key}") for each in self.columns)
         return replace(self, columns=tuple(moved))
 
-    def only(self, headings: Mapping[str, str]) -> Table:
-        """Some of the columns, in this order, with other headings."""
-        columns = {each.heading: each for each in self.columns}
-        some = (replace(columns[name], heading=shown) for name, shown in headings.items())
-        return replace(self, columns=tuple(some))
-
     @property
     def headings(self) -> list[str]:
         """Of the columns."""
@@ -166,8 +160,9 @@ def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
 
 def terminal(table: Table, width: int = WIDTH) -> str:
     """Aligned text: words and the first column to the left, other numbers to the right."""
-    last = max((k for k, column in enumerate(table.columns, start=1) if column.words), default=1)
-    return text(table.columns, last, width)
+    printed = [column for column in table.columns if column.shown is not None]
+    last = max((k for k, column in enumerate(printed, start=1) if column.words), default=1)
+    return text(printed, last, width)
 
 
 def csv(table: Table) -> bytes:

@@ -84,7 +84,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     waveforms = read_waveforms([Path(record) for record in records], given)
     each = find_each(waveforms)
     labels = waveforms.labels
-    table, printed = vectors_table(each, labels)
+    table = vectors_table(each, labels)
     orders, tachos = listing((f"{k}×" for k in each[0].orders), "and"), [one.tacho for one in each]
     many, first = len(each) > 1, waveforms.records[0]
     signal = first.tacho
@@ -123,7 +123,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
             f"phases {labels.phase}.",
             *map(_course, each),
         ),
-        tables=(table.only(printed),),
+        tables=(table,),
         file=table,
         keys=dict(plain(document)),
         pictures={

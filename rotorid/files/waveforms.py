@@ -274,14 +274,8 @@ def find_each(waveforms: Waveforms) -> tuple[Vectors, ...]:
     return each
 
 
-def vectors_table(each: Sequence[Vectors], labels: Labels) -> tuple[Table, dict[str, str]]:
-    """A runs table of records of the same sensors and orders, one row an instant and a sensor.
-
-    Returns
-    -------
-    Table, dict
-        The table, and the headings of those of its columns that people read, by their names.
-    """
+def vectors_table(each: Sequence[Vectors], labels: Labels) -> Table:
+    """A runs table of records of the same sensors and orders, one row an instant and a sensor."""
     rows: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in each]) for name in _ROWS}
     whole = replace(each[0], **rows)
     runs = np.repeat([one.run for one in each], [len(one.times) for one in each])
@@ -313,11 +307,11 @@ def vectors_table(each: Sequence[Vectors], labels: Labels) -> tuple[Table, dict[
         ("note", np.where(whole.end[:, None], "end of the record", ""), "{}", ""),
     ]
     made = []
-    for name, values, form, _ in columns:
+    for name, values, form, title in columns:
         cells = np.broadcast_to(values, gap.shape).ravel()
         cells = significant(cells, DIGITS) if cells.dtype.kind == "f" else cells
-        made.append(Column(name, cells.tolist(), form.format))
-    return Table("vectors", tuple(made)), {name: heading for name, *_, heading in columns if heading}
+        made.append(Column(name, cells.tolist(), form.format if title else None, title=title))
+    return Table("vectors", tuple(made))
 
 
 def read_vectors_grid(
@@ -356,7 +350,7 @@ def read_vectors_grid(
     for one in each:
         for word in one.warnings:
             warnings.warn(f"{path}: run {one.run!r}: {word}", TableWarning, stacklevel=2)
-    table, _ = vectors_table(each, labels)
+    table = vectors_table(each, labels)
     rows = (tuple("" if value is None else value for value in row) for row in table.rows)
     grid = Grid(str(path), 1, tuple(table.headings), tuple(enumerate(rows, start=2)))
     return grid, labels.phase, waveforms.files
