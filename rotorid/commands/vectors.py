@@ -125,7 +125,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
         ),
         tables=(table,),
         file=table,
-        keys=dict(plain(document)),
+        keys=plain(document),
         pictures={
             "Vectors, over the tacho of the first record.": lambda: figure_vectors(
                 each, labels, signal, first.rate
