@@ -14,14 +14,14 @@ dropped. What is uncertain is drawn: amplitudes with their errors are fitted aga
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from balancing.conditioning import chance
-from balancing.regions import real_parts
+from balancing.regions import LEVEL, real_parts
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 UNLIKE = 1e-4
@@ -30,6 +30,8 @@ _DRAWS, _MOST = 1000, 32
 """Draws of a minimum; choices."""
 _WALK, _OPEN, _SMALL, _TINY = 60, 3.0, 0.1, 1e-300
 """Steps of a draw. Of the largest amplitude: deviation of what is open; what is smaller is of this scale."""
+_FURTHER = 2.0
+"""A region is looked for so many times as far away as weights are drawn."""
 _STARTS = {
     p: np.outer(np.geomspace(least, most, sizes), np.exp(2j * np.pi * np.arange(ways) / ways)).ravel()
     for p, least, most, sizes, ways in ((1, 0.1, 10.0, 9, 16), (2, 0.3, 3.0, 3, 8))
@@ -146,11 +148,33 @@ def effects(parameters: FloatArray) -> ComplexArray:
     return np.asarray(parameters[..., 1::2] + 1j * parameters[..., 2::2])
 
 
-def best_weights(x: FloatArray, weights: FloatArray, largest: FloatArray | float = np.inf) -> ComplexArray:
-    """Weights (n, P) that leave least, by parameters (n, N, 1 + 2P), each cut to the largest."""
+def best_weights(x: FloatArray, weights: FloatArray) -> ComplexArray:
+    """Weights (n, P) that leave least, by parameters (n, N, 1 + 2P)."""
     y, w = x[..., :1] * weights[:, None], effects(x) * weights[:, None]
-    D = -(np.linalg.pinv(w, 1e-7) @ y)[..., 0]
-    return np.asarray(D * np.minimum(1.0, largest / np.maximum(np.abs(D), _TINY)))
+    return np.asarray(-(np.linalg.pinv(w, 1e-7) @ y)[..., 0])
+
+
+def region(
+    best: ComplexArray, draws: ComplexArray, misfit: Callable[[ComplexArray], FloatArray], dof: int, limit: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """The best weights (P,), and weights (n, P) of their region of 95 %: of draws (n, P).
+
+    Of one plane where a weight may leave nothing anywhere: the weight of least misfit, and all within a limit
+    of it, sought from the draws on.
+    """
+    if len(best) == 1:
+        spread, least = draws - best, best
+        for k in range(60):
+            places = np.vstack((least, least + 0.7**k * spread))
+            least = places[np.argmin(misfit(places))]
+        places = np.vstack((least, least + _FURTHER * spread))
+        above = misfit(places)
+        if chance(above[0], dof) >= UNLIKE:
+            return least, places[above <= above[0] + limit]
+    numbers = np.hstack((np.abs(draws), np.angle(draws * best.conj())))
+    tail = (1 - LEVEL) / (4 * len(best))
+    low, high = np.quantile(numbers, (tail, 1 - tail), axis=0)
+    return best, draws[((numbers >= low) & (numbers <= high)).all(axis=1)]
 
 
 def _together(minima: Sequence[Minimum], weights: FloatArray) -> tuple[float, float]:

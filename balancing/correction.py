@@ -183,9 +183,15 @@ class Correction(Prediction, Answered):
         return (*self.influence.remarks.notes, *self.decision.notes)
 
     @property
+    def judgement(self) -> MountDecision:
+        """The decision; not to mount anything where the runs contradict their conventions."""
+        cause = "; ".join(self.contradictions)
+        return replace(self.decision, word="do not mount", cause=cause, instead=()) if cause else self.decision
+
+    @property
     def sound(self) -> bool:
         """Whether nothing speaks against mounting the weights."""
-        return self.decision.word == "mount" and not self.contradictions
+        return self.judgement.word == "mount"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
@@ -201,7 +207,7 @@ class Correction(Prediction, Answered):
         parts = () if self.parts is None else records(self.parts._weight_columns()[:-2])
         return plain(
             {
-                "judgement": self.decision.to_dict(self.labels),
+                "judgement": self.judgement.to_dict(self.labels),
                 "method": self.method,
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
@@ -269,9 +275,8 @@ class Correction(Prediction, Answered):
         """Whether to mount what, what is determined, and what a check run will read."""
         labels = self.labels
         if not self.sound:
-            first = [f"Do not mount anything yet: {words}." for words in self.contradictions]
-            first += self.decision.lines()
-            if self.decision.word == "determined in part":
+            first = list(self.judgement.lines())
+            if self.judgement.word == "determined in part":
                 first += [f"With these weights: {self._left()}.", *self.decision.elsewhere]
             return "\n".join(first)
         if not self.weights.any():

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from balancing.amplitudes import Fit, best_weights, choices, effects
+from balancing.amplitudes import Fit, best_weights, choices, effects, region
 from balancing.conditioning import UndeterminedError, chance
 from balancing.cones import allowed_sectors, stands_in
 from balancing.correction import MountDecision
 from balancing.decision import HARDLY_BELOW
 from balancing.holes import SAME_ANGLE, Holes
-from balancing.regions import LEVEL, Region, half_width
+from balancing.regions import LEVEL
 from balancing.tables import reading_columns, rms, three_figures, weight_columns
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
@@ -87,8 +87,8 @@ class AmplitudeSolution:
         Misfit of the amplitudes.
     before, effect
         Readings y ≥ 0 of the bare rotor (N,), and w of the planes by them (N, P); speed by speed.
-    draws
-        The weights as the errors allow, (n, P).
+    region
+        Weights at random in its 95 % region, (n, P).
     left
         Share of the present vibration (rms) that the weights of the first solution leave if this one is
         true: the upper end of its 95 % interval.
@@ -98,8 +98,14 @@ class AmplitudeSolution:
     chi_square: float
     before: FloatArray
     effect: ComplexArray
-    draws: ComplexArray
+    region: ComplexArray
     left: float
+
+    @property
+    def intervals(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """From, to and ± of the sizes and angles in the region, (P,) each; kg or kg·m, rad."""
+        size, angle = np.abs(self.region), np.angle(self.region * self.weights.conj())
+        return size.min(axis=0), size.max(axis=0), np.abs(angle).max(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,21 +157,13 @@ class WithoutPhase(Answered):
         return self.decision.word == "mount"
 
     def holds(self, weights: ComplexArray) -> bool:
-        """Whether weights (P,) lie in the 95 % region of a solution.
-
-        For one plane also where one that leaves nothing misfits by no more than 95 % allow.
-        """
-        if any(Region.of(one.draws, one.weights).holds(weights) for one in self.solutions):
-            return True
-        if len(self.planes) > 1:
-            return False
-        places = np.concatenate([weights, *(one.draws[:, 0] for one in self.solutions)])
-        distances = np.abs(self.trials.weights[:, 0] - places[:, None])
-        a = np.abs(self.trials.mean).reshape(self.errors.shape) / self.errors
-        g = distances[:, :, None] / self.errors
-        scale = (g * a).sum(axis=1) / np.maximum((g * g).sum(axis=1), _TINY)
-        misfit = ((a - scale[:, None] * g) ** 2).sum(axis=(1, 2))
-        return bool(misfit[0] <= misfit.min() + self.scatter.limit(2, LEVEL))
+        """Whether sizes and angles of weights (P,) lie in the 95 % intervals of a solution."""
+        return any(
+            ((np.abs(weights) >= low) & (np.abs(weights) <= high)).all()
+            and (np.abs(np.angle(weights * one.weights.conj())) <= angle).all()
+            for one in self.solutions
+            for low, high, angle in [one.intervals]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
@@ -211,13 +209,12 @@ class WithoutPhase(Answered):
         """plane, mass, unit, angle_deg and their 95 % of each solution."""
         sign = np.array([-1.0 if plane in self.remove else 1.0 for plane in self.planes])
         D = np.concatenate([sign * one.weights for one in solutions])
-        tails, scale = ((1 - LEVEL) / 2, (1 + LEVEL) / 2), self.labels.weight_scale
-        low, high = np.hstack([np.quantile(np.abs(one.draws), tails, axis=0) for one in solutions]) * scale
-        angle = np.hstack([half_width(np.angle(one.draws * one.weights.conj())) for one in solutions])
+        low, high, angle = np.hstack([one.intervals for one in solutions])
+        scale = self.labels.weight_scale
         return (
             *weight_columns(self.labels, self.planes * len(solutions), D),
-            Column("mass_low", low, lambda mass: figures(mass, 2), title="from"),
-            Column("mass_high", high, lambda mass: figures(mass, 2), title="to (95 %)"),
+            Column("mass_low", low * scale, lambda mass: figures(mass, 2), title="from"),
+            Column("mass_high", high * scale, lambda mass: figures(mass, 2), title="to (95 %)"),
             Column("angle_95_deg", np.degrees(angle), lambda width: f"± {width:.0f}°", title=""),
         )
 
@@ -329,20 +326,37 @@ def balance_without_phase(
     weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
     largest = limits.max_weight / np.abs(size)
     solutions = list[AmplitudeSolution]()
+
+    def misfit(places: ComplexArray) -> FloatArray:
+        """χ² (n,) where a weight at one of the places (n, 1) leaves nothing, each reading in its best scale."""
+        distance = np.abs(T[:, 0] - places)[..., None] / errors
+        scale = (distance * a / errors).sum(axis=1) / np.maximum((distance**2).sum(axis=1), _TINY)
+        return np.asarray(((a / errors - scale[:, None] * distance) ** 2).sum(axis=(1, 2)))
+
+    def cut(D: ComplexArray) -> ComplexArray:
+        """Weights (…, P) of the job, the largest ones at most."""
+        return np.asarray(D * np.minimum(1.0, largest / np.maximum(np.abs(D), _TINY)) * size)
+
     for choice in choices(minima, weights, limit):
         x = np.array([one.parameters for one in choice])
-        D = best_weights(x[None], weights, largest)[0]
         draws = np.array([one.draws for one in choice]).swapaxes(0, 1)
-        mounted = solutions[0].weights / size if solutions else D
-        after, before = (draws[..., 0] + effects(draws) @ mounted) * weights, draws[..., 0] * weights
+        best, inside = region(
+            best_weights(x[None], weights)[0],
+            best_weights(draws, weights),
+            misfit,
+            (len(a) - 1) * N - 2,
+            scatter.limit(2, LEVEL),
+        )
+        mounted = solutions[0].weights if solutions else cut(best)
+        after, before = (draws[..., 0] + effects(draws) @ (mounted / size)) * weights, draws[..., 0] * weights
         left = np.linalg.norm(after, axis=1) / np.linalg.norm(before, axis=1).clip(_TINY)
         solutions.append(
             AmplitudeSolution(
-                D * size,
+                cut(best),
                 sum(one.chi_square for one in choice),
                 x[:, 0] * top,
                 effects(x) * top[:, None] / size,
-                best_weights(draws, weights, largest) * size,
+                cut(inside),
                 float(np.quantile(left, (1 + LEVEL) / 2)),
             )
         )

@@ -100,7 +100,7 @@ def solutions_figure(result: WithoutPhase) -> Figure:
         polar = polar_axes(ax, labels.angles_on_paper, f"Plane {cut(plane, 24)!r}, {labels.weight_in}")
         tried = result.trials.weights[:, p]
         for k, one in enumerate(result.solutions[: len(COLORS)]):
-            look, (size, angle) = of_plane(k), labels.weight(one.draws[::4, p])
+            look, (size, angle) = of_plane(k), labels.weight(one.region[::4, p])
             polar.plot(np.deg2rad(angle), size, ".", ms=2, alpha=0.25, color=look["color"])
             name = f"solution {k + 1}: {labels.weight_at(one.weights[p])}"
             draw_line(polar, labels.weight, [0, one.weights[p]], lw=2, label=name, **look)

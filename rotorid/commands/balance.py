@@ -118,7 +118,7 @@ class Balance(Outcome):
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
         document: dict[str, Any] = self.result.to_dict()
         if (left := self.left) is not None:  # what is mounted is not to be mounted again
-            counted = left.correction.decision.to_dict(left.correction.labels)
+            counted = left.correction.judgement.to_dict(left.correction.labels)
             expected = counted["rms_expected"] if left.word == "trim" else None
             document["judgement"].update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
         return document | {key: part.to_dict() for key, part in parts.items() if part}

@@ -68,6 +68,28 @@ def test_three_points_as_printed():
     assert answer.sound
 
 
+def two_point_method(a, b, c, mass):
+    """A. Lindholm's (a reliability forum, quoted on eng-tips): size, and angle to either side of the trials' line.
+
+    Sides b, c and 2a are a triangle's: d² = 2b² + 2c² − 4a²; the test mass is to the balancing mass as d to 2a.
+    """
+    d = np.sqrt(2 * b**2 + 2 * c**2 - 4 * a**2)
+    cosine = (a**2 + (d / 2) ** 2 - b**2) / (a * d)
+    return mass * 2 * a / d, np.arccos(cosine)
+
+
+def test_two_points_as_printed():
+    rng = np.random.default_rng(20)
+    for _ in range(20):
+        mass, place, scale = rng.uniform(0.5, 2.0), np.exp(1j * rng.uniform(-3, 3)), rng.uniform(1, 20)
+        correction = rng.uniform(0.5, 2.0) * place
+        a, b, c = scale * np.abs(np.array([0, mass, -mass]) - correction)
+        answer = balance_without_phase(job([a, b, c], AT[180], mass, errors=ReadingErrors(0.02)))
+        size, angle = two_point_method(a, b, c, mass)
+        both = sorted((one.weights[0] for one in answer.solutions), key=np.angle)
+        assert both == pytest.approx([size * np.exp(-1j * angle), size * np.exp(1j * angle)], abs=1e-6)
+
+
 def test_impossible_amplitudes_are_named():
     answer = balance_without_phase(job((7, 4, 3.5, 5)))
     assert answer.decision.word == "measure again"
