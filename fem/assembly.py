@@ -250,6 +250,11 @@ class Planes:
     pedestals: IndexArray
     feet: FloatArray
 
+    @property
+    def across(self) -> AnyArray:
+        """Force in x from y, and with the opposite sign in y from x; or the same of z."""
+        return np.array([[0.0, 1.0], [-1.0, 0.0]] if self.planes == 2 else [[-1j]])
+
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
         """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
 
@@ -346,8 +351,7 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
         w = basis[P.A.deflection(damper.node)]
         B += damper.damping * np.outer(w, w)
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))
-    # Force in x from y, and with the opposite sign in y from x; or the same of z.
-    along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
+    along, across = np.eye(p), P.across
     forms, feet = np.array([M, B, K, G, B]), np.arange(p * d, p * (d + f))
     matrices = np.zeros((5, p * (d + f), p * (d + f)), across.dtype)
     planes = np.einsum("kab,kij->kaibj", [along] * 3 + [across] * 2, forms)
@@ -380,8 +384,6 @@ class WholeBand:
             entries = upper[:, A.width - off, off:]
             self._bands[:, A.width - off, off:] = entries
             self._bands[:, A.width + off, : A.size - off] = entries
-        self._to: AnyArray = TO_XY if p == 2 else np.eye(1)
-        self._from = np.linalg.inv(self._to)
 
     def factor(self, value: complex, speed: float) -> Callable[..., ComplexArray]:
         """Solutions X of P X = B, P = λ² M + λ D + K at one λ and speed: of B, and whether of Pᵀ X = B.
@@ -407,12 +409,3 @@ class WholeBand:
             return np.asarray(zgbtrs(lu, reach, reach, B, pivots, trans=int(transposed))[0])
 
         return solve
-
-    def interleaved(self, X: AnyArray) -> ComplexArray:
-        """From (…, planes, size) to the order of the band, (…, planes · size)."""
-        return np.swapaxes(self._from @ X, -1, -2).reshape(*X.shape[:-2], self.size)
-
-    def planes(self, X: AnyArray) -> AnyArray:
-        """Back to (…, planes, size)."""
-        alternating = X.reshape(*X.shape[:-1], -1, self.P.planes)
-        return self._to @ np.swapaxes(alternating, -1, -2)

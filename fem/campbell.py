@@ -304,7 +304,7 @@ def _crossings(paths: _Paths) -> _Crossings:
 
     def excess(speeds: FloatArray) -> FloatArray:
         nonlocal value, vector
-        value, vector = polish(paths.whirl.Q, speeds, np.arange(k.size), value, vector, 2)
+        value, vector = polish(paths.whirl.Q, speeds, np.arange(k.size), value, vector)
         return np.abs(value.imag) - speeds
 
     speed, rest = roots(excess, paths.speeds[steps], f[steps, mode])

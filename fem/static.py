@@ -13,7 +13,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.assembly import Planes, WholeBand, both_planes, free_motions, multiply, rounding_error
+from fem.assembly import (
+    FROM_XY,
+    TO_XY,
+    Planes,
+    WholeBand,
+    both_planes,
+    free_motions,
+    multiply,
+    rounding_error,
+)
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray, number
@@ -154,8 +163,9 @@ def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
     for plane in (0, 1):
         if free_motions(P.rotor, set(P.rows[springs[:, plane, plane] != 0])):
             raise ValueError("a rotor that is not held has no rest: give stiffness to supports at two nodes")
-    whole = WholeBand(P)
-    X = whole.planes(whole.factor(0.0, speed)(whole.interleaved(forces).T).T).real
+    loads = (FROM_XY @ forces).swapaxes(1, 2).reshape(len(forces), -1)  # F and b alternate
+    answers = WholeBand(P).factor(0.0, speed)(loads.T).T.reshape(len(forces), -1, 2)
+    X = (TO_XY @ answers.swapaxes(1, 2)).real
     flat, work = X.reshape(-1, P.A.size), np.abs((forces * X).sum(axis=(1, 2)))
     if not (rounding_error(P.A.shaft, flat.T, np.repeat(work, 2)) < 1e-3).all():
         raise ValueError(

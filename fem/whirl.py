@@ -137,9 +137,9 @@ def solve_modes(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
 
 
 def polish(
-    Q: Reduced, speeds: FloatArray, at: IndexArray, values: ComplexArray, vectors: ComplexArray, steps: int
+    Q: Reduced, speeds: FloatArray, at: IndexArray, values: ComplexArray, vectors: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Improve single pairs by inverse iteration: each step squares the error.
+    """Improve single pairs by two steps of inverse iteration: each squares the error.
 
     Parameters
     ----------
@@ -149,12 +149,10 @@ def polish(
         Which speed each pair belongs to, shape (B,).
     values, vectors
         Shapes (B,) and (B, R), vectors of length 1.
-    steps
-        How many.
     """
     D, K = Q.at(speeds[at])
     lam, X = values[:, None], vectors[:, None]
-    for _ in range(steps):
+    for _ in range(2):
         new = _answers(Q.M, D, K, lam, X @ np.swapaxes(D, 1, 2) + 2 * lam[..., None] * (X @ Q.M))
         lam = lam - 1 / (X.conj() * new).sum(axis=2)
         X = new / np.linalg.norm(new, axis=2, keepdims=True)
@@ -300,7 +298,7 @@ def _vectors_and_loads(whirl: Whirl, shift: float) -> tuple[ComplexArray, Comple
     p, d = whirl.Q.P.planes, whirl.Q.basis.shape[1]
     lam, speed = np.nan_to_num(whirl.values)[..., None, None], whirl.speeds[:, None, None, None]
     x = np.nan_to_num(whirl.vectors)[..., : p * d].reshape(*whirl.values.shape, p, d)
-    turned = speed * (np.array([[-1j]] if p == 1 else [[0.0, 1.0], [-1.0, 0.0]]) @ x)
+    turned = speed * (whirl.Q.P.across @ x)
     return x, np.concatenate(((lam * lam - shift) * x, lam * turned, lam * x + turned), axis=3)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -223,11 +223,8 @@ def draw_bifurcations(branches: Sequence[Branch], directions: FloatArray, label:
         stable = np.array([orbit.stable for orbit in branch.orbits])
         for word, style, part in (("stable", "-", stable | (kinds != "")), ("unstable", "--", ~stable)):
             if (part & (kinds == "")).any():
-                line: dict[str, Any] = {
-                    "color": colors[branch.kind],
-                    "marker": "" if len(speeds) > 1 else "o",
-                }
-                ax.plot(speeds, np.where(part, sizes, np.nan), style, label=f"{branch.kind}, {word}", **line)
+                (line,) = ax.plot(speeds, np.where(part, sizes, np.nan), style, color=colors[branch.kind])
+                line.set(label=f"{branch.kind}, {word}", marker="" if len(speeds) > 1 else "o")
         for kind, marker in zip(KINDS, MARKERS, strict=False):
             if (at := kinds == kind).any():
                 ax.plot(speeds[at], sizes[at], marker, color=DARK, markersize=5, zorder=3, label=kind)

@@ -15,6 +15,7 @@ from fem import (
     available_modes,
     checked_number,
     critical_speeds_below,
+    decrements_of,
     label,
     runs_away,
     solve_whirl,
@@ -86,11 +87,6 @@ class ResponseCost(Answered):
         difference = np.where(self.excluded[:, None, None], -1.0, self.relative_difference)
         s, c, p = np.unravel_index(int(np.argmax(difference)), difference.shape)
         return float(self.speeds[s]), self.sensors[int(c)], self.nodes[int(p)]
-
-    @property
-    def left_out(self) -> list[tuple[float, float]]:
-        """Bands around the critical speeds, rad/s."""
-        return [(w * (1 - self.bands), w * (1 + self.bands)) for w in self.criticals.tolist()]
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -254,16 +250,14 @@ class StabilityCost(Answered):
     @property
     def answer(self) -> Answer:
         """Both stabilities, and how far apart the thresholds are."""
-        apart = "" if self.relative_difference is None else f" ({100 * self.relative_difference:+.3g} %)"
-        disagree = "" if self.full.status == self.small.status else "The models DISAGREE. "
+        model = f"{len(self.nodes)}-mass model"
         if self.full.threshold is not None and self.small.threshold is not None:
             ends = rpm_text(self.full.threshold), rpm_text(self.small.threshold)
-            words = f"Stable up to {ends[0]}, the {len(self.nodes)}-mass model up to {ends[1]}{apart}."
-            return Answer(words, warnings=self.warnings)
-        words = (
-            f"{disagree}Full rotor: {self.full.sentence()}.\n{len(self.nodes)}-mass model: "
-            f"{self.small.sentence()}."
-        )
+            apart = f"{100 * (self.small.threshold / self.full.threshold - 1.0):+.3g} %"
+            words = f"Stable up to {ends[0]}, the {model} up to {ends[1]} ({apart})."
+        else:
+            disagree = "" if self.full.status == self.small.status else "The models DISAGREE. "
+            words = f"{disagree}Full rotor: {self.full.sentence()}.\n{model}: {self.small.sentence()}."
         return Answer(words, warnings=self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
@@ -336,5 +330,4 @@ def compare_stability(
 
 def _least_damped(whirl: Whirl) -> FloatArray:
     """Smallest logarithmic decrement at each speed, shape (S,); −inf where the rotor runs away."""
-    decrements = -2 * np.pi * whirl.values.real / np.abs(whirl.values.imag)
-    return np.where(runs_away(whirl), -np.inf, np.fmin.reduce(decrements, axis=1))
+    return np.where(runs_away(whirl), -np.inf, np.fmin.reduce(decrements_of(whirl.values), axis=1))

@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -183,8 +183,9 @@ def equivalent_masses(
     >>> estimate.values.round(3)
     array([33.333, 33.333])
     """
-    choices: dict[str, Any] = {"seal_stiffness": seal_stiffness, "normalise": normalise, "rows": rows}
-    B, D = design(compliance, frequencies, shapes, **choices)
+    B, D = design(
+        compliance, frequencies, shapes, seal_stiffness=seal_stiffness, normalise=normalise, rows=rows
+    )
     if B.ndim != 2:
         raise ValueError("equivalent_masses takes one model at a time; for many at once use design")
     names = [f"m{i + 1}" for i in range(B.shape[1])]

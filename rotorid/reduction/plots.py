@@ -78,9 +78,9 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         words = f"{f * RPM:.0f} rpm ({f:.5g} rad/s" if np.isfinite(f) else "does not vibrate"
         if np.isfinite(f):
             words += f", {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}"
-        style: dict[str, Any] = {"color": COLORS[k], "markeredgecolor": "white", "markersize": 9, "zorder": 6}
         axes.plot(along, curves[:, k] / scale[k], **look(k), linewidth=1.8, zorder=5)
-        axes.plot(x, points[:, k], MARKERS[k], **style, label=f"mode {k + 1}: {words}")
+        (mark,) = axes.plot(x, points[:, k], MARKERS[k], color=COLORS[k], label=f"mode {k + 1}: {words}")
+        mark.set(markeredgecolor="white", markersize=9, zorder=6)
     axes.secondary_xaxis("top").set_xticks(x, labels, rotation=45, fontsize=TEXT)
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=3)
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
@@ -101,13 +101,16 @@ def plot_methods(methods: Methods, ax: Axes | None = None) -> Axes:
     for i, row in enumerate(methods.rows):
         x = np.arange(n) + (i - (len(methods.rows) - 1) / 2) * width
         errors = 100 * row.relative_error[:n]
-        style: dict[str, Any] = {
-            "color": COLORS[i],
-            "hatch": HATCHES[i],
-            "edgecolor": "white",
-            "linewidth": 0,
-        }
-        bars = axes.bar(x, np.nan_to_num(errors), 0.92 * width, label=row.name, **style)
+        bars = axes.bar(
+            x,
+            np.nan_to_num(errors),
+            0.92 * width,
+            label=row.name,
+            color=COLORS[i],
+            hatch=HATCHES[i],
+            edgecolor="white",
+            linewidth=0,
+        )
         texts = [
             f"{_percent(error)}, MAC {agreement:.4f}"
             for error, agreement in zip(errors, row.mac, strict=False)
@@ -162,8 +165,8 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
         names = " and ".join(NAMED[key] for key, other in placement.named.items() if other == row)
         nodes = ", ".join(map(str, placement.nodes[row]))
         text = f"{names}: {nodes}, {100 * placement.error[row]:.3g} %, MAC {placement.mac[row]:.4f}"
-        style: dict[str, Any] = {"markersize": 10, "markeredgecolor": "black", "zorder": 6}
-        axes.plot(x[row], y[row], MARKERS[k], color=COLORS[k], label=text, **style)
+        (mark,) = axes.plot(x[row], y[row], MARKERS[k], color=COLORS[k], label=text)
+        mark.set(markersize=10, markeredgecolor="black", zorder=6)
     legend_above(axes, 1, 0.8, title=title, title_fontsize="medium")
     return axes
 

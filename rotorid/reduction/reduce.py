@@ -605,8 +605,8 @@ def _errors_by_draws(result: Reduction, stated: InputErrors) -> MassErrors:
     factors[:, i, j] = factors[:, j, i] = a
     alpha, springs = result.compliance * factors, result.seal_stiffness * c
     shapes = result.rotor_shapes[:, :k] * u.reshape(-1, n, k)
-    how: dict[str, Any] = {"normalise": result.normalise, "rows": result.rows}
-    B, D = design(alpha, result.rotor_frequencies[:k] * w, shapes, seal_stiffness=springs, **how)
+    omega = result.rotor_frequencies[:k] * w
+    B, D = design(alpha, omega, shapes, seal_stiffness=springs, normalise=result.normalise, rows=result.rows)
     masses, _ = solve_many(B, D)
     omega = np.full_like(masses, np.nan)
     if np.isfinite(masses).all():

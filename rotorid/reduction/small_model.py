@@ -176,13 +176,13 @@ class SmallModel(Answered):
         basis = np.zeros((P.A.size, k))
         basis[P.A.deflections[:k], np.arange(k)] = 1.0
         Q, p = project(P, basis), P.planes
-        along, across = np.eye(p), np.array([[0.0, 1.0], [-1.0, 0.0]] if p == 2 else [[-1j]])
+        along = np.eye(p)
         blocks = {
             "M": np.kron(along, np.diag(self.masses)),
             "D0": np.kron(along, self.material_damping + self.damping),
             "K0": np.kron(along, self.stiffness),
-            "D1": np.kron(across, self.gyroscopic),
-            "K1": np.kron(across, self.material_damping),
+            "D1": np.kron(P.across, self.gyroscopic),
+            "K1": np.kron(P.across, self.material_damping),
         }
         matrices: dict[str, Any] = {}
         for name, block in blocks.items():
@@ -425,9 +425,8 @@ def small_model(
         raise ValueError(f"{len(places)} nodes need as many masses, numbers in kg")
     others = {*(each.node for each in rotor.supports), *(each.node for each in rotor.forces)}
     model = condense(rotor, (*places, *sorted(others.difference(places))), dict(zip(places, m, strict=True)))
-    damping, n = np.zeros_like(model.stiffness), len(places)
-    damping[:n, :n] = modal(rotor, places, m, modal_damping)
-    return replace(model, damping=damping)
+    damping = modal(rotor, places, m, modal_damping)
+    return replace(model, damping=np.pad(damping, (0, len(model.nodes) - m.size)))
 
 
 def condense(rotor: fem.Rotor, kept: tuple[int, ...], masses: Mapping[int, float]) -> SmallModel:
