@@ -132,7 +132,7 @@ def test_errors_between_runs_are_told_as_they_were_stated(cli, tmp_path):
 
 def test_weights_beyond_what_the_job_allows_are_warned_of(cli, tmp_path):
     limits = "[planes.left]\nmax_unbalance_g_mm = 400\nforbidden_deg = [[160, 175]]\n"
-    job = zoned(tmp_path, limits)
+    job = turbo_job(tmp_path, limits)
     beyond = "423 g·mm at 168.9° in plane 'left' is more than the largest weight there, 400 g·mm"
     arc = "423 g·mm at 168.9° in plane 'left' stands where the job forbids weights (forbidden_deg)"
     given = "--weights", "left=423@168.9"
