@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing.trials import Arc, Limits
-from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.base.text import listing
 from rotorid.regression import solution, stretch, unstretch
 
@@ -334,6 +334,8 @@ def _sides(
     chosen: tuple[Arc | None, ...], start: ComplexArray, T: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Rows, of length 1, with right + rows y ≥ 0: left of a sector's start and right of its end."""
+    if not any(chosen):
+        return np.zeros((0, len(T))), np.zeros(0)
     inward = [
         unit * (np.arange(len(start)) == p)
         for p, arc in enumerate(chosen)
@@ -343,6 +345,22 @@ def _sides(
     rows = stretch(normals)[::2] @ T
     length = np.linalg.norm(rows, axis=1)
     return rows / length[:, None], (normals @ start).real / length
+
+
+class _Columns(NamedTuple):
+    """A sparse matrix by columns, as much of scipy's as clarabel reads, made in a tenth of the time."""
+
+    data: FloatArray
+    indices: IntArray
+    indptr: IntArray
+    shape: tuple[int, ...]
+    has_canonical_format: bool = True
+
+
+def _columns(A: FloatArray) -> _Columns:
+    """What is not 0 of a matrix (m, n)."""
+    column, row = A.T.nonzero()
+    return _Columns(A[row, column], row, np.searchsorted(column, np.arange(A.shape[1] + 1)), A.shape)
 
 
 def _program(
@@ -356,7 +374,6 @@ def _program(
 ) -> tuple[FloatArray, float, FloatArray, float]:
     """Minimise t, or |y|²/2 where nothing rises: y, t, dual values of the heads, and the dual objective."""
     import clarabel
-    from scipy.sparse import csc_matrix
 
     m, _, n = rows.shape
     s, width = len(right), n + int(rises.any())
@@ -364,7 +381,7 @@ def _program(
     A[:s, :n] = -sides
     A[s:].reshape(m, 3, width)[:, 1:, :n] = -rows
     A[s::3, n:], q[n:] = -1.0 * rises[:, None], 1.0
-    curvature = csc_matrix(np.eye(n) if width == n else (width, width), dtype=float)
+    curvature = np.eye(width) * (width == n)
     b = np.concatenate((right, np.stack((head, centres.real, centres.imag), axis=1).ravel()))
     cones = [clarabel.NonnegativeConeT(s)] * bool(s) + [clarabel.SecondOrderConeT(3)] * m
     settings = clarabel.DefaultSettings()
@@ -372,7 +389,7 @@ def _program(
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     for refined in (False, True):  # steps of full accuracy take half as long again, and are hardly needed
         settings.iterative_refinement_enable = refined
-        solved = clarabel.DefaultSolver(curvature, q, csc_matrix(A), b, cones, settings).solve()
+        solved = clarabel.DefaultSolver(_columns(curvature), q, _columns(A), b, cones, settings).solve()
         if str(solved.status) == "Solved":
             break
     if "PrimalInfeasible" in str(solved.status):

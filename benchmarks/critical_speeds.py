@@ -56,6 +56,7 @@ def task() -> Row:
         difference=difference(fem.critical_speeds(make(), n=N), with_ross(theirs())),
         allowed=1e-6,
         required_ratio=50.0,
+        goal=120.0,
     )
 
 

@@ -79,7 +79,7 @@ def reduction() -> Row:
         peer_seconds=best_of(theirs, guyan_of_ross, 5),
         difference=relative_difference(our_guyan(ours(), kept), guyan_of_ross(theirs())),
         allowed=1e-6,
-        required_ratio=0.5,
+        required_ratio=1.0,
         goal=2.0,
     )
 

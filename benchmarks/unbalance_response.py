@@ -48,6 +48,7 @@ def task() -> Row:
         difference=relative_difference(ours(make()), with_ross(theirs())),
         allowed=1e-6,
         required_ratio=1000.0,
+        goal=1500.0,
     )
 
 

@@ -44,8 +44,8 @@ def draw_unbalance(estimate: Unbalance, ax: Axes | None = None) -> Axes:
     """
     labels, Q = estimate.labels, len(estimate.stations)
     sizes, angles = labels.weight(estimate.unbalance)
-    each = np.arange(Q)
-    alone = np.nan_to_num(estimate.covariance).reshape(Q, 2, Q, 2)[each, :, each]
+    stations = np.arange(Q)
+    alone = np.nan_to_num(estimate.covariance).reshape(Q, 2, Q, 2)[stations, :, stations]
     edges = region_edge(estimate.unbalance, alone * estimate.determined[:, None, None], 91)
     tips, edges = (on_paper(labels, each * labels.weight_scale) for each in (estimate.unbalance, edges))
     longest = np.abs(edges).max() or 1.0

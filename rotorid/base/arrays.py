@@ -50,8 +50,7 @@ def number(value: object, what: str, *, signed: bool = False) -> float:
     except (TypeError, ValueError):
         raise ValueError(f"{what} must be a number, not {value!r}") from None
     if not math.isfinite(result) or (result < 0 and not signed):
-        limit = "finite" if signed else "finite and not negative"
-        raise ValueError(f"{what} must be {limit}, not {result}")
+        raise ValueError(f"{what} must be finite{'' if signed else ' and not negative'}, not {result}")
     return result + 0.0  # no negative zero
 
 

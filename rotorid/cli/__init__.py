@@ -96,15 +96,17 @@ def application(typed: Sequence[str] = ()) -> typer.Typer:
         help=whole_paragraphs(written_help(_rotorid)),
     )
     panel_of = {name.replace("_", "-"): job for job, names in _JOBS.items() for name in names.split()}
-    one = typed[0] if typed and typed[0] in panel_of else ""
-    for name in [one] if one else panel_of:
-        command = typer_command(_work_of(name.replace("-", "_")))
-        app.command(name, cls=Command, rich_help_panel=panel_of[name])(command)
+    one, named = {*typed[:1]} & {*panel_of}, [*typed] in (["--help"], ["-h"])
+    for name in one or panel_of:
+        work = _work_of(name.replace("-", "_"))
+        made = app.command(name, cls=Command, rich_help_panel=panel_of[name], help=written_help(work))
+        made(_rotorid if named else typer_command(work))  # of all only the first lines of help are shown
     if not one:
         fleet = typer.Typer(
             no_args_is_help=True, help="Jobs of many machines as a table, and coefficients of their type."
         )
-        fleet.command("fit", cls=Command)(typer_command(_work_of("fleet_fit")))
+        fit = _work_of("fleet_fit")
+        fleet.command("fit", cls=Command, help=written_help(fit))(typer_command(fit))
         app.add_typer(fleet, name="fleet", rich_help_panel="More")
         for more in (worksheet, demo, schema):
             app.command(more.__name__, cls=Command, rich_help_panel="More", help=written_help(more))(more)

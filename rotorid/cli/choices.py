@@ -63,7 +63,7 @@ def whole_paragraphs(text: str) -> str:
 
 def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
     """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
-    command.help = whole_paragraphs(command.help or "")
+    command.help = whole_paragraphs(command.help or "").partition("Parameters ---")[0]
     for parameter in command.get_params(ctx):
         if parameter.name == "help":
             parameter.rich_help_panel = "Output"

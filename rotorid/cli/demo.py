@@ -18,8 +18,6 @@ STEPS = {
     "reduce": "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --plot {}/reduction.png",
 }
 """What is typed after `rotorid`, where {} is the folder, by the keys of the document."""
-_LINES = 6
-"""Of each answer."""
 
 
 def demo(
@@ -42,7 +40,7 @@ def demo(
     for number, (line, words) in enumerate(zip(typed, commands.values(), strict=True), start=1):
         with contextlib.redirect_stdout(io.StringIO()) as text:
             application(words)(words, prog_name="rotorid", standalone_mode=False)
-        typer.echo("\n".join([f"{number}. {line}", *text.getvalue().splitlines()[:_LINES]]))
+        typer.echo("\n".join([f"{number}. {line}", *text.getvalue().splitlines()[:6]]))
     typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")
 
 

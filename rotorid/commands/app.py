@@ -212,7 +212,6 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     parameters = [*first, *options]
     run_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run_command.__annotations__ = {one.name: one.annotation for one in parameters}
-    run_command.__doc__ = inspect.cleandoc(written_help(work)).partition("Parameters\n")[0]
     return run_command
 
 

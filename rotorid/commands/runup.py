@@ -215,7 +215,7 @@ def _modes(fit: FittedModes, steady: FittedModes | None) -> list[dict[str, Any]]
     def named(values: FloatArray) -> dict[str, Any]:
         return dict(zip(names, values, strict=True))
 
-    k, ci95 = len(fit.ends), fit.fit.estimate.ci95
+    k, ci95 = len(fit.ends), fit.fit.ci95
     return [
         {
             "mode": r + 1,

@@ -13,6 +13,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.influence import read_influence, write_influence
     from rotorid.files.job import Job, job_from_files, read_job
+    from rotorid.files.job_models import Errors
+    from rotorid.files.layout import Conventions
     from rotorid.files.measurements import read_measurements, read_record
     from rotorid.files.model import HarmonicFile, read_harmonic_model, read_ode_model
     from rotorid.files.node_tables import (
@@ -21,26 +23,31 @@ if TYPE_CHECKING:
         read_modes,
         read_unbalance,
     )
-    from rotorid.files.problems import InputError, TableWarning
+    from rotorid.files.problems import InputError, Problem, TableWarning
     from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
     from rotorid.files.runs import read_trials
     from rotorid.files.small_model import read_small_model
 
 _NAMES = {
+    "layout": "Conventions",
     "influence": "read_influence write_influence",
     "job": "Job job_from_files read_job",
+    "job_models": "Errors",
     "measurements": "read_measurements read_record",
     "model": "HarmonicFile read_harmonic_model read_ode_model",
     "node_tables": "read_bow read_compliance read_modes read_unbalance",
-    "problems": "InputError TableWarning",
+    "problems": "InputError Problem TableWarning",
     "rotor": "read_rotor rotor_files write_rotor",
     "runs": "read_trials",
     "small_model": "read_small_model",
 }
 __all__ = [
+    "Conventions",
+    "Errors",
     "HarmonicFile",
     "InputError",
     "Job",
+    "Problem",
     "TableWarning",
     "job_from_files",
     "read_bow",

@@ -87,14 +87,12 @@ def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArra
     """By scipy's "dop853" or "lsoda", and the time that it comes to in so many steps at most."""
     from scipy.integrate import DOP853, LSODA
 
-    t, theta, table = (
-        system.t,
-        np.abs(system.theta[: system.k]),
-        np.full((len(system.t), *system.first.shape), np.nan),
-    )
+    t, theta = system.t, np.abs(system.theta[: system.k])
+    table = np.full((len(t), *system.first.shape), np.nan)
     # of a sensitivity times its parameter as of the state
-    scale = np.divide(1.0, theta, where=theta > 0, out=np.ones(system.k))
-    limits = (0.01 * rtol * np.outer(first_sizes(system), [1.0, *scale])).ravel()
+    limits = (
+        0.01 * rtol * np.outer(first_sizes(system), [1.0, *1.0 / np.where(theta > 0, theta, 1.0)]).ravel()
+    )
     table[0] = system.first
     # inputs have corners at the samples: no step may cross one
     corners = range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)

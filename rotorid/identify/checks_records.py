@@ -21,9 +21,9 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
-from rotorid.identify.integrators import HEUN
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_residuals import Iterations, Problem
+from rotorid.identify.simulation import STEPWISE
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Combination, Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
@@ -66,7 +66,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
     words += [poor, cause, path.bound_warning]
-    if problem.integrator in (*HEUN, "rk4"):
+    if problem.integrator in STEPWISE:
         words.append(f"± do not count what a step of {problem.integrator} from sample to sample is off")
     if path.converged:
         estimate = combined(problem, estimate)

@@ -83,7 +83,8 @@ def exact(system: System) -> FloatArray:
     scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))
     m = n * (1 + len(moving))
     M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
-    M[:m, :m] = np.kron(np.eye(1 + len(moving)), tables[0, :, :n])
+    for low in range(0, m, n):
+        M[low : low + n, low : low + n] = tables[0, :, :n]
     parts = np.concatenate([tables[:1], tables[moving] * scale[:, None, None]]).reshape(m, -1)
     M[n:m, :n], M[:m, m : m + 1 + nu] = parts[n:, :n], parts[:, n:]
     M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
@@ -109,19 +110,24 @@ def exact(system: System) -> FloatArray:
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
-    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k), by doubling spans; P (n, m, m), or one for all."""
+    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k), by doubling spans.
+
+    P is (n, m, m), or one for all, which then multiplies all steps at once.
+    """
+    n, m, k = push.shape
     y = push.copy()
     y[0] += P[0] @ first
+    flat = np.moveaxis(y, 0, 1).reshape(m, -1)
     span = 1
-    while span < len(y):
+    while span < n:
         if len(P) > 1:
             y[span:] += P[span:] @ y[:-span]
             P = np.concatenate([P[:span], P[span:] @ P[:-span]])
         else:
-            y[span:] += np.tensordot(y[:-span], P[0], (1, 1)).swapaxes(1, 2)
+            flat[:, span * k :] += P[0] @ flat[:, : -span * k]
             P = P @ P
         span *= 2
-    return y
+    return y if len(P) > 1 else flat.reshape(m, n, k).swapaxes(0, 1)
 
 
 def heun_step(

@@ -107,13 +107,13 @@ def simulate(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
     t, u, n = given.t, inputs_of(model, given), len(model.states)
-    x, S, used, steps = np.zeros((len(t), n)), np.zeros((len(t), n, len(values))), "none", 0
+    system, used = System(model, values, t, u, sensitivities), "none"
+    table = np.zeros((len(t), n, 1 + len(values)))
     if n:
-        system = System(model, values, t, u, sensitivities)
-        table, used = _solved(system, integrator, rtol)
-        _check(model, t, table)
-        x, steps = table[..., 0], system.steps
-        S = table[..., 1:] if sensitivities else S
+        solved, used = _solved(system, integrator, rtol)
+        _check(model, t, solved)
+        table[..., : 1 + system.k] = solved
+    x, S = table[..., 0], table[..., 1:]
     outputs = model.h(t, x, values, u)
     y, y_theta = outputs[..., 0], outputs[..., 1 : 1 + n] @ S + outputs[..., 1 + n :]
     y_theta = y_theta if sensitivities else np.zeros_like(y_theta)
@@ -124,7 +124,7 @@ def simulate(
             f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
             "the output"
         )
-    return Trajectory(t, x, S, y, y_theta, used, steps)
+    return Trajectory(t, x, S, y, y_theta, used, system.steps)
 
 
 def simulated_record(
@@ -158,14 +158,11 @@ def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, s
 
 
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
-    """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the time and the state."""
-    lost = np.logical_not(np.abs(table[..., 0]) < LARGEST)
-    unsure = np.logical_not(np.isfinite(table).all(axis=-1))
-    for i in np.flatnonzero((lost | unsure).any(axis=1))[:1]:
-        j = int(np.argmax(lost[i] if lost[i].any() else unsure[i]))
-        sure = f"{table[i, j, 0]:.3g}"
-        value = sure if lost[i].any() else "not finite in its sensitivity to the parameters"
+    """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the first time."""
+    largest = np.append(LARGEST, np.full(table.shape[2] - 1, np.inf))
+    lost = np.logical_not(np.abs(table) < largest)
+    for i, k, j in np.argwhere(lost.swapaxes(1, 2))[:1].tolist():
+        value = f"state {model.states[j]}{' or its sensitivity' * (k > 0)} is {table[i, j, k]:.3g}"
         raise SimulationError(
-            f"the solution diverges: at t = {t[i]:.6g} the state {model.states[j]} is {value}; choose other "
-            "parameters or bounds"
+            f"the solution diverges: at t = {t[i]:.6g} the {value}; choose other parameters or bounds"
         )

