@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from exact_solutions import SOLVERS
 
 import fem
 from rotorid.reduction import equivalent_masses, natural_frequencies
@@ -64,18 +63,3 @@ def test_whirl_on_damped_supports_and_seals(cross, turning):
     modes = fem.whirl_modes(rotor, SPEED, 2)
     found = modes.eigenvalues[np.argsort(modes.direction)]
     np.testing.assert_allclose(found, [backward.conjugate(), forward], rtol=1e-8)
-
-
-@pytest.mark.parametrize("method", SOLVERS)
-def test_unbalance_response_on_unequal_damped_supports(method):
-    """The backward part of the motion deforms the turning shaft at twice the speed."""
-    kx, ky, cx, cy = 1e6, 3e6, 800.0, 300.0
-    s, turn = 1j * SPEED, np.array([[0, 1], [-1, 0]])
-    own = BENDING * ((1 + BETA * s) * np.eye(2) + BETA * SPEED * turn)
-    support = 2 * np.diag([kx + s * cx, ky + s * cy])
-    total = np.linalg.inv(np.linalg.inv(own) + np.linalg.inv(support))
-    exact = np.linalg.solve(total + MASS * s * s * np.eye(2), SPEED**2 * np.array([1, -1j]))
-    rotor = disc_on_supports(((kx, 0), (0, ky)), ((cx, 0), (0, cy)))
-    response = SOLVERS[method](fem.unbalance_response, rotor, {2: 1.0}, np.array([SPEED]))
-    found = [response.readings([(2, angle)])[0, 0] for angle in (0.0, 90.0)]
-    np.testing.assert_allclose(found, exact, rtol=1e-8)

@@ -40,9 +40,6 @@ def test_it_is_the_critical_speeds_at_each_stiffness():
     rotor = dataclasses.replace(machine(), supports=[fem.Support(s.node, 1e8) for s in machine().supports])
     found = fem.speed_map(rotor, [1e7, 1e8, 1e9], n=3)
     np.testing.assert_allclose(found.speeds[1], fem.critical_speeds(rotor, 3).frequencies, rtol=1e-12)
-    omega = found.speeds[1, 1]
-    modes = fem.whirl_modes(rotor, omega, 6)
-    assert np.abs(modes.frequencies[modes.direction > 0] - omega).min() < 1e-7 * omega
 
 
 @each_of(

@@ -1,34 +1,18 @@
 """Thresholds and ranges of instability, against closed forms and dense matrices of drawn rotors."""
 
 import dataclasses
-import math
 
 import dense_rotor
 import numpy as np
 import pytest
 from exact_solutions import whirl_exactly
 from fem_rotors import rotor23
+from jeffcott import CRITICAL, STIFFNESS, jeffcott
 from repetitions import FULL
 from whirl_rotors import machine
 
 import fem
 from fem.stability import judge, within
-
-MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
-STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3
-CRITICAL = math.sqrt(STIFFNESS / MASS)
-
-
-def jeffcott(*supports, bearing=1e13, material=0.0):
-    """A disc in the middle of a massless shaft."""
-    return fem.Rotor(
-        [SHAFT / 2, SHAFT / 2],
-        DIAMETER,
-        density=0.0,
-        discs=[fem.Disc(2, MASS)],
-        supports=[fem.Support(1, bearing), fem.Support(3, bearing), *supports],
-        material_damping=material,
-    )
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 5.0])
@@ -93,6 +77,8 @@ def test_stable_and_unstable_from_the_start():
     ("highest", "options", "message"),
     [
         (10.0, {"lowest": 20.0}, "range of speeds is empty"),
+        (10.0, {"steps": 0}, "at least one step"),
+        (10.0, {"steps": 2.5}, "at least one step"),
         (10.0, {"lowest": -5.0}, "not negative"),
         (150.0, {}, "support 'seal' at node 2: its table holds 100 to 200"),
     ],

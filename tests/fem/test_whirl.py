@@ -65,25 +65,6 @@ def test_rigid_disc_on_a_light_overhang():
     np.testing.assert_allclose(np.sort(signed), np.sort(roots.real), rtol=1e-7)
 
 
-def test_rigid_rotor_on_two_bearings():
-    """Translation and tilting of a rigid symmetric rotor: tilting feels the gyroscopic moment."""
-    L, k, m, Ip, Id, speed = 1.0, 2e5, 30.0, 1.2, 0.8, 600.0
-    rotor = fem.Rotor(
-        [L / 2, L / 2],
-        0.5,
-        density=1e-9,
-        discs=[fem.Disc(2, m, Ip, Id)],
-        supports=[fem.Support(1, k), fem.Support(3, k)],
-        model=FULL,
-    )
-    tilt = k * L**2 / 2
-    roots = np.roots([Id, -Ip * speed, -tilt])
-    expected = np.sort([*roots, math.sqrt(2 * k / m), -math.sqrt(2 * k / m)])
-    found = fem.whirl_modes(rotor, speed, 4)
-    np.testing.assert_allclose(np.sort(found.frequencies * found.direction), expected, rtol=1e-4)
-    assert np.abs(found.log_decrements).max() < 1e-6
-
-
 def test_directions_of_a_symmetric_rotor():
     rotor = dataclasses.replace(
         machine(), supports=[fem.Support(s.node, 1e8, 1e4) for s in machine().supports]
@@ -93,14 +74,6 @@ def test_directions_of_a_symmetric_rotor():
     # Circles: y lags x by a quarter turn forward, leads it backward.
     np.testing.assert_allclose(found.y, -1j * found.direction * found.x, atol=1e-12)
     assert found.to_dict()["direction"][:2] == ["backward", "forward"]
-
-
-def test_at_rest_without_damping_frequencies_are_the_critical_speeds():
-    rotor = rotor23()
-    found = fem.whirl_modes(rotor, 0.0, 6)
-    np.testing.assert_allclose(found.frequencies[::2], fem.critical_speeds(rotor).frequencies, rtol=1e-9)
-    np.testing.assert_allclose(found.frequencies[1::2], found.frequencies[::2], rtol=1e-12)
-    assert np.abs(found.log_decrements).max() < 1e-9
 
 
 def test_a_free_rotor():

@@ -36,7 +36,7 @@ class Answer:
     broken: str = ""
 
 
-def answer(words, *, seconds=SECONDS, check=True):
+def answer(words, *, seconds=SECONDS):
     """Run `rotorid WORDS --json`; never raises."""
     out, err = io.StringIO(), io.StringIO()
     previous_words, sys.argv = sys.argv, ["rotorid", *words, "--json"]
@@ -63,7 +63,7 @@ def answer(words, *, seconds=SECONDS, check=True):
         signal.signal(signal.SIGPROF, previous)
         sys.argv = previous_words
     if broken or status:
-        if check and not broken and (status not in (1, 2) or not err.getvalue().startswith("rotorid: ")):
+        if not broken and (status not in (1, 2) or not err.getvalue().startswith("rotorid: ")):
             broken = f"exit status {status}: {err.getvalue()[:200]!r}"
         return Answer(status, None, err.getvalue(), broken)
     try:

@@ -30,11 +30,10 @@ MOST_TRIES = 20
 
 
 class Window:
-    """One window; a person needs `stroke` seconds for a key and `field` for the next field."""
+    """One window."""
 
-    def __init__(self, browser, stroke=0.0, field=0.0):
+    def __init__(self, browser):
         self.browser, self.driver = browser, browser.driver
-        self.stroke, self.field = stroke, field
 
     def open(self, address):
         """The page, as soon as it shows the job."""
@@ -43,14 +42,14 @@ class Window:
         self.wait(lambda: self.text("#job") != "rotorid worksheet", "the job is shown")
         return visit
 
-    def wait(self, met, what, seconds=30.0):
+    def wait(self, met, what):
         """Until something is met; what it returned."""
-        until = time.monotonic() + seconds
+        until = time.monotonic() + 30
         while time.monotonic() < until:
             if found := met():
                 return found
             time.sleep(0.02)
-        raise AssertionError(f"not within {seconds:g} s: {what}; the page shows:\n{self.browser.text()}")
+        raise AssertionError(f"not within 30 s: {what}; the page shows:\n{self.browser.text()}")
 
     def actions(self):
         """Keys to come."""
@@ -62,18 +61,16 @@ class Window:
         """Keys, one after the other."""
         actions = self.actions()
         for key in keys:
-            actions.send_keys(key).pause(self.stroke)
+            actions.send_keys(key)
         actions.perform()
 
     def hold(self, modifier, key):
         """A key together with a modifier."""
         self.actions().key_down(modifier).send_keys(key).key_up(modifier).perform()
-        time.sleep(self.stroke)
 
     def go(self, selector):
         """Move the focus there by Tab."""
         self.wait(lambda: self.texts(selector), f"there is a {selector}")
-        time.sleep(self.field)
         for _ in range(MOST_TRIES):
             if not (tabs := self.driver.execute_script(_TABS, selector)):
                 return
@@ -81,7 +78,7 @@ class Window:
             if tabs < 0:
                 actions.key_down(SHIFT)
             for _ in range(abs(tabs)):
-                actions.send_keys(TAB).pause(self.stroke)
+                actions.send_keys(TAB)
             actions.perform()
             actions.reset_actions()  # lets go of the keys
         raise AssertionError(f"{selector} cannot be reached by Tab")
@@ -100,7 +97,6 @@ class Window:
     def next(self, text):
         """Type into the field after this one."""
         self.leave()
-        time.sleep(self.field)
         self.press(*text)
 
     def push(self, selector, key=ENTER):
