@@ -30,11 +30,10 @@ MOST_TRIES = 20
 
 
 class Window:
-    """One window; a person needs `stroke` seconds for a key and `field` for the next field."""
+    """One window."""
 
-    def __init__(self, browser, stroke=0.0, field=0.0):
+    def __init__(self, browser):
         self.browser, self.driver = browser, browser.driver
-        self.stroke, self.field = stroke, field
 
     def open(self, address):
         """The page, as soon as it shows the job."""
@@ -60,29 +59,22 @@ class Window:
 
     def press(self, *keys):
         """Keys, one after the other."""
-        actions = self.actions()
-        for key in keys:
-            actions.send_keys(key).pause(self.stroke)
-        actions.perform()
+        self.actions().send_keys(*keys).perform()
 
     def hold(self, modifier, key):
         """A key together with a modifier."""
         self.actions().key_down(modifier).send_keys(key).key_up(modifier).perform()
-        time.sleep(self.stroke)
 
     def go(self, selector):
         """Move the focus there by Tab."""
         self.wait(lambda: self.texts(selector), f"there is a {selector}")
-        time.sleep(self.field)
         for _ in range(MOST_TRIES):
             if not (tabs := self.driver.execute_script(_TABS, selector)):
                 return
             actions = self.actions()
             if tabs < 0:
                 actions.key_down(SHIFT)
-            for _ in range(abs(tabs)):
-                actions.send_keys(TAB).pause(self.stroke)
-            actions.perform()
+            actions.send_keys(TAB * abs(tabs)).perform()
             actions.reset_actions()  # lets go of the keys
         raise AssertionError(f"{selector} cannot be reached by Tab")
 
@@ -100,7 +92,6 @@ class Window:
     def next(self, text):
         """Type into the field after this one."""
         self.leave()
-        time.sleep(self.field)
         self.press(*text)
 
     def push(self, selector, key=ENTER):
