@@ -57,7 +57,7 @@ def worksheet(
 
             webbrowser.open(address)
 
-    serve(job, 0, opened)
+    serve(job, opened)
 
 
 def schema(

@@ -12,8 +12,7 @@ import hmac
 import json
 import multiprocessing
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import BrokenExecutor, Executor
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,6 @@ from rotorid.base.worker_processes import worker_pool
 from rotorid.worksheet.calculation import Results, answered, drawn, trial, whole_job
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.job_text import Conflict
-from rotorid.worksheet.page import page
 
 TOKEN = "X-Rotorid-Token"
 PAGE = {"/": "text/html", "/worksheet.js": "text/javascript", "/worksheet.css": "text/css"}
@@ -109,7 +107,7 @@ class Worksheet:
             case "/state":
                 return JSONResponse(await self._state(int(given.get("after", 0))))
             case "/trial":
-                return HTMLResponse(await self._ask(trial, self._files.job.name, {**given}))
+                return JSONResponse(await self._ask(trial, self._files.job.name, {**given}))
             case "/picture" | "/sheet" if asked:
                 return HTMLResponse(await self._ask(drawn, path[1:], *asked))
             case "/edit":
@@ -122,7 +120,7 @@ class Worksheet:
         return JSONResponse({})
 
     async def _state(self, after: int) -> dict[str, Any]:
-        """The page, as soon as it is newer than the version that a window has, or after a second."""
+        """What a window shows, as soon as it is newer than the version that it has, or after a second."""
         for _ in range(LOOKS):
             names = self._files.look()
             if names or not self._version:
@@ -131,8 +129,9 @@ class Worksheet:
                 break
             await asyncio.sleep(LOOK)
         busy = "" if self._computing is None or self._computing.done() else "computing"
-        html = page(self._files, self._results, self._notice, busy)
-        return {"version": self._version, "html": html}
+        job = self._files.job
+        now = {"name": f"{job.parent.name} / {job.name}", "notice": self._notice, "busy": busy}
+        return {**self._files.now.state(), **self._results, **now, "version": self._version}
 
     def _changed(self, names: Iterable[str] = ()) -> None:
         """Compute files anew, of which other programs changed some; what is being computed is given up."""
@@ -150,6 +149,8 @@ class Worksheet:
                 seen = await self._ask(whole_job, self._files.job.name, self._version)
             except ValueError as error:
                 seen = {"refused": str(error)}
+        for one in seen.get("problems", ()):
+            one["at"] = f"{self._files.job.parent / one['file']} {one['row']}"
         self._results = seen
         self._version += 1
 
@@ -166,7 +167,7 @@ class Worksheet:
                 if not (await asyncio.wait({asked}, timeout=GRACE))[0]:
                     self.stop()
                 raise
-            if isinstance(asked.exception(), BrokenProcessPool):
+            if isinstance(asked.exception(), BrokenExecutor):
                 self.stop()
                 raise ValueError("the calculation ended unexpectedly: try again")
         answer = asked.result()

@@ -10,7 +10,6 @@ import functools
 import os
 import warnings
 from collections.abc import Callable, Mapping
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,28 +104,28 @@ def _without_check(path: Path) -> Job:
 
 
 def balanced(job: str, version: int, checked: bool) -> dict[str, Any]:
-    """The answer: what to do, its tables as HTML, what there is to mount."""
+    """The answer: what to do, its tables as HTML, remarks, what there is to mount."""
     from rotorid.report.balance import to_do
+    from rotorid.report.page import block
 
     made, read, warned = _balance(job, version, checked)
     answer, document, labels = made.answer, made.document, read.trials.labels
     if not checked:
         warned = ["the check run is not finished: the answer is that of the runs before it", *warned]
-    shown = {
-        "judgement": answer.judgement,
-        "warnings": [*warned, *answer.warnings],
-        "notes": answer.notes,
-    }
+    remarks = [("Warning:", text) for text in (*warned, *answer.warnings)]
+    remarks += [("Note:", text) for text in answer.notes]
+    shown = {"judgement": answer.judgement, "remarks": remarks}
     if read.trials.special or read.trials.amplitudes_only:  # the columns of these are others
-        return {**shown, "numbers": answer.numbers}
+        return {**shown, "tables": [block(answer.numbers)]}
     trim = "left_to_do" in document
     refer = "" if trim else f"For {document['corrections_refer_to']}. "
+    if not trim and made.result.parts is not None:
+        remarks.append(("In parts,", f"{labels.weight_in}: {made.result.parts.in_words()}."))
+    remarks.append(("", f"{refer}Angles count {labels.angles}, phase {labels.phase}."))
     return {
         **shown,
         "tables": [*to_do(document, made.result, read, boxes=False).values()],
         "unit": labels.weight_in,
-        "parts": [] if trim else document["parts"],
-        "conventions": f"{refer}Angles count {labels.angles}, phase {labels.phase}.",
         "to_mount": document["mounting"]["holes"] if "mounting" in document else document["corrections"],
     }
 
@@ -139,8 +138,8 @@ def drawn(what: str, *asked: Any) -> str:  # noqa: ANN401
     return made.sheet().decode() if what == "sheet" else str(inline_svg(made.figure(), made.answer.judgement))
 
 
-def trial(job: str, fields: Mapping[str, str]) -> str:
-    """A first trial weight, from the load alone or `with_job` with the job's coefficients, in HTML."""
+def trial(job: str, fields: Mapping[str, str]) -> list[str]:
+    """A first trial weight, from the load alone or `with_job` with the job's coefficients, as paragraphs."""
     from rotorid.commands.trial_weight import TrialWeightOptions, trial_weight
 
     options: dict[str, Any] = {}
@@ -151,5 +150,4 @@ def trial(job: str, fields: Mapping[str, str]) -> str:
             options[key] = float(number) if unit == "deg" else f"{number}{unit}"
     made = trial_weight(Path(job) if "with_job" in fields else None, TrialWeightOptions(**options))
     answer = made.answer
-    lines = [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]
-    return "".join(f"<p>{escape(line)}</p>" for line in lines if line)
+    return [answer.judgement, answer.numbers, *answer.warnings, *answer.notes]

@@ -25,9 +25,6 @@ KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""
 NUMBER = re.compile(r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 
-_LISTS = ("available", "stock", "holes_")
-"""Settings that are lists, however few values they have."""
-
 
 class Conflict(ValueError):
     """What an edit changes is not what it was."""
@@ -89,6 +86,16 @@ class Table:
         above = [*(line for line in self.lines if line.id == "header"), *rows, *same][-1]
         self.lines.insert(self.lines.index(above) + 1, made)
         self.write(made, cells)
+
+    def state(self, key: str) -> dict[str, Any]:
+        """What the page shows, by what columns hold; of a row its `id`, too, and where it is `at`."""
+        columns = self.columns()
+        rows = [
+            {what: line.cells[name] for what, name in columns.items()}
+            | {"id": f"{key}|{line.id}", "at": f"{self.path} {line.number}"}
+            for line in self.rows()
+        ]
+        return {"columns": columns, "rows": rows, "header": [*self.header], "read_only": self.read_only}
 
     def data(self) -> bytes:
         """The whole file."""
@@ -164,13 +171,20 @@ def text_of(value: object) -> str:
     return "" if value is None else str(value).removesuffix(".0")
 
 
+def _texts(settings: object) -> list[Any]:
+    """Settings, each with its name, its text, and the settings in it."""
+    if not isinstance(settings, Mapping):
+        return []
+    return [[name, text_of(value), _texts(value)] for name, value in settings.items()]
+
+
 def value_of(key: str, text: str) -> Any:  # noqa: ANN401  any type of TOML
     """The setting that was typed; None for nothing."""
     parts = [part.strip() for part in text.split(";") if part.strip()]
     if ":" in text:
         return {name.strip(): _one(value.strip()) for name, _, value in (one.partition(":") for one in parts)}
     values = [*map(_one, parts)]
-    if len(values) > 1 or (values and key.startswith(_LISTS)):
+    if len(values) > 1 or (values and key.startswith(("available", "stock", "holes_"))):  # these are lists
         return values
     return values[0] if values else None
 
@@ -202,12 +216,10 @@ class Job:
     tables: dict[str, Table] = field(default_factory=dict)  # by `KEYS`
     read_only: str = ""  # why nothing can be edited
 
-    def setting(self, key: Sequence[str]) -> Any:  # noqa: ANN401  any type of TOML
-        """The value of a nested key, None without one."""
-        inner: Any = self.settings
-        for part in key:
-            inner = inner.get(part) if isinstance(inner, dict) else None
-        return inner
+    def state(self) -> dict[str, Any]:
+        """What the page shows; of settings the texts, in the order of the file."""
+        tables = {key: table.state(key) for key, table in self.tables.items()}
+        return {"settings": _texts(self.settings), "tables": tables, "read_only": self.read_only}
 
     def _set(self, key: Sequence[str], new: Any) -> None:  # noqa: ANN401
         """Change a setting, add it, or (None) remove it; comments and order of the file stay."""
@@ -234,7 +246,10 @@ class Job:
         row, _, column = place.rpartition("|")
         if name not in KEYS:
             key = [part for part in (name, row, column) if part]
-            if _is_new(text_of(self.setting(key)), edit, ".".join(key)):
+            now: Any = self.settings
+            for part in key:
+                now = now.get(part) if isinstance(now, dict) else None
+            if _is_new(text_of(now), edit, ".".join(key)):
                 self._set(key, value_of(key[-1], edit["new"]))
             return
         table = self.tables[name]

@@ -17,11 +17,11 @@ FIRST_PORT, PORTS = 49152, 16384
 """Ports that nobody else has claimed: each job has one of its own, where it is free."""
 
 
-def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
+def serve(job: Path, show: Callable[[str], object]) -> None:
     """Serve the page of a job, or of a folder for one, until it is interrupted.
 
-    The port is one of 127.0.0.1; 0: that of the job, or any that is free. `show` gets the address. ValueError
-    for what is no job, where the port is taken, and without the extra `rotorid[worksheet]`.
+    The port of 127.0.0.1 is that of the job, or any where that is taken. `show` gets the address. ValueError
+    for what is no job, and without the extra `rotorid[worksheet]`.
     """
     try:
         import tomlkit  # noqa: F401
@@ -45,10 +45,8 @@ def serve(job: Path, port: int, show: Callable[[str], object]) -> None:
         if os.name == "posix":  # elsewhere it would let two programs have one port
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((HOST, port or usual))
-        except OSError as error:
-            if port:
-                raise ValueError(f"port {port} of {HOST} cannot be used: {error.strerror}") from error
+            listening.bind((HOST, usual))
+        except OSError:
             listening.bind((HOST, 0))
         listening.listen()
         address = f"{HOST}:{listening.getsockname()[1]}"

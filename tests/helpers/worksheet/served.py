@@ -36,34 +36,26 @@ def command(job, *options):
 class Served:
     """A running `rotorid worksheet`; `port` and `token` are those of its address, `job` is what it serves."""
 
-    def __init__(self, job, *options):
+    def __init__(self, job):
         self.job = job
-        command = [sys.executable, "-m", "rotorid", "worksheet", str(job), *options]
-        self.begun = time.perf_counter()
+        command = [sys.executable, "-m", "rotorid", "worksheet", str(job)]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         line = self.process.stdout.readline()
         found = re.search(r"http://127\.0\.0\.1:(\d+)/#(\S+)", line)
         if found is None:
             raise RuntimeError(line + self.process.stderr.read())
-        self.ready = time.perf_counter()
         self.address, self.port, self.token = found.group(), int(found.group(1)), found.group(2)
 
     def ask(self, path, body=None, **headers):
         """Status and content of a request; headers in place of the usual ones, None: without."""
-        usual = {
-            "X-Rotorid-Token": self.token,
-            "Host": f"127.0.0.1:{self.port}",
-            "Content-Type": "application/json",
-        }
-        sent = {
-            k: v for k, v in {**usual, **{k.replace("_", "-"): v for k, v in headers.items()}}.items() if v
-        }
+        usual = {"X_Rotorid_Token": self.token, "Host": f"127.0.0.1:{self.port}"}
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         with contextlib.closing(connection):
             connection.putrequest("POST" if body is not None else "GET", path, skip_host=True)
             data = b"" if body is None else json.dumps(body).encode()
-            for name, value in {**sent, "Content-Length": str(len(data))}.items():
-                connection.putheader(name, value)
+            for name, value in {**usual, "Content_Length": str(len(data)), **headers}.items():
+                if value is not None:
+                    connection.putheader(name.replace("_", "-"), value)
             connection.endheaders(data)
             answer = connection.getresponse()
             content = answer.read().decode()
@@ -71,16 +63,19 @@ class Served:
         return answer.status, json.loads(content) if kind.startswith("application/json") else content
 
     def state(self, after=0):
-        """What a window shows: its `html`, and of that the texts of `cells`, `numbers`, `words`."""
+        """What a window gets to show; of that the texts of `cells`, `numbers`, `words`."""
         status, state = self.ask(f"/state?after={after}")
         assert status == 200, state
-        page = html.unescape(state["html"])
-        state["busy"] = re.search('id="busy" role="status">([^<]*)<', page).group(1)
-        state["notice"] = "".join(re.findall('id="notice" role="status"><p>([^<]*)<', page))
-        cells = re.findall('<input id="([^"]*)" value="([^"]*)" class="cell"', state["html"])
-        state["cells"] = {html.unescape(name): html.unescape(text) for name, text in cells}
-        state["numbers"] = dict(re.findall(r'data-key="([^"]*)"[^>]*>([^<]*)<', page))
-        state["words"] = " ".join(re.sub("<[^>]*>", " ", page).split())
+        state["cells"] = {
+            f"{row['id']}|{name}": row[what]
+            for table in state["tables"].values()
+            for row in table["rows"]
+            for what, name in table["columns"].items()
+        }
+        answered = [state.get(key) for key in ("read_only", "answer", "problems", "refused")]
+        text = html.unescape(json.dumps(answered, ensure_ascii=False))
+        state["numbers"] = dict(re.findall(r'data-key=."(.*?)."[^>]*>([^<]*)<', text))
+        state["words"] = " ".join(re.sub("<[^>]*>", " ", text).split())
         return state
 
     def settled(self):
@@ -156,7 +151,7 @@ class SharedJobs:
 
 def _shown(state):
     """What the files of a job say in its state."""
-    return state["cells"], 'id="phase lead" aria-pressed="true"' in state["html"]
+    return state["cells"], state["settings"]
 
 
 def _put_back(folder, sample):

@@ -59,10 +59,7 @@ class Window:
 
     def press(self, *keys):
         """Keys, one after the other."""
-        actions = self.actions()
-        for key in keys:
-            actions.send_keys(key)
-        actions.perform()
+        self.actions().send_keys(*keys).perform()
 
     def hold(self, modifier, key):
         """A key together with a modifier."""
@@ -77,9 +74,7 @@ class Window:
             actions = self.actions()
             if tabs < 0:
                 actions.key_down(SHIFT)
-            for _ in range(abs(tabs)):
-                actions.send_keys(TAB)
-            actions.perform()
+            actions.send_keys(TAB * abs(tabs)).perform()
             actions.reset_actions()  # lets go of the keys
         raise AssertionError(f"{selector} cannot be reached by Tab")
 

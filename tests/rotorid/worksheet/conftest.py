@@ -15,8 +15,8 @@ def serve():
     needed()
     running = []
 
-    def start(job, *options):
-        running.append(Served(job, *options))
+    def start(job):
+        running.append(Served(job))
         return running[-1]
 
     yield start

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from repetitions import FULL
+from workbook_jobs import as_workbook
 from worksheet.served import command
 from worksheet.typed_job import rows, type_job
 from worksheet.window import SPACE, Window
@@ -21,7 +22,8 @@ EXAMINED = {"new": [*SIZES], "holes.toml": [1366], "checked.toml": [800]}
 """Widths at which axe looks at a page, three seconds at a large one; `make test-full`: at all of them."""
 if FULL:
     EXAMINED = {job: [*SIZES] for job in EXAMINED}
-FIRST = '[id="runs|baseline|1220|probe 1|1|phase_deg"]'
+CELL = "runs|baseline|1220|probe 1|1|phase_deg"
+FIRST = f'[id="{CELL}"]'
 
 # Of what a finger should hit, the smaller side of it or of its label; what is out of sight is left out.
 _TARGETS = """
@@ -133,6 +135,40 @@ def test_fields_of_a_trial_weight_are_kept(shared, windows):
     window.leave()
     window.open(served.address)
     assert window.text('#trial [name="load kg"]') == "50"
+
+
+@pytest.mark.full
+def test_a_problem_stands_in_words_and_leads_to_its_cell(shared, windows):
+    window = windows[0]
+    window.open(shared().address)
+    window.type(FIRST, "915")
+    window.leave()
+    words = "1 × phase of baseline: '915' stands here; expected"
+    window.wait(lambda: words in "".join(window.texts("#problems li")), "the problem is told")
+    window.push("#problems button")
+    assert window.texts("[aria-invalid][aria-label*='915']:focus") == ["915"]
+
+
+@pytest.mark.full
+def test_two_who_type_into_one_cell_are_asked(shared, windows):
+    window, served = windows[0], shared()
+    window.open(served.address)
+    window.type(FIRST, "12")
+    assert served.type(CELL, "77")[0] == 200
+    window.leave()
+    window.wait(lambda: window.texts("#conflicts p"), "the question")
+    assert "wrote “77” here; you typed “12”" in window.text("#conflicts p")
+    window.push("#conflicts [data-mine]")
+    window.wait(lambda: not window.texts("#conflicts p"), "it is answered")
+    assert served.state()["cells"][CELL] == "12"
+
+
+@pytest.mark.full
+def test_a_workbook_cannot_be_typed_into(tmp_path, serve, windows):
+    windows[0].open(
+        serve(as_workbook(sample_data() / "turbo_job" / "job.toml", tmp_path / "job.xlsx")).address
+    )
+    assert len(windows[0].texts("input.cell:disabled")) == len(windows[0].texts("input.cell")) > 100
 
 
 @pytest.mark.full

@@ -80,8 +80,7 @@ def test_who_has_no_token_or_comes_from_elsewhere_is_refused(shared):
         ("/edit", {"edits": [{"cell": "runs|no such|run", "old": "", "new": "x"}]}),
         ("/edit", {"edits": [{"table": "nothing", "cells": {}}]}),
         ("/edit", {}),
-        ("/do", {"do": "no such"}),
-        ("/do", {"do": "check_run", "of": "another answer"}),
+        ("/no_such", {}),
         ("/edit", {"edits": [{"create": "no such", "header": ["run"]}]}),
         ("/trial", {"no_such": "1"}),
         ("/edit", "[" * 100_000),
@@ -133,9 +132,9 @@ def test_a_trial_weight_with_and_without_the_coefficients(shared):
     status, text = served.ask(
         "/trial", {"load kg": "25,5", "speed rpm": "3000", "radius mm": "100", "lag": ""}
     )
-    assert (status, "2.534 g" in text) == (200, True)
+    assert (status, "2.534 g" in " ".join(text)) == (200, True)
     status, text = served.ask("/trial", {"with_job": "on"})
-    assert (status, text[:3]) == (200, "<p>")
+    assert (status, len(text) > 1) == (200, True)
 
 
 def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
@@ -143,11 +142,12 @@ def test_a_problem_has_its_cell_and_names_the_file_alone(shared):
     served.settled()
     assert served.type(CELL, "915")[0] == 200
     state = served.settled()
-    assert "1 × phase of baseline: '915' stands here; expected" in state["words"]
-    assert (f'data-go="{CELL}"' in state["html"], state["numbers"]) == (True, {})
+    [problem], row = state["problems"], state["tables"]["runs"]["rows"][0]
+    assert (problem["at"], problem["column"], problem["value"]) == (row["at"], "phase_deg", "915")
+    assert (f"{row['id']}|phase_deg", state["numbers"]) == (CELL, {})
     assert served.ask("/picture")[0] == 400
     assert served.type(CELL, "")[0] == 200
-    assert "1 × phase of baseline: still missing" in served.settled()["words"]
+    assert [one["value"] for one in served.settled()["problems"]] == [""]
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path):
@@ -168,8 +168,8 @@ def test_while_a_check_run_is_typed_the_answer_before_it_stays(shared, name):
     assert served.edit(*edits)[0] == 200
     now = served.settled()
     assert now["numbers"] == before["numbers"] != {}
-    assert "Warning: the check run is not finished" in now["words"]
-    assert "1 × amplitude of check: still missing" in now["words"]
+    assert "the check run is not finished" in now["words"]
+    assert [one["column"] for one in now["problems"]] == header[3:4]
     assert served.ask("/picture")[1].startswith("<svg")
     assert ("2 × 150" in served.ask("/sheet")[1]) == (name == "holes.toml")
 
@@ -192,7 +192,7 @@ def test_a_workbook_is_answered_and_not_edited(tmp_path, serve):
     state = served.settled()
     assert state["numbers"]
     assert "edit job.xlsx in Excel: what is saved there appears here" in state["words"]
-    assert state["html"].count(" disabled") == len(state["cells"])
+    assert state["read_only"]
     status, answer = served.edit({"cell": "phase", "old": "lead", "new": "lag"})
     assert (status, "edit job.xlsx in Excel" in answer["error"]) == (400, True)
 
@@ -263,4 +263,4 @@ def test_a_rotor_file_names_nothing_outside_and_its_tables_are_watched(tmp_path,
     (folder / "shaft.csv").write_text("".join(lines[:-1]))
     now = served.noticed(state["version"])
     assert now["notice"] == "shaft.csv was changed by another program"
-    assert now["words"].partition("Answer")[2] != state["words"].partition("Answer")[2]
+    assert now["words"] != state["words"]
