@@ -25,7 +25,6 @@ from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
     Influence,
     Remarks,
-    change_of_run,
     estimate_influence,
     local_runs,
     match_speeds,
@@ -98,7 +97,6 @@ __all__ = [
     "Zones",
     "after_check_run",
     "balance_without_phase",
-    "change_of_run",
     "check_runs",
     "combine",
     "compare_check",

@@ -9,29 +9,31 @@ they are.
 Each reading (a sensor at a speed) is fitted for itself: χ² = Σ ((|y + Σ w d_r| − a_r)/σ_r)² from many starts,
 and has one or several minima. One of each is chosen, and the weights D that leave least of all, Σ |y + w D|²,
 are one solution of the job. Where one weight may leave nothing anywhere, choices in which it does not are
-dropped. What is uncertain is drawn: amplitudes with their errors are fitted again from each minimum.
+dropped, and the weight is the one at which the least misfit of all readings, each in its own scale, is
+smallest: its 95 % region are the weights whose misfit errors explain. In all other cases regions are those of
+draws by the curvature of χ² at the minima.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from balancing.conditioning import chance
-from balancing.regions import LEVEL, real_parts
+from balancing.regions import real_parts
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 UNLIKE = 1e-4
 """Chance below which no single weight leaves nothing at every reading."""
-_DRAWS, _MOST = 1000, 32
-"""Draws of a minimum; choices."""
-_WALK, _OPEN, _SMALL, _TINY = 60, 3.0, 0.1, 1e-300
-"""Steps of a draw. Of the largest amplitude: deviation of what is open; what is smaller is of this scale."""
+_DRAWS, _MOST, _PLACES = 1000, 32, 8000
+"""Draws of a minimum; choices; places of a weight."""
+_OPEN, _TINY = 3.0, 1e-300
+"""Deviation of what is open, of the largest amplitude."""
 _FURTHER = 2.0
-"""A region is looked for so many times as far away as weights are drawn."""
+"""Logarithm of sizes, and angle, how far away from a weight its region is looked for."""
 _STARTS = {
     p: np.outer(np.geomspace(least, most, sizes), np.exp(2j * np.pi * np.arange(ways) / ways)).ravel()
     for p, least, most, sizes, ways in ((1, 0.1, 10.0, 9, 16), (2, 0.3, 3.0, 3, 8))
@@ -86,35 +88,17 @@ class Fit:
                 kept.append(k)
         self.parameters, self.chi_square = x[kept], chi_square[kept]
 
-    def minima(self, rng: np.random.Generator, within: float, dof: float) -> list[Minimum]:
-        """Those so much above the best at most, with draws by random walks (Metropolis) from each.
-
-        `dof`: degrees of freedom of errors that were estimated.
-        """
+    def minima(self, rng: np.random.Generator, within: float) -> list[Minimum]:
+        """Those so much above the best at most, with draws of each by the curvature of χ² there."""
         n, out = self.parameters.shape[1], list[Minimum]()
         for x, chi_square in zip(self.parameters, self.chi_square, strict=True):
             if chi_square > self.chi_square[0] + within:
                 break
             J = self._residuals(x[None])[1][0]
-            root = 2.4 * np.linalg.cholesky(np.linalg.inv(J.T @ J + np.eye(n) / _OPEN**2) / n)
-            draws = np.repeat(x[None], _DRAWS, axis=0)
-            probability = self._log_probability(draws, dof)
-            for _ in range(_WALK):
-                moved = draws + rng.standard_normal(draws.shape) @ root.T
-                there = self._log_probability(moved, dof)
-                taken = there - probability > np.log(rng.random(_DRAWS))
-                draws = np.where(taken[:, None], moved, draws)
-                probability = np.where(taken, there, probability)
+            root = np.linalg.cholesky(np.linalg.inv(J.T @ J + np.eye(n) / _OPEN**2))
+            draws = x + rng.standard_normal((_DRAWS, n)) @ root.T
             out.append(Minimum(float(chi_square), x, np.where(draws[:, :1] < 0, -draws, draws)))
         return out
-
-    def _log_probability(self, x: FloatArray, dof: float) -> FloatArray:
-        """Of parameters (n, 1 + 2P): likelihood, flat in the logarithms of y and the |w|."""
-        z = np.abs(x[:, :1] + effects(x) @ self._T.T)
-        excess = (((z - self._a) / self._s) ** 2).sum(axis=1) - self.chi_square[0]
-        fit = excess if np.isinf(dof) else (dof + x.shape[1]) * np.log1p(excess.clip(0.0) / dof)
-        flat = np.log(np.abs(effects(x)) ** 2 + _SMALL**2).sum(axis=1) + np.log(np.abs(x[:, 0]) + _SMALL)
-        return np.asarray(-0.5 * fit - flat)
 
     def _residuals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(|…| − a)/σ (B, R) of parameters (B, 1 + 2P), and their derivatives by these."""
@@ -154,38 +138,35 @@ def best_weights(x: FloatArray, weights: FloatArray) -> ComplexArray:
     return np.asarray(-(np.linalg.pinv(w, 1e-7) @ y)[..., 0])
 
 
-def region(
-    best: ComplexArray, draws: ComplexArray, misfit: Callable[[ComplexArray], FloatArray], dof: int, limit: float
-) -> tuple[ComplexArray, ComplexArray]:
-    """The best weights (P,), and weights (n, P) of their region of 95 %: of draws (n, P).
+def common_weight(
+    start: ComplexArray, T: ComplexArray, a: FloatArray, s: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Places (n, 1) of one weight that leaves nothing, the best first, and χ² (n,) there of a ± s (R, N).
 
-    Of one plane where a weight may leave nothing anywhere: the weight of least misfit, and all within a limit
-    of it, sought from the draws on.
+    Readings have one scale each, the best one.
     """
-    if len(best) == 1:
-        spread, least = draws - best, best
-        for k in range(60):
-            places = np.vstack((least, least + 0.7**k * spread))
-            least = places[np.argmin(misfit(places))]
-        places = np.vstack((least, least + _FURTHER * spread))
-        above = misfit(places)
-        if chance(above[0], dof) >= UNLIKE:
-            return least, places[above <= above[0] + limit]
-    numbers = np.hstack((np.abs(draws), np.angle(draws * best.conj())))
-    tail = (1 - LEVEL) / (4 * len(best))
-    low, high = np.quantile(numbers, (tail, 1 - tail), axis=0)
-    return best, draws[((numbers >= low) & (numbers <= high)).all(axis=1)]
+
+    def misfit(places: ComplexArray) -> FloatArray:
+        distance = np.abs(T - places[:, None]) / s
+        scale = (distance * a / s).sum(axis=1) / np.maximum((distance**2).sum(axis=1), _TINY)
+        return np.asarray(((a / s - scale[:, None] * distance) ** 2).sum(axis=(1, 2)))
+
+    spiral = np.geomspace(1e-4, 1.0, _PLACES) * np.exp(2.4j * np.arange(_PLACES))
+    for reach in (*np.geomspace(1.0, 1e-6, 12), _FURTHER):
+        places = np.vstack((start, start * np.exp(reach * spiral[:, None])))
+        chi_square = misfit(places)
+        start = places[chi_square.round(9).argmin()]  # rounding moves nothing
+    return places, chi_square
 
 
 def _together(minima: Sequence[Minimum], weights: FloatArray) -> tuple[float, float]:
     """Misfit of minima of the first readings, and how far in errors one weight is from leaving nothing."""
-    misfit, x = sum(one.chi_square for one in minima), np.array([one.parameters for one in minima])
+    x, draws = (np.array([getattr(one, name) for one in minima]) for name in ("parameters", "draws"))
     D = best_weights(x[None], weights[: len(x)])[0]
-    draws = np.array([one.draws for one in minima])
     left = real_parts((x[:, 0] + effects(x) @ D)[:, None])
-    off = real_parts((draws[..., 0] + effects(draws) @ D)[..., None]) - left[:, None]
-    inverse = np.linalg.pinv(np.einsum("nki,nkj->nij", off, off) / _DRAWS)
-    return misfit, float(np.einsum("ni,nij,nj->", left, inverse, left))
+    off = real_parts((draws[..., 0] + effects(draws) @ D)[..., None])
+    unlike = left**2 / off.var(axis=1).clip(_TINY)
+    return sum(one.chi_square for one in minima), float(unlike.sum())
 
 
 def choices(readings: Sequence[Sequence[Minimum]], weights: FloatArray, limit: float) -> list[Choice]:

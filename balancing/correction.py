@@ -186,7 +186,9 @@ class Correction(Prediction, Answered):
     def judgement(self) -> MountDecision:
         """The decision; not to mount anything where the runs contradict their conventions."""
         cause = "; ".join(self.contradictions)
-        return replace(self.decision, word="do not mount", cause=cause, instead=()) if cause else self.decision
+        return (
+            replace(self.decision, word="do not mount", cause=cause, instead=()) if cause else self.decision
+        )
 
     @property
     def sound(self) -> bool:

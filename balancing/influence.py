@@ -520,22 +520,3 @@ def _gain(A: ComplexArray, variance: FloatArray) -> ComplexArray:
     variance = np.where(largest > 0, np.maximum(variance, 1e-4 * largest), 1.0)
     root = 1 / np.sqrt(variance)
     return np.asarray(gain(root[..., None] * A) * root[..., None, :])
-
-
-def change_of_run(influence: Influence, run: Trials) -> Influence:
-    """The coefficients with what a run differs from the bare rotor by as the vibration to correct.
-
-    Its correction is minus what was mounted in the run.
-
-    Parameters
-    ----------
-    influence
-        With a baseline.
-    run
-        One run of the same speeds, sensors and planes.
-    """
-    P = len(influence.planes)
-    flip, first = np.diag([-1.0, *np.ones(P)]).astype(complex), np.eye(P + 1, 1)
-    noise = influence.errors.noise.changed(flip).plus(influence._of_runs(run, first))
-    errors = influence.errors._replace(noise=noise)
-    return replace(influence, baseline=run.mean[0] - influence.baseline, errors=errors)

@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.check_run import last_run
-from balancing.conditioning import chance, check_planes
+from balancing.conditioning import check_planes
 from balancing.conventions import Labels
-from balancing.correct import fit_part
 from balancing.correction import Correction
 from balancing.influence import Influence, match_readings, plane_indices
 from balancing.iso21940 import Tolerance
@@ -43,8 +42,6 @@ from rotorid.base.text import capital, counted, rpm, vibration_unit_words, weigh
 Kind = Literal["plane", "bearing", "sensor"]
 Word = Literal["pass", "fail", "not decidable"]
 _GRAM_MM = 1e6
-POOR = 1e-3
-"""Probability of χ² below which unbalance in the planes does not explain the readings."""
 _SHOWN = 3
 _POINTS = 2880
 ZONES = np.array([*"ABCD"])
@@ -322,7 +319,6 @@ def verdict_of_check(
     bare = replace(last_run(check), planes=(), weights=np.zeros((1, 0), dtype=complex))
     left = influence.part(*where).rebased(bare)
     judged: list[Judgement] = []
-    warnings = left.remarks.warnings
     if tolerance is not None:
         part = left.part(range(len(left.speeds)), None, plane_indices(left, tolerance.planes))
         W, Y = part.W.reshape(-1, len(part.planes)), part.baseline.ravel()
@@ -331,16 +327,10 @@ def verdict_of_check(
         solved = [fitted.resolve(w.reshape(-1, *W.shape), y.reshape(-1, len(Y))) for y, w in part.draws()]
         draws = np.concatenate([0 * fitted.weights[None][:0], *solved])
         judged += judge_unbalance(-fitted.weights, -draws, tolerance, part.planes, radii=radii)
-        by_errors, _ = fit_part(part)
-        if by_errors.dof and chance(by_errors.chi_square or 0.0, by_errors.dof) < POOR:
-            warnings += (
-                "unbalance in these planes does not explain the readings within their errors: some is "
-                "elsewhere, or the coefficients are wrong",
-            )
     if limits is not None:
         covariance = left.channels()[..., :2, :2] if left.known_errors else np.full((2, 2), np.nan)
         judged += _readings(left, left.baseline, covariance, limits.residual[np.ix_(*where)])
-    return _verdict(judged, f"check run {check.runs[-1]}", left.labels, warnings)
+    return _verdict(judged, f"check run {check.runs[-1]}", left.labels, left.remarks.warnings)
 
 
 def verdict_of_readings(

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from balancing.amplitudes import Fit, best_weights, choices, effects, region
+from balancing.amplitudes import UNLIKE, Fit, best_weights, choices, common_weight, effects
 from balancing.conditioning import UndeterminedError, chance
 from balancing.cones import allowed_sectors, stands_in
 from balancing.correction import MountDecision
 from balancing.decision import HARDLY_BELOW
 from balancing.holes import SAME_ANGLE, Holes
-from balancing.regions import LEVEL
+from balancing.regions import LEVEL, Region
 from balancing.tables import reading_columns, rms, three_figures, weight_columns
 from balancing.trials import Limits, Trials
 from rotorid.base.answer import COLUMNS, Answer, Answered
@@ -63,16 +63,11 @@ class Scatter(NamedTuple):
     chi_square: float
     dof: int
 
-    @property
-    def estimated(self) -> float:
-        """Degrees of freedom of the errors, infinite where they are not estimated."""
-        return self.dof if self.origin == "estimated" else np.inf
-
     def limit(self, n: int, level: float) -> float:
         """What n numbers may miss at a level."""
         from scipy.special import fdtri
 
-        return float(n * fdtri(n, min(self.estimated, 1e9), level))
+        return float(n * fdtri(n, self.dof if self.origin == "estimated" else 1e9, level))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +150,6 @@ class WithoutPhase(Answered):
     def sound(self) -> bool:
         """Whether to mount them."""
         return self.decision.word == "mount"
-
-    def holds(self, weights: ComplexArray) -> bool:
-        """Whether sizes and angles of weights (P,) lie in the 95 % intervals of a solution."""
-        return any(
-            ((np.abs(weights) >= low) & (np.abs(weights) <= high)).all()
-            and (np.abs(np.angle(weights * one.weights.conj())) <= angle).all()
-            for one in self.solutions
-            for low, high, angle in [one.intervals]
-        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
@@ -280,7 +266,7 @@ def balance_without_phase(
     limits
         Of the planes (P): largest weights, which are kept, and arcs, where nothing is mounted.
     row_weights
-        How much each reading counts for the weights, (S, C).
+        How much each reading counts for the weights, (S, C), where no weights leave nothing at all of them.
     remove
         Planes where material is taken away.
     holes
@@ -322,50 +308,40 @@ def balance_without_phase(
         scatter, errors = Scatter(ASSUMED * factor, "estimated", scatter.dof, scatter.dof), factor * errors
         fits = [Fit(T, *one) for one in zip(a.T, errors.T, strict=True)]
     limit, rng = scatter.limit(2 * P, POSSIBLE), np.random.default_rng(0)
-    minima = [fit.minima(rng, limit, scatter.estimated) for fit in fits]
+    minima = [fit.minima(rng, limit) for fit in fits]
     weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
     largest = limits.max_weight / np.abs(size)
     solutions = list[AmplitudeSolution]()
 
-    def misfit(places: ComplexArray) -> FloatArray:
-        """χ² (n,) where a weight at one of the places (n, 1) leaves nothing, each reading in its best scale."""
-        distance = np.abs(T[:, 0] - places)[..., None] / errors
-        scale = (distance * a / errors).sum(axis=1) / np.maximum((distance**2).sum(axis=1), _TINY)
-        return np.asarray(((a / errors - scale[:, None] * distance) ** 2).sum(axis=(1, 2)))
-
-    def cut(D: ComplexArray) -> ComplexArray:
-        """Weights (…, P) of the job, the largest ones at most."""
-        return np.asarray(D * np.minimum(1.0, largest / np.maximum(np.abs(D), _TINY)) * size)
-
     for choice in choices(minima, weights, limit):
         x = np.array([one.parameters for one in choice])
         draws = np.array([one.draws for one in choice]).swapaxes(0, 1)
-        best, inside = region(
-            best_weights(x[None], weights)[0],
-            best_weights(draws, weights),
-            misfit,
-            (len(a) - 1) * N - 2,
-            scatter.limit(2, LEVEL),
-        )
-        mounted = solutions[0].weights if solutions else cut(best)
-        after, before = (draws[..., 0] + effects(draws) @ (mounted / size)) * weights, draws[..., 0] * weights
-        left = np.linalg.norm(after, axis=1) / np.linalg.norm(before, axis=1).clip(_TINY)
+        best, inside = best_weights(x[None], weights)[0], best_weights(draws, weights)
+        if P == 1:
+            places, above = common_weight(best, T, a, errors)
+        alike = P == 1 and chance(above[0], (len(a) - 1) * N - 2) >= UNLIKE
+        if alike:
+            best, inside = places[0], places[above <= above[0] + scatter.limit(2, LEVEL)]
+        else:
+            around = Region.of(inside, best)
+            inside = inside[[around.holds(one) for one in inside]]
+        D = best * np.minimum(1.0, largest / np.maximum(np.abs(best), _TINY))
+        mounted = solutions[0].weights / size if solutions else D
+        after, before = (draws[..., 0] + effects(draws) @ mounted) * weights, draws[..., 0] * weights
+        share = np.linalg.norm(after, axis=1) / np.linalg.norm(before, axis=1).clip(_TINY)
+        left = np.abs(1 - mounted / inside).max() if alike else np.quantile(share, (1 + LEVEL) / 2)
         solutions.append(
             AmplitudeSolution(
-                cut(best),
+                D * size,
                 sum(one.chi_square for one in choice),
                 x[:, 0] * top,
                 effects(x) * top[:, None] / size,
-                cut(inside),
-                float(np.quantile(left, (1 + LEVEL) / 2)),
+                inside * size,
+                float(left),
             )
         )
-    gaps = [
-        _widest_gap(of, holes.get(name)) for name, of in zip(trials.planes, trials.weights.T, strict=True)
-    ]
-    p = int(np.argmax([width for width, *_ in gaps]))
-    _, further, hole = gaps[p]
-    run = trials.planes[p], further, hole
+    each = zip(trials.planes, trials.weights.T, strict=True)
+    run = max(((plane, *_widest_gap(of, holes.get(plane))) for plane, of in each), key=lambda one: one[3])[:3]
     weak = chance(float((((a - a.mean(axis=0)) / errors) ** 2).sum()), a.size - N) > 1 - LEVEL
     decision = _decide(trials, solutions, scatter, limits, run, weak=weak)
     return WithoutPhase(trials, tuple(solutions), scatter, errors * top, decision, run, tuple(remove))
@@ -387,7 +363,7 @@ def _check(trials: Trials, holes: Mapping[str, Holes]) -> None:
     missing = [] if (T == 0).all(axis=1).any() else ["the rotor without weights"]
     for plane, of in zip(trials.planes, T.T, strict=True):
         while len(np.unique(np.round(np.angle(of[of != 0]), 6))) < 3:
-            _, weight, hole = _widest_gap(of, holes.get(plane))
+            weight, hole, _ = _widest_gap(of, holes.get(plane))
             missing.append(f"{trials.labels.weight_at(weight)}{_there(hole)} in plane {plane!r}")
             of = np.append(of, weight)
     raise UndeterminedError(
@@ -401,10 +377,10 @@ def _there(hole: str) -> str:
     return hole and f" (hole {hole})"
 
 
-def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[float, complex, str]:
-    """Of angles of one plane's weights; one as large as the largest in it, a third or half of the way.
+def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[complex, str, float]:
+    """A weight in the widest gap of one plane's weights, a third or half of the way; its hole; the gap, rad.
 
-    Where there are holes it is in the nearest one with a direction that no weight had; and its name.
+    As large as the largest; where there are holes, in the nearest one with a direction that no weight had.
     """
     angles = np.unique(np.round(np.angle(weights[weights != 0]), 6))
     gaps = np.diff([*angles, angles[0] + 2 * np.pi])
@@ -416,7 +392,7 @@ def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[float, comp
         if new.any():
             at = int(np.where(new, np.abs(places - direction), np.inf).argmin())
             direction, hole = places[at], holes.names[at]
-    return float(gaps[k]), complex(np.abs(weights).max() * direction), hole
+    return complex(np.abs(weights).max() * direction), hole, float(gaps[k])
 
 
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
+from balancing.noise import run_noise
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"
@@ -94,9 +95,18 @@ class Estimated(NamedTuple):
     warned: bool
 
 
+def change_of_run(influence: balancing.Influence, run: balancing.Trials) -> balancing.Influence:
+    """The coefficients with what a run differs from the bare rotor by as the vibration to correct."""
+    P, of = len(influence.planes), influence.errors
+    flip, first = np.diag([-1.0, *np.ones(P)]).astype(complex), np.eye(P + 1, 1).astype(complex)
+    noise = of.noise.changed(flip).plus(run_noise(run, influence.W, first, of.reading, of.run))
+    change = run.mean[0] - influence.baseline
+    return replace(influence, baseline=change, errors=of._replace(noise=noise))
+
+
 def estimated(influence: balancing.Influence, one: balancing.Trials, method: str) -> Estimated:
     """Weights of a run from what it differs from the bare rotor by, beside what was mounted."""
-    correction = balancing.correct(balancing.change_of_run(influence, one), refuse=False, method=method)
+    correction = balancing.correct(change_of_run(influence, one), refuse=False, method=method)
     weights, draws = correction.weights @ DISC_1_2_AND_SUM.T, correction.draws @ DISC_1_2_AND_SUM.T
     true = -one.weights[0] @ DISC_1_2_AND_SUM.T
     regions = [balancing.Region.of(draws[:, [k]], weights[[k]]) for k in range(len(true))]

@@ -100,19 +100,6 @@ def test_residual_unbalance_of_a_check_run(job, limit, words):
     assert verdict_of_check(influence, mounted, tolerance=rigid(limit)).to_dict() == found.to_dict()
 
 
-def test_vibration_that_the_planes_do_not_explain_is_named(job):
-    made, W, Y0, influence = job
-    check = check_run(made, W, np.array([2e-4, 1e-4j]))
-    assert verdict_of_check(influence, check, tolerance=rigid(1e-3)).warnings == ()
-    more = replace(check, readings=check.readings + 0.3 * Y0)
-    found = verdict_of_check(influence, more, tolerance=rigid(1e-3))
-    assert "does not explain the readings within their errors" in found.warnings[0]
-    assert "Warning: unbalance in these planes" in found.answer.brief()
-    # one plane alone does not explain what two leave
-    one = tolerance(1, 100, 1, planes={"A": None})
-    assert len(verdict_of_check(influence, check, tolerance=one).warnings) == 1
-
-
 def test_readings_against_limits(job):
     made, W, _, influence = job
     residual = np.array([2e-4, 1e-4j])

@@ -29,9 +29,14 @@ LINES = (
 
 
 class Outcome(NamedTuple):
-    """Whether a region holds the truth; whether to mount, and the share of the vibration that is left."""
+    """Whether printed intervals hold the truth; whether to mount, and the share of the vibration left.
+
+    `inside`: all of one solution together; `sizes`, `angles`: shares of the planes, each for itself.
+    """
 
     inside: bool
+    sizes: float
+    angles: float
     mount: bool
     left: float
 
@@ -57,12 +62,21 @@ def draw(rng, runs, planes, sensors, scatter, stated):
     return Trials(names[0], speeds, names[1], names[2], read[:, None], T, errors, amplitudes_only=True), D, W
 
 
+def held(solution, D):
+    """Whether the intervals of a solution hold size and angle of each plane's weight, (2, P)."""
+    low, high, angle = solution.intervals
+    off = np.abs(np.angle(D * solution.weights.conj()))
+    return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
+
+
 def outcome(rng, *line):
     """Balance a job and see."""
     trials, D, W = draw(rng, *line)
     answer = balance_without_phase(trials)
     left = np.linalg.norm(W @ (answer.weights - D)) / np.linalg.norm(W @ D)
-    return Outcome(answer.holds(D), answer.sound, float(left))
+    each = np.array([held(one, D) for one in answer.solutions])
+    sizes, angles = each.any(axis=0).mean(axis=1)
+    return Outcome(bool(each.all(axis=(1, 2)).any()), sizes, angles, answer.sound, float(left))
 
 
 def simulate(jobs, *line, seed=1):
@@ -72,19 +86,18 @@ def simulate(jobs, *line, seed=1):
 
 
 def shares(found):
-    """Of jobs: regions that hold, mounted; of those mounted, worse than before."""
+    """Of jobs: what holds, together and each, mounted; of those mounted, worse than before."""
     mounted = [one.left for one in found if one.mount]
     worse = np.mean(np.array(mounted) > 1.0) if mounted else 0.0
-    return np.mean([one.inside for one in found]), len(mounted) / len(found), worse
+    return *np.mean([one[:4] for one in found], axis=0), worse
 
 
 def main(jobs=1000):
     """Print the table."""
-    print(f"{'':<40}{'holds':>8}{'mount':>8}{'worse':>8}")
+    print(f"{'':<40}" + "".join(f"{head:>8}" for head in ("holds", "sizes", "angles", "mount", "worse")))
     for name, *line in LINES:
         found = simulate(jobs if line[1] == 1 else max(jobs // 5, 1), *line)
-        inside, mount, worse = shares(found)
-        print(f"{name:<40}{100 * inside:>8.1f}{100 * mount:>8.1f}{100 * worse:>8.1f}", flush=True)
+        print(f"{name:<40}" + "".join(f"{100 * share:>8.1f}" for share in shares(found)), flush=True)
 
 
 if __name__ == "__main__":
