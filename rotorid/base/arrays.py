@@ -50,7 +50,8 @@ def number(value: object, what: str, *, signed: bool = False) -> float:
     except (TypeError, ValueError):
         raise ValueError(f"{what} must be a number, not {value!r}") from None
     if not math.isfinite(result) or (result < 0 and not signed):
-        raise ValueError(f"{what} must be finite{'' if signed else ' and not negative'}, not {result}")
+        limit = "finite" if signed else "finite and not negative"
+        raise ValueError(f"{what} must be {limit}, not {result}")
     return result + 0.0  # no negative zero
 
 

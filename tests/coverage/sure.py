@@ -13,7 +13,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 PAGE = HERE.parents[1] / "docs" / "sure.md"
 PROGRAMS = {
-    "balance": ("coverage_balance.py", 2500),
+    "balance": ("coverage_balance.py", 1000),
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
     "fits": ("coverage_fits.py", 1000),

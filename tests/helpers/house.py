@@ -33,7 +33,7 @@ CEILINGS = (  # places, units, issue whose end puts it in force; only an issue t
     ("tests", 260_000, "28"),
     ("benchmarks examples docs", 37_500, "22b"),
 )
-RESOLVED = {"22", "22a", "22b", "23", "25a", "25b", "25c", "26", "28", "28b"}
+RESOLVED = {"22", "22a", "22b", "23", "25a", "25b", "25c", "26", "28", "28b", "29"}
 """Issues whose ceilings hold: the one that resolves another adds it here; 28b is what 28 has not reached."""
 
 LAYOUT = (
