@@ -8,6 +8,7 @@ and counts for the coefficients (`refine`).
 from __future__ import annotations
 
 from balancing.check_run import CheckComparison, compare_check, last_run, refine, with_check_runs
+from balancing.choice_of_pieces import Mounted, mount
 from balancing.computed import combine, model_influence, with_parameters
 from balancing.conditioning import (
     Conditioning,
@@ -18,8 +19,8 @@ from balancing.conditioning import (
 from balancing.convention_test import ConventionTest, convention_test
 from balancing.conventions import Labels
 from balancing.correct import correct
-from balancing.correction import Correction
-from balancing.errors import Reading, RunErrors, reading_of, usual_run_errors
+from balancing.correction_result import Correction
+from balancing.error_draws import Gaussian
 from balancing.groups import Groups, Unknowns, held, in_planes, mapped, unknowns
 from balancing.holes import Holes, equal_holes, from_list
 from balancing.influence import (
@@ -31,9 +32,16 @@ from balancing.influence import (
 )
 from balancing.iso21940 import GRADES, Tolerance, tolerance
 from balancing.methods import METHODS, Solution, solve
-from balancing.mount import Mounted, mount
-from balancing.noise import Gaussian
-from balancing.pieces import Discrete, solve_discrete
+from balancing.pass_or_fail import (
+    Verdict,
+    Zones,
+    verdict_of_check,
+    verdict_of_prediction,
+    verdict_of_readings,
+    zones_of,
+)
+from balancing.piece_search import Discrete, solve_discrete
+from balancing.reading_errors import Reading, RunErrors, reading_of, usual_run_errors
 from balancing.regions import Region, real_parts, region_edge
 from balancing.special_runs import machine_influence, relative_to, rotor_and_arbor, with_arbor
 from balancing.trial_weight import (
@@ -44,16 +52,8 @@ from balancing.trial_weight import (
     trial_from_force,
 )
 from balancing.trials import TRIAL_WEIGHTS, Limits, Placement, ReadingErrors, Relative, RunScatter, Trials
-from balancing.trim import LeftToDo, after_check_run
+from balancing.trim_after_check_run import LeftToDo, after_check_run
 from balancing.unbalance import Unbalance, estimate_unbalance, unbalance_of_run
-from balancing.verdict import (
-    Verdict,
-    Zones,
-    verdict_of_check,
-    verdict_of_prediction,
-    verdict_of_readings,
-    zones_of,
-)
 from balancing.what_if import WhatIf, mode_made_worse, what_if
 from balancing.without_phase import AmplitudeSolution, WithoutPhase, balance_without_phase
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
-from balancing.errors import reading_of
+from balancing.error_draws import Noise
 from balancing.influence import (
     Influence,
     Whitening,
@@ -37,10 +37,7 @@ from balancing.influence import (
     picked,
     with_readings,
 )
-from balancing.noise import Noise
-from balancing.prediction import rms_change, shown
-from balancing.regions import LEVEL, real_parts
-from balancing.tables import (
+from balancing.printed_readings import (
     ROUNDING,
     covariance_column,
     largest_readings,
@@ -50,7 +47,10 @@ from balancing.tables import (
     vector_columns,
     weight_rows,
 )
+from balancing.reading_errors import reading_of
+from balancing.regions import LEVEL, real_parts
 from balancing.trials import Trials
+from balancing.weights_and_prediction import rms_change, shown
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -59,7 +59,7 @@ from rotorid.base.text import figures, listing, sentence
 from rotorid.regression import solution, unstretch
 
 if TYPE_CHECKING:
-    from balancing.correction import Correction
+    from balancing.correction_result import Correction
 
 DRAWS = 400
 

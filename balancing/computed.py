@@ -32,13 +32,13 @@ from numpy.typing import ArrayLike
 
 from balancing.conditioning import chance
 from balancing.conventions import Labels
+from balancing.error_draws import Gaussian
 from balancing.groups import mapped
 from balancing.influence import (
     Influence,
     Remarks,
     match_speeds,
 )
-from balancing.noise import Gaussian
 from balancing.regions import mean_variances
 from rotorid.base.text import Quantity, rpm_text
 

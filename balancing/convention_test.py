@@ -17,7 +17,7 @@ import numpy as np
 
 from balancing.conditioning import chance
 from balancing.conventions import Labels
-from balancing.errors import mean_variance, reading_of
+from balancing.reading_errors import mean_variance, reading_of
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray
 from rotorid.regression import gain
@@ -74,7 +74,7 @@ def convention_test(trials: Trials) -> ConventionTest:
 
     One reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other
     one fits (p > 0.01) and leaves less than half; or where the other one leaves less than a tenth, which
-    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.errors`; unknown
+    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.reading_errors`; unknown
     ones are taken as 2 % and 2°.
 
     Parameters

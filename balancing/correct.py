@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike
 
 from balancing.check_run import whitened
 from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
-from balancing.cones import AT_LIMIT, explain
-from balancing.correction import Correction
-from balancing.decision import Case, decide, remedies
+from balancing.correction_result import Correction
 from balancing.groups import Groups, mapped, unknowns
 from balancing.influence import Influence, match_speeds, plane_indices
+from balancing.limits_and_minmax import AT_LIMIT, explain
 from balancing.methods import NoErrorsError, Solution, solve
+from balancing.mount_decision import Case, decide, remedies
+from balancing.printed_readings import reading_names
 from balancing.regions import LEVEL
-from balancing.tables import reading_names
 from balancing.trials import Limits, Trials
 from balancing.what_if import check_run_spread, todays
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray

@@ -1,7 +1,7 @@
 """Influence coefficients: what weights do, `Y = Y₀ + W T`, how they err, and how they are drawn again.
 
 Source of the estimate: [S] (34)–(39), generalised: weights removed or left in, several in a run and repeated
-runs are all one relation. How errors travel is derived in `balancing.noise`.
+runs are all one relation. How errors travel is derived in `balancing.error_draws`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.conditioning import UndeterminedError, check_effects, check_runs
 from balancing.conventions import Labels
-from balancing.errors import (
+from balancing.error_draws import Errors, Noise, drawn, run_noise
+from balancing.error_draws import Gaussian as Gaussian
+from balancing.error_draws import Mounted as Mounted
+from balancing.error_draws import Whitening as Whitening
+from balancing.reading_errors import (
     NOTICEABLE,
     ROUNDING,
     Reading,
@@ -28,10 +32,6 @@ from balancing.errors import (
     unbalances,
     unseen,
 )
-from balancing.noise import Errors, Noise, drawn, run_noise
-from balancing.noise import Gaussian as Gaussian
-from balancing.noise import Mounted as Mounted
-from balancing.noise import Whitening as Whitening
 from balancing.trials import Placement, Trials, check_names, check_speeds, keep
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
@@ -445,7 +445,7 @@ def estimate_influence(trials: Trials, *, relative: bool = False) -> Influence:
     Returns
     -------
     Influence
-        With its errors, by the rules of `balancing.errors`.
+        With its errors, by the rules of `balancing.reading_errors`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Methods of correction: weights D that make Y + W D small, and how to solve again for redrawn data.
 
 Least squares, ridge: with rows weighted by w and columns scaled, (BᴴB + λ²) x = −Bᴴ w Y, λ relative to the
-largest singular value. Min–max and limits: `balancing.cones`.
+largest singular value. Min–max and limits: `balancing.limits_and_minmax`.
 
 The weighted fit divides residuals by their errors, which depend on D through those of W: normal errors of
 covariance C stand in z = (Y, W₁, …, W_P), (Re, Im) pairs, of each reading. With B = [1, D₁, …] stretched,
@@ -33,7 +33,7 @@ from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, chance, check_planes, check_stack
-from balancing.cones import (
+from balancing.limits_and_minmax import (
     AT_LIMIT,
     TINY,
     TOLERANCE,

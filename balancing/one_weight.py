@@ -26,7 +26,7 @@ import numpy as np
 
 from balancing.conventions import Labels
 from balancing.holes import Holes, Mounting, contents, equal_together
-from balancing.pieces import solve_discrete
+from balancing.piece_search import solve_discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted, percent
 

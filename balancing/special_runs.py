@@ -28,11 +28,11 @@ import numpy as np
 
 from balancing.conditioning import UndeterminedError, check_effects, check_runs
 from balancing.correct import correct
-from balancing.correction import Correction
+from balancing.correction_result import Correction
+from balancing.error_draws import Gaussian
 from balancing.groups import mapped
 from balancing.influence import Influence, Mounted, fit_runs
-from balancing.noise import Gaussian
-from balancing.tables import three_figures
+from balancing.printed_readings import three_figures
 from balancing.trials import TRIAL_WEIGHTS, Relative, Trials
 from rotorid.base.answer import COLUMNS
 from rotorid.base.arrays import FloatArray

@@ -34,7 +34,13 @@ import numpy as np
 
 from balancing.conventions import Labels
 from balancing.influence import Influence, plane_indices
-from balancing.tables import largest_readings, reading_columns, reading_names, three_figures, vector_columns
+from balancing.printed_readings import (
+    largest_readings,
+    reading_columns,
+    reading_names,
+    three_figures,
+    vector_columns,
+)
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain

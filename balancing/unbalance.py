@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from balancing.conditioning import HOPELESS, UndeterminedError
 from balancing.conventions import Labels
 from balancing.influence import Influence
+from balancing.printed_readings import weight_columns
 from balancing.regions import NORMAL_RADIUS, real_parts
-from balancing.tables import weight_columns
 from balancing.trials import Trials, check_names
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray

@@ -29,10 +29,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.influence import Influence, match_speeds, plane_indices
-from balancing.prediction import Outlook
+from balancing.printed_readings import largest_readings, rms, small, three_figures
 from balancing.regions import LEVEL, half_width, reach, real_parts
-from balancing.tables import largest_readings, rms, small, three_figures
 from balancing.trials import Trials
+from balancing.weights_and_prediction import Outlook
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, records, text

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from balancing.amplitudes import UNLIKE, Fit, best_weights, choices, common_weight, effects
 from balancing.conditioning import UndeterminedError, chance
-from balancing.cones import allowed_sectors, stands_in
-from balancing.correction import MountDecision
-from balancing.decision import HARDLY_BELOW
+from balancing.correction_result import MountDecision
 from balancing.holes import SAME_ANGLE, Holes
+from balancing.limits_and_minmax import allowed_sectors, stands_in
+from balancing.mount_decision import HARDLY_BELOW
+from balancing.printed_readings import reading_columns, rms, three_figures, weight_columns
 from balancing.regions import LEVEL, Region
-from balancing.tables import reading_columns, rms, three_figures, weight_columns
 from balancing.trials import Limits, Trials
+from balancing.without_phase_fit import UNLIKE, Fit, best_weights, choices, common_weight, effects
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
-from balancing.noise import run_noise
+from balancing.error_draws import run_noise
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"

@@ -20,7 +20,7 @@ import fem
 from rotorid import read_job, read_rotor
 from rotorid.calibration import CalibratedRotor
 from rotorid.commands.calibrate import CalibrateOptions, calibrate
-from rotorid.commands.coefficients import choose
+from rotorid.commands.choice_of_coefficients import choose
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rk4 import BARE, FEW, FOLDER, estimated, lines, of

@@ -12,6 +12,7 @@ array([632.11])
 
 from fem import plots
 from fem.campbell import Campbell, campbell
+from fem.critical_speed_map import SpeedMap, speed_map
 from fem.derivatives import MatrixChange, matrix_change, receptance_with_derivatives
 from fem.forces import (
     CubicSpring,
@@ -68,7 +69,6 @@ from fem.rotor import (
     label,
     refined,
 )
-from fem.speed_map import SpeedMap, speed_map
 from fem.stability import (
     Stability,
     Window,

@@ -10,8 +10,8 @@ import numpy as np
 
 from balancing.plots.discs import disc_axes, disc_height, draw_plane
 from balancing.plots.polar import draw_line, from_zero, of_plane, polar_axes, turning, unit
+from balancing.printed_readings import INVISIBLE
 from balancing.regions import reach
-from balancing.tables import INVISIBLE
 from rotorid.base.plot_style import STYLES, TEXT, legend_below, new_figure, plain
 from rotorid.base.text import cut
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.check_run import CheckComparison
-    from balancing.correction import Correction
-    from balancing.mount import Mounted
+    from balancing.choice_of_pieces import Mounted
+    from balancing.correction_result import Correction
     from balancing.trials import Trials
-    from balancing.trim import LeftToDo
+    from balancing.trim_after_check_run import LeftToDo
 
 _NAMED, _SPEEDS, _LETTERS = 40, 12, 70
 """Readings that have room for the names of their sensors; speeds that have; letters of a title's line."""

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from balancing.correction import Correction
-    from balancing.mount import Mounted
+    from balancing.choice_of_pieces import Mounted
+    from balancing.correction_result import Correction
 
 _HOLES, _NUMBERS, _TEXTS, _SIDE, _EDGE = 0.84, 0.63, 1.08, 1.95, 1.42
 """Radii of holes, their numbers, what stands around the disc; half of the picture."""

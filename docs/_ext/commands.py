@@ -34,7 +34,7 @@ def all_commands() -> Iterator[tuple[str, Any]]:
     from typer.main import get_command
 
     from rotorid.cli import application
-    from rotorid.cli.choices import tell_choices
+    from rotorid.cli.help_and_suggestions import tell_choices
 
     group: Any = get_command(application())
     for name, command in group.commands.items():

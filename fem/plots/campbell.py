@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem.campbell import Campbell
-    from fem.speed_map import SpeedMap
+    from fem.critical_speed_map import SpeedMap
 
 _HIGHEST = 3.0  # logarithmic decrements above it are not drawn to scale
 _PALE = 0.35

@@ -22,8 +22,8 @@ from scipy.special import chdtrc
 from fem import Calibration, Rotor, is_reading
 from fem.parameters import with_parameters
 from rotorid.base.arrays import FloatArray, IntArray
-from rotorid.calibration.readings import ReadingRows, RunReadings
 from rotorid.calibration.result import LEVEL, CalibratedRotor
+from rotorid.calibration.rows_of_runs import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
 from rotorid.regression import solution
 from rotorid.regression.nonlinear import NonlinearEstimate, nonlinear_least_squares, search_from

@@ -9,7 +9,7 @@ import numpy as np
 from fem import Rotor
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.text import listing, percent
-from rotorid.calibration.readings import RunReadings
+from rotorid.calibration.rows_of_runs import RunReadings
 from rotorid.calibration.unknowns import Unknown
 from rotorid.regression.estimate import combination_words
 from rotorid.regression.nonlinear import NonlinearEstimate

@@ -13,9 +13,9 @@ import typer
 
 from rotorid.base.answer import COLUMNS
 from rotorid.base.choices import one_of
-from rotorid.cli.choices import Command, Commands, whole_paragraphs
 from rotorid.cli.demo import demo
-from rotorid.commands.app import json_text, run, typer_command, written_help
+from rotorid.cli.help_and_suggestions import Command, Commands, whole_paragraphs
+from rotorid.commands.command_line import json_text, run, typer_command, written_help
 from rotorid.commands.progress import plain
 
 _JOBS = {
@@ -26,11 +26,11 @@ _JOBS = {
 }
 """Commands by what they are for, the chief one first."""
 SCHEMAS = {
-    "job": ("Job file of rotorid", "rotorid.files.job_models:JobSettings"),
+    "job": ("Job file of rotorid", "rotorid.files.job_keys:JobSettings"),
     "rotor": ("Rotor file of rotorid", "rotorid.files.rotor:RotorFile"),
     "small": ("Small model for motion of rotorid", "rotorid.files.small_model:SmallModelFile"),
     "study": ("Study file of rotorid", "rotorid.study.study_file:StudyKeys"),
-    "waveforms": ("Waveforms file of rotorid", "rotorid.files.waveforms:WaveformsFile"),
+    "waveforms": ("Waveforms file of rotorid", "rotorid.files.waveform_jobs:WaveformsFile"),
 }
 """Files that `schema` knows: what each is, and its keys."""
 

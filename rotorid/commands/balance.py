@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import LINES, Answer, kinds, together
 from rotorid.base.tables import Table
 from rotorid.base.text import sentence
-from rotorid.commands.after_check import as_proposed, left_to_do
-from rotorid.commands.balance_solution import BalanceOptions as BalanceOptions
-from rotorid.commands.balance_solution import (
+from rotorid.commands.balance_after_check import as_proposed, left_to_do
+from rotorid.commands.balance_options import BalanceOptions as BalanceOptions
+from rotorid.commands.balance_options import (
     choices,
     coefficients_of,
     job_of,
@@ -22,7 +22,7 @@ from rotorid.commands.balance_solution import (
     special,
     with_other_conventions,
 )
-from rotorid.commands.coefficients import (
+from rotorid.commands.choice_of_coefficients import (
     KINDS,
     NEEDS_TRIAL,
     as_measured,
@@ -30,8 +30,8 @@ from rotorid.commands.coefficients import (
     needs_trial_run,
     of_planes,
 )
-from rotorid.commands.option_quantities import mounted_weights
-from rotorid.commands.quantities import one_of, speeds
+from rotorid.commands.option_units import mounted_weights
+from rotorid.commands.option_values import one_of, speeds
 from rotorid.commands.without_phase import balanced_without_phase
 from rotorid.report.options import check_choices, refuse
 from rotorid.report.outcome import Outcome, aligned, command, outcome_of, provenance, table_of
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
         Verdict,
         Zones,
     )
-    from rotorid.commands.balance_solution import JobGiven
+    from rotorid.commands.balance_options import JobGiven
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
     from rotorid.report.outcome import Written

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, figures, sentence
-from rotorid.commands.moving import moving
-from rotorid.commands.quantities import Speeds, rising_speeds
+from rotorid.commands.motion_inputs import moving
+from rotorid.commands.option_values import Speeds, rising_speeds
 from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import counted, error_figures, figures
 from rotorid.commands.model_places import model_places
-from rotorid.commands.quantities import Names
+from rotorid.commands.option_values import Names
 from rotorid.report.options import file_of, rotor_of
 from rotorid.report.outcome import Outcome, command, provenance
 
@@ -187,7 +187,7 @@ def calibrate(
         For files or options that cannot be, and for data that say nothing of the rotor.
     """
     from rotorid import calibration
-    from rotorid.commands.unknown_numbers import unknowns
+    from rotorid.commands.calibrate_options import unknowns
 
     given = prepared(rotor, data, options)
     origin = provenance([*given.rotor_files, *given.data_files], options)
@@ -213,7 +213,7 @@ def prepared(
     ValueError
         As `calibrate`.
     """
-    from rotorid.commands.unknown_numbers import unknowns
+    from rotorid.commands.calibrate_options import unknowns
     from rotorid.files import read_job, rotor_files
 
     model = rotor_of(rotor)

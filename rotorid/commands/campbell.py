@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, percent, rpm_text
-from rotorid.commands.quantities import Band, Speeds, band, number, rising_speeds
+from rotorid.commands.option_values import Band, Speeds, band, number, rising_speeds
 from rotorid.report.options import rotor_of
 from rotorid.report.outcome import USUAL, Outcome, command
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rotorid.base.text import listing
-from rotorid.commands.quantities import Band, band
+from rotorid.commands.option_values import Band, band
 from rotorid.report.options import rotor_of
 from rotorid.report.outcome import Outcome, command
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotorid.base.text import listing
-from rotorid.commands.quantities import check_names, number, pairs
+from rotorid.commands.option_values import check_names, number, pairs
 from rotorid.report.options import check_choices, file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorid.base.text import listing
-from rotorid.commands.option_quantities import Errors, amplitude_errors
+from rotorid.commands.option_units import Errors, amplitude_errors
 from rotorid.report.options import file_of
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.commands.quantities import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.commands.option_values import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
 from rotorid.report.options import rotor_of
 from rotorid.report.outcome import USUAL, Outcome, command
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import SPEEDS, counted, error_figures, listing
-from rotorid.commands.option_quantities import Errors, amplitude_errors
-from rotorid.commands.quantities import Band, band, one_of
+from rotorid.commands.option_units import Errors, amplitude_errors
+from rotorid.commands.option_values import Band, band, one_of
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, get_args
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, figures, percent, rpm_text
-from rotorid.commands.moving import SMALL, mounted_nodes, moving, reduction, reduction_notes
-from rotorid.commands.quantities import (
+from rotorid.commands.motion_inputs import SMALL, mounted_nodes, moving, reduction, reduction_notes
+from rotorid.commands.option_values import (
     FASTEST,
     Nodes,
     Speeds,
@@ -30,7 +30,7 @@ from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:
     from fem import Rotor
-    from rotorid.commands.moving import Moving
+    from rotorid.commands.motion_inputs import Moving
     from rotorid.motion.run import MotionRun
     from rotorid.motion.steady import SteadyEnd
     from rotorid.motion.system import MotionSystem
@@ -338,7 +338,7 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
 
 def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
     """Read "7=20um@90" as x + iy in m, by node."""
-    from rotorid.commands.option_quantities import length
+    from rotorid.commands.option_units import length
 
     def read(_: str, value: str) -> complex:
         size, _, angle = value.partition("@")

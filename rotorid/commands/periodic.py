@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, listing, range_text, rpm_text
-from rotorid.commands.moving import (
+from rotorid.commands.motion_inputs import (
     SMALL,
     Moving,
     mounted_nodes,
@@ -19,7 +19,7 @@ from rotorid.commands.moving import (
     reduction,
     reduction_notes,
 )
-from rotorid.commands.quantities import Band, Sensor, sensors, two_speeds
+from rotorid.commands.option_values import Band, Sensor, sensors, two_speeds
 from rotorid.report.outcome import USUAL, Outcome, command
 
 if TYPE_CHECKING:

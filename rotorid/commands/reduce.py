@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
-from rotorid.commands.quantities import (
+from rotorid.commands.option_values import (
     Band,
     Nodes,
     Speeds,

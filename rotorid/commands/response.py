@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 from rotorid.base.json import cell
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, error_figures, figures, listing, range_text, rpm_text
-from rotorid.commands.moving import moving
-from rotorid.commands.quantities import (
+from rotorid.commands.motion_inputs import moving
+from rotorid.commands.option_values import (
     Band,
     Sensor,
     Speeds,

@@ -11,7 +11,7 @@ from rotorid.base.json import plain
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, counted, error_figures, figures, listing
 from rotorid.commands.modes import bands, frequencies
-from rotorid.commands.quantities import Band, acceleration, one_of
+from rotorid.commands.option_values import Band, acceleration, one_of
 from rotorid.report.options import file_of
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
@@ -136,7 +136,7 @@ def runup(data: Path | str | Sequence[Readings], options: RunUpOptions | None = 
 def _read(file: Path, options: RunUpOptions, recorded: bool) -> tuple[Sequence[Readings], Sequence[Path]]:
     """Vectors of each run in a table, or of records, and the files that were read."""
     from rotorid.files.runs import read_vectors
-    from rotorid.files.waveforms import read_vectors_grid
+    from rotorid.files.waveform_jobs import read_vectors_grid
 
     if not recorded:
         return read_vectors(file, one_of(options.phase or "lead", "--phase", get_args(Phase))), (file,)

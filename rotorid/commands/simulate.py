@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, ClassVar, cast
 from rotorid.base.tables import Column, Table
 from rotorid.base.text import capital, counted, listing
 from rotorid.commands.fit import Values, sigmas
-from rotorid.commands.option_quantities import Errors, amplitude_errors
-from rotorid.commands.quantities import (
+from rotorid.commands.option_units import Errors, amplitude_errors
+from rotorid.commands.option_values import (
     Speeds,
     Times,
     check_names,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
-from rotorid.commands.option_quantities import length, positions, size, vectors, weight, weights
-from rotorid.commands.quantities import degrees, pairs
+from rotorid.commands.option_units import length, positions, size, vectors, weight, weights
+from rotorid.commands.option_values import degrees, pairs
 from rotorid.report.options import changed, refuse
 from rotorid.report.outcome import Outcome, command
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from balancing import Holes, Labels
     from balancing.one_weight import OneWeight
-    from rotorid.commands.option_quantities import Amount, Positions, Vector
+    from rotorid.commands.option_units import Amount, Positions, Vector
 
 _WAYS = ("holes", "two", "drill", "planes")
 _OF_HOLES = ("pieces", "per_hole", "taken")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid.commands.option_quantities import grade, length, mass, positions, speed_with_unit, two_positions
+from rotorid.commands.option_units import grade, length, mass, positions, speed_with_unit, two_positions
 from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of
 
 if TYPE_CHECKING:
     from balancing import Tolerance
-    from rotorid.commands.option_quantities import Amount, Positions
+    from rotorid.commands.option_units import Amount, Positions
 
 
 @dataclass(frozen=True)

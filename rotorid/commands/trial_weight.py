@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, ClassVar, get_args
 
 from rotorid.base.answer import together
 from rotorid.base.text import SHORT_ANGLES, Angles, Phase
-from rotorid.commands.coefficients import choose, used_planes
-from rotorid.commands.option_quantities import read_with_unit, size, speed_with_unit
-from rotorid.commands.quantities import Names, degrees, names, number, one_of
+from rotorid.commands.choice_of_coefficients import choose, used_planes
+from rotorid.commands.option_units import read_with_unit, size, speed_with_unit
+from rotorid.commands.option_values import Names, degrees, names, number, one_of
 from rotorid.files import units
 from rotorid.report.options import job_source, refuse
 from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance, table_of
 
 if TYPE_CHECKING:
     from balancing import Lag, TrialWeight
-    from rotorid.commands.option_quantities import Amount
+    from rotorid.commands.option_units import Amount
     from rotorid.files import Job
 
 _WITHOUT_JOB = ("reading_phase", "lag", "sensor_angle", "speed")

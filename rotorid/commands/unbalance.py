@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.commands.coefficients import computed
-from rotorid.commands.quantities import Nodes, nodes
+from rotorid.commands.choice_of_coefficients import computed
+from rotorid.commands.option_values import Nodes, nodes
 from rotorid.report.options import job_source
 from rotorid.report.outcome import WITHOUT_FILE, Outcome, command, outcome_of, provenance
 

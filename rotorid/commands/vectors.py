@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotorid.base.json import plain
 from rotorid.base.text import RPM, counted, listing
-from rotorid.commands.quantities import Speeds, speeds
+from rotorid.commands.option_values import Speeds, speeds
 from rotorid.report.outcome import USUAL, Outcome, command, provenance
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def vectors(records: Sequence[Path | str], options: VectorsOptions | None = None
     ValueError
         For records without turns, and options that cannot be.
     """
-    from rotorid.files.waveforms import find_each, read_waveforms, vectors_table
+    from rotorid.files.waveform_jobs import find_each, read_waveforms, vectors_table
     from rotorid.waveforms.plots import figure_vectors
 
     options = options or VectorsOptions()

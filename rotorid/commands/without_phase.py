@@ -14,7 +14,7 @@ from rotorid.report.outcome import Outcome, Written, outcome_of, provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.commands.balance_solution import BalanceOptions
+    from rotorid.commands.balance_options import BalanceOptions
     from rotorid.files import Job
 
 _REFUSED = (

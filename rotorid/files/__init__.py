@@ -12,9 +12,9 @@ from rotorid.base.lazy_names import lazy_names
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rotorid.files.influence import read_influence, write_influence
+    from rotorid.files.input_problems import InputError, Problem, TableWarning
     from rotorid.files.job import Job, job_from_files, read_job
-    from rotorid.files.job_models import Errors
-    from rotorid.files.layout import Conventions
+    from rotorid.files.job_keys import Errors
     from rotorid.files.measurements import read_measurements, read_record
     from rotorid.files.model import HarmonicFile, read_harmonic_model, read_ode_model
     from rotorid.files.node_tables import (
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
         read_modes,
         read_unbalance,
     )
-    from rotorid.files.problems import InputError, Problem, TableWarning
     from rotorid.files.rotor import read_rotor, rotor_files, write_rotor
     from rotorid.files.runs import read_trials
     from rotorid.files.small_model import read_small_model
+    from rotorid.files.table_layouts import Conventions
 
 _NAMES = {
     "layout": "Conventions",

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 
-from rotorid.files.problems import Problems, TableWarning, refusal
+from rotorid.files.input_problems import Problems, TableWarning, refusal
 
 MOST_ABOVE = 60
 """Rows among which a header stands that is known by its columns."""

@@ -25,12 +25,12 @@ from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
-from rotorid.files.layout import Conventions
-from rotorid.files.problems import Problems
+from rotorid.files.input_problems import Problems
 from rotorid.files.runs import make_trials, nearest_speed, show_speeds
+from rotorid.files.table_layouts import Conventions
 
 if TYPE_CHECKING:
-    from rotorid.files.job_models import Errors
+    from rotorid.files.job_keys import Errors
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""

@@ -32,7 +32,7 @@ from rotorid.files.cells import (
     thousands_or_decimals,
 )
 from rotorid.files.disk import file_content, is_workbook
-from rotorid.files.problems import Problems
+from rotorid.files.input_problems import Problems
 from rotorid.files.units import Unit, UnitError, UnitReader
 
 REMARKS = ("note", "comment")

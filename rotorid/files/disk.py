@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.logs import files as log
-from rotorid.files.problems import STANDARD_INPUT, refusal
+from rotorid.files.input_problems import STANDARD_INPUT, refusal
 
 MOST_BYTES = 200_000_000
 SUFFIXES = (".xlsx", ".xlsm")

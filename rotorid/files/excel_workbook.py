@@ -11,7 +11,7 @@ from typing import Any
 
 from rotorid.files.cells import MOST_CELLS, BadCell, Cell, Row, Shown, clean
 from rotorid.files.disk import file_content
-from rotorid.files.problems import InputError, Problems, refusal
+from rotorid.files.input_problems import InputError, Problems, refusal
 
 MOST_UNPACKED = 200_000_000
 """Bytes of all parts of a workbook."""

@@ -26,9 +26,9 @@ from rotorid.files.check_and_slow_roll import outside
 from rotorid.files.columns import UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.disk import file_content, write_files
 from rotorid.files.headings import read_headings, read_unit, readable
-from rotorid.files.layout import vector_in
-from rotorid.files.problems import MOST_LINES, Problems, refusal
+from rotorid.files.input_problems import MOST_LINES, Problems, refusal
 from rotorid.files.runs import SPEED, nearest_speed, speed_words
+from rotorid.files.table_layouts import vector_in
 from rotorid.files.units import Unit, UnitError
 
 if TYPE_CHECKING:

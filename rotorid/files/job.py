@@ -26,7 +26,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray, polar
 from rotorid.base.text import counted
 from rotorid.files import units
 from rotorid.files.columns import Source, source_name
-from rotorid.files.job_models import (
+from rotorid.files.input_problems import InputError, Problems, refusal
+from rotorid.files.job_keys import (
     READINGS,
     TABLES,
     WEIGHTS,
@@ -46,10 +47,9 @@ from rotorid.files.job_planes import (
     row_weights,
     with_taken,
 )
-from rotorid.files.layout import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
-from rotorid.files.problems import InputError, Problems, refusal
 from rotorid.files.runs import make_trials
 from rotorid.files.settings import read_toml
+from rotorid.files.table_layouts import ROTATIONS, Conventions, files_of_runs, resolve_angles, stated_phase
 
 if TYPE_CHECKING:
     from balancing import Mounted
@@ -89,7 +89,7 @@ class Job:
     check_mounted
         Whether `check.weights` are those of a table; else what was proposed is taken to have been mounted.
     check_pieces
-        The pieces that `check.weights` are then, by `rotorid.commands.after_check`; None: others.
+        The pieces that `check.weights` are then, by `rotorid.commands.balance_after_check`; None: others.
     rotor
         The model that the job names, or None.
     holes
@@ -267,7 +267,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     for key in READINGS:
         path = tables.get(key)
         if isinstance(path, Path) and path.suffix.lower() == ".toml":
-            from rotorid.files.waveforms import read_vectors_grid
+            from rotorid.files.waveform_jobs import read_vectors_grid
 
             grid, phase, read = read_vectors_grid(path, settings.phase)
             tables[key], records = grid, (*records, *read)

@@ -19,8 +19,8 @@ from rotorid.files.columns import REMARKS
 from rotorid.files.disk import file_content, is_workbook
 from rotorid.files.excel_workbook import read_workbook
 from rotorid.files.headings import find_header
-from rotorid.files.job_models import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
-from rotorid.files.problems import InputError, Problems, refusal
+from rotorid.files.input_problems import InputError, Problems, refusal
+from rotorid.files.job_keys import READINGS, TABLES, WEIGHT_TABLES, WrittenJob
 from rotorid.files.settings import Place
 
 NAMED = {"planes": "plane", "sensors": "sensor"}

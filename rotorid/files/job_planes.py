@@ -34,11 +34,11 @@ from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.cells import NotANumber, parse_number
 from rotorid.files.columns import Source
-from rotorid.files.job_models import JobSettings, Plane, Sensor
-from rotorid.files.layout import Conventions
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.input_problems import InputError, Problems
+from rotorid.files.job_keys import JobSettings, Plane, Sensor
 from rotorid.files.runs import nearest_speed, show_speeds
 from rotorid.files.settings import Settings
+from rotorid.files.table_layouts import Conventions
 from rotorid.files.units import Quantity, in_job_units
 from rotorid.files.weights import read_weights
 

@@ -17,10 +17,10 @@ from rotorid.base.text import Shown, listing, speed_axis, vibration_unit_words
 from rotorid.files import units
 from rotorid.files.cells import Grid, show
 from rotorid.files.columns import Column, Table, make_table, read_grid
-from rotorid.files.instruments import DERIVATIVE, read_responses
+from rotorid.files.input_problems import Problems, TableWarning
+from rotorid.files.instrument_formats import DERIVATIVE, read_responses
 from rotorid.files.model import HarmonicFile
 from rotorid.files.node_tables import read_modes
-from rotorid.files.problems import Problems, TableWarning
 from rotorid.files.units import TIME, Unit, UnitError, UnitReader, one_of, ratio, spelt
 from rotorid.identify.amplitudes import AmplitudeErrors, Experiments, experiments, real_matrices
 from rotorid.identify.ode import OdeModel

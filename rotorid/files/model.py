@@ -19,8 +19,8 @@ from pydantic import BeforeValidator, Field, PlainValidator
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
-from rotorid.files.attached import whole
-from rotorid.files.problems import Problems, TableWarning
+from rotorid.files.bearings_and_seals import whole
+from rotorid.files.input_problems import Problems, TableWarning
 from rotorid.files.settings import (
     MOST_NAMES,
     NotNegative,

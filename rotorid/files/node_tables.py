@@ -13,7 +13,7 @@ from rotorid.base.arrays import FloatArray, polar
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
-from rotorid.files.problems import Problems
+from rotorid.files.input_problems import Problems
 from rotorid.files.units import Unit, one_of, ratio
 from rotorid.reduction import SmallModel
 

@@ -27,7 +27,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.tables import csv_bytes
 from rotorid.base.text import counted
 from rotorid.files import units
-from rotorid.files.attached import (
+from rotorid.files.bearings_and_seals import (
     OUTWARDS,
     Attached,
     Place,
@@ -41,7 +41,7 @@ from rotorid.files.attached import (
 )
 from rotorid.files.columns import Column, read_table
 from rotorid.files.disk import each_file_once, write_files
-from rotorid.files.problems import InputError, Problems, TableWarning, refusal
+from rotorid.files.input_problems import InputError, Problems, TableWarning, refusal
 from rotorid.files.settings import (
     NotNegative,
     Number,

@@ -23,7 +23,8 @@ from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
 from rotorid.files.columns import Column, Source, Table, make_table
-from rotorid.files.layout import (
+from rotorid.files.input_problems import MOST_LINES, Problems
+from rotorid.files.table_layouts import (
     DEFAULT_TOLERANCE,
     MOUNTED,
     Conventions,
@@ -32,12 +33,11 @@ from rotorid.files.layout import (
     stated_phase,
     without_phases,
 )
-from rotorid.files.problems import MOST_LINES, Problems
 from rotorid.files.units import one_of
 from rotorid.files.weights import read_weights
 
 if TYPE_CHECKING:
-    from rotorid.files.job_models import Errors
+    from rotorid.files.job_keys import Errors
     from rotorid.identify.modes_result import Readings
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))

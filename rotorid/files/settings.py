@@ -40,7 +40,7 @@ from rotorid.base.json import SCHEMA_VERSION
 from rotorid.base.text import listing
 from rotorid.files.cells import LARGEST, NotANumber, decimal_comma, parse_number
 from rotorid.files.disk import file_content
-from rotorid.files.problems import InputError, Problem, Problems, refusal
+from rotorid.files.input_problems import InputError, Problem, Problems, refusal
 from rotorid.files.units import Quantity, Unit
 
 MOST_BYTES = 2_000_000

@@ -15,7 +15,7 @@ from pydantic import Field
 from fem import GRAVITY, Motion
 from rotorid.base.arrays import polar
 from rotorid.files import units
-from rotorid.files.attached import (
+from rotorid.files.bearings_and_seals import (
     Attached,
     Place,
     each,
@@ -26,7 +26,7 @@ from rotorid.files.attached import (
     support_tables,
     whole,
 )
-from rotorid.files.problems import InputError, Problems, refusal
+from rotorid.files.input_problems import InputError, Problems, refusal
 from rotorid.files.settings import (
     NotNegative,
     Number,

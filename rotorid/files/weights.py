@@ -23,8 +23,8 @@ from rotorid.files import units
 from rotorid.files.cells import Cell, Grid, NotANumber, parse_number, show
 from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.headings import WEIGHT, find_header, read_headings
-from rotorid.files.layout import NUMBER, Conventions, long_rows
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.input_problems import InputError, Problems
+from rotorid.files.table_layouts import NUMBER, Conventions, long_rows
 from rotorid.files.units import Unit, one_of
 
 MASSES = ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in")

@@ -22,7 +22,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.logs import progress
 from rotorid.files import read_job
 from rotorid.files.disk import each_file_once, file_content
-from rotorid.files.problems import printable, refusal
+from rotorid.files.input_problems import printable, refusal
 from rotorid.files.settings import read_toml
 from rotorid.files.units import vibration
 

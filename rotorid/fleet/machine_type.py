@@ -45,11 +45,11 @@ from balancing import (
     usual_run_errors,
     with_parameters,
 )
-from balancing.noise import Gaussian, Mounted, Whitening
+from balancing.error_draws import Gaussian, Mounted, Whitening
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted, listing
-from rotorid.files.layout import DEFAULT_TOLERANCE
+from rotorid.files.table_layouts import DEFAULT_TOLERANCE
 from rotorid.files.units import vibration, weight
 from rotorid.fleet.jobs import machine_of, mounted_in, quantity_of, read_fleet, runs_of
 from rotorid.regression import covariance_root, unstretch

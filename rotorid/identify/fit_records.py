@@ -13,11 +13,11 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import counted
-from rotorid.identify.checks_records import judge, misfit
 from rotorid.identify.expressions import finite
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.quasilinearization import quasilinearization
-from rotorid.identify.record_residuals import RTOL, Iterations, Problem
+from rotorid.identify.record_least_squares import RTOL, Iterations, Problem
+from rotorid.identify.record_warnings import judge, misfit
 from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps

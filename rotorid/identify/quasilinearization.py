@@ -19,7 +19,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.integrators import HEUN, heun_step, recurrence
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import LARGEST, Iterations, Problem, negligible
+from rotorid.identify.record_least_squares import LARGEST, Iterations, Problem, negligible
 from rotorid.identify.records import Record, inputs_of, refined
 from rotorid.identify.sensitivity_steps import Step, iterate
 from rotorid.identify.simulation import simulate

@@ -12,7 +12,7 @@ from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.json import plain
 from rotorid.base.text import capital, percent
 from rotorid.identify.ode import OdeModel
-from rotorid.identify.record_residuals import Iterations
+from rotorid.identify.record_least_squares import Iterations
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import Trajectory
 from rotorid.regression.estimate import parameter_columns

@@ -16,7 +16,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.identify.ode import SimulationError
-from rotorid.identify.record_residuals import Iterations, Problem, negligible
+from rotorid.identify.record_least_squares import Iterations, Problem, negligible
 from rotorid.regression.estimate import Estimate
 
 Step = tuple[FloatArray, FloatArray, Estimate | None, FloatArray, bool, bool]

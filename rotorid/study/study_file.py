@@ -25,8 +25,8 @@ from fem import InfluenceCoefficients, Rotor, Sensor, influence
 from fem.parameters import expand, parameter_value, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.files import units
-from rotorid.files.attached import Place
-from rotorid.files.problems import Problems
+from rotorid.files.bearings_and_seals import Place
+from rotorid.files.input_problems import Problems
 from rotorid.files.rotor import read_rotor, rotor_files
 from rotorid.files.settings import (
     NotNegative,

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline, interp1d
 
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray
+from rotorid.waveforms.filters_and_delays import before_path, response
 from rotorid.waveforms.order_tracking import Orders, track_orders
 from rotorid.waveforms.record import Channel, TachoSettings, WaveformRecord
-from rotorid.waveforms.signal_path import before_path, response
 from rotorid.waveforms.tacho import Tacho, read_tacho
 
 STEADY, WINDOWS, CALM = 0.01, 20, 8

@@ -71,7 +71,7 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Outcome, Job, list[
     """
     from rotorid.base.answer import kinds
     from rotorid.commands.balance import BalanceOptions, corrected
-    from rotorid.commands.balance_solution import job_of
+    from rotorid.commands.balance_options import job_of
     from rotorid.commands.without_phase import balanced_without_phase
 
     plain, warned = BalanceOptions(), list[str]()
@@ -92,8 +92,8 @@ def _balance(job: str, version: int, checked: bool) -> tuple[Outcome, Job, list[
 
 def _without_check(path: Path) -> Job:
     """The job as it is before its check run."""
+    from rotorid.files.input_problems import Problems
     from rotorid.files.job import job_of, open_job
-    from rotorid.files.problems import Problems
 
     problems = Problems()
     written = open_job(path, problems)

@@ -11,9 +11,9 @@ from typing import Any
 from rotorid.base.text import listing
 from rotorid.files.cells import Grid
 from rotorid.files.disk import MOST_BYTES, SUFFIXES, file_content, first_bytes, is_workbook, write_files
+from rotorid.files.input_problems import InputError, Problems
 from rotorid.files.job import open_job
-from rotorid.files.job_models import named_tables
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.job_keys import named_tables
 from rotorid.worksheet.job_text import KEYS, Conflict, Job, Table, read_table, settings_in, shown
 
 MOST_STEPS, MOST_TRIES = 200, 5

@@ -18,8 +18,8 @@ from typing import Any
 from rotorid.base.tables import guarded
 from rotorid.files.cells import SEP_LINE, Grid, clean, decimal_comma, decode, parse_text, show
 from rotorid.files.headings import find_header
-from rotorid.files.job_models import READINGS, named_tables
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.input_problems import InputError, Problems
+from rotorid.files.job_keys import READINGS, named_tables
 
 KEYS = ("runs", "weights", "check", "check_weights")
 """Tables that are shown."""

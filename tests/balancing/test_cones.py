@@ -11,7 +11,7 @@ from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from balancing.cones import (
+from balancing.limits_and_minmax import (
     Bounds,
     allowed_sectors,
     explain,

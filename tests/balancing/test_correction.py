@@ -8,7 +8,7 @@ import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, synthetic
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.tables import largest_readings
+from balancing.printed_readings import largest_readings
 
 ERRORS = ReadingErrors(0.02, np.deg2rad(1))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal, job, noisy, synthetic
 
-from balancing.errors import (
+from balancing.reading_errors import (
     ASSUMED,
     reading_covariance,
     reading_of,

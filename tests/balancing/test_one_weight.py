@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from balancing.conventions import Labels
 from balancing.holes import equal_holes, from_list
 from balancing.one_weight import STEEL, combine, drill, split, two_positions
-from balancing.pieces import solve_discrete
+from balancing.piece_search import solve_discrete
 from balancing.trials import Limits
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)

@@ -6,7 +6,7 @@ from balancing_data import complex_normal
 from mountings import everything
 
 from balancing.holes import equal_holes, from_list, lightest
-from balancing.pieces import HEAVIER, solve_discrete
+from balancing.piece_search import HEAVIER, solve_discrete
 from balancing.trials import Limits
 
 METHODS = ("least-squares", "minmax")

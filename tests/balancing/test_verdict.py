@@ -15,9 +15,9 @@ from balancing import (
     verdict_of_prediction,
 )
 from balancing.iso21940 import tolerance
+from balancing.pass_or_fail import judge, judge_unbalance
 from balancing.regions import NORMAL_RADIUS as RADIUS
 from balancing.regions import Region
-from balancing.verdict import judge, judge_unbalance
 
 ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
 

@@ -13,7 +13,7 @@ from balancing import (
     UndeterminedError,
     balance_without_phase,
 )
-from balancing.amplitudes import Fit
+from balancing.without_phase_fit import Fit
 
 GRAMS = Labels("mm_s_rms", 1.0, "g", 1.0)
 AT = {120: (0, 120, 240), 180: (0, 180)}

@@ -13,7 +13,7 @@ from rotorid.files import read_ode_model, read_record
 from rotorid.identify.fit_records import fit
 from rotorid.identify.ode import ode_model
 from rotorid.identify.quasilinearization import linear_solutions
-from rotorid.identify.record_residuals import RTOL, Problem
+from rotorid.identify.record_least_squares import RTOL, Problem
 from rotorid.identify.records import Record
 from rotorid.identify.simulation import simulate
 from rotorid.regression import solution

@@ -28,7 +28,7 @@ from balancing import (
     estimate_influence,
     unknowns,
 )
-from balancing.errors import ASSUMED_RUN as ASSUMED
+from balancing.reading_errors import ASSUMED_RUN as ASSUMED
 
 ComplexArray = NDArray[np.complex128]
 

@@ -32,10 +32,10 @@ from fem.parameters import with_parameters
 from rotorid import read_rotor
 from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
 from rotorid.commands.balance import Balance, balance
-from rotorid.commands.unknown_numbers import unknowns
+from rotorid.commands.calibrate_options import unknowns
 from rotorid.files import Job
-from rotorid.files.job_models import Plane, Sensor
-from rotorid.files.layout import Conventions
+from rotorid.files.job_keys import Plane, Sensor
+from rotorid.files.table_layouts import Conventions
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]

@@ -14,7 +14,7 @@ import coverage_balance as balance
 import numpy as np
 
 from balancing import UndeterminedError, correct, estimate_influence, what_if
-from balancing.errors import rms
+from balancing.reading_errors import rms
 
 HEADS = ("readings", "rms", "below", "rises said", "wrongly")
 

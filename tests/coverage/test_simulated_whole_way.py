@@ -19,8 +19,8 @@ from balancing import Limits, ReadingErrors, Trials, UndeterminedError, equal_ho
 from balancing.influence import Whitening
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.files import Job
-from rotorid.files.job_models import Plane
-from rotorid.files.layout import Conventions
+from rotorid.files.job_keys import Plane
+from rotorid.files.table_layouts import Conventions
 
 MISTAKES = ("mirrored", "one hole off", "forgotten")
 MATTERS = 4.0

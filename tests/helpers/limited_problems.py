@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from balancing import Limits, solve
-from balancing.cones import allowed_sectors
+from balancing.limits_and_minmax import allowed_sectors
 
 
 def drawn(seed):

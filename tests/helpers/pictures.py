@@ -8,7 +8,7 @@ from unittest import mock
 from documents import is_text, undrawn
 
 from rotorid.cli import application
-from rotorid.commands.app import Destination
+from rotorid.commands.command_line import Destination
 from rotorid.samples import sample_data
 
 COMMANDS = {

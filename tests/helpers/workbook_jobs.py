@@ -18,7 +18,7 @@ from tables_data import RUNS
 
 from rotorid.files.cells import Shown
 from rotorid.files.job_excel import template_bytes
-from rotorid.files.job_models import TABLES
+from rotorid.files.job_keys import TABLES
 from rotorid.files.settings import Settings
 
 SAMPLES = (

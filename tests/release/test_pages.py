@@ -10,7 +10,7 @@ from golden.tolerances import TOLERANCES
 
 import rotorid
 from rotorid.files import cells, disk, excel_workbook, instruments, problems, settings
-from rotorid.files.job_models import MOST_HOLES
+from rotorid.files.job_keys import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rotorid import read_job
-from rotorid.commands.coefficients import choose
+from rotorid.commands.choice_of_coefficients import choose
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "rk4"

@@ -6,7 +6,7 @@ import pytest
 from helpers.calibration.jobs import machine
 
 import fem
-from rotorid.commands.unknown_numbers import unknowns
+from rotorid.commands.calibrate_options import unknowns
 
 COEFFICIENTS = ("kxx", "kxy", "kyx", "kyy", "cxx", "cyy")
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from rotorid.commands.quantities import speeds
+from rotorid.commands.option_values import speeds
 from rotorid.samples import sample_data
 
 ROTOR = sample_data() / "rotor23.csv"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.commands.option_quantities import mass, vectors
+from rotorid.commands.option_units import mass, vectors
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.commands.quantities import band, nodes, sensors
+from rotorid.commands.option_values import band, nodes, sensors
 
 
 def test_speeds_in_any_order_and_more_than_once(cli, files):

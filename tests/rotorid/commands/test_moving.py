@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem import JournalBearing, Rotor
-from rotorid.commands.moving import moving
+from rotorid.commands.motion_inputs import moving
 from rotorid.files import InputError
 from rotorid.files.small_model import small_model_files
 from rotorid.reduction import SmallModel

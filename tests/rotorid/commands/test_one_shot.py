@@ -10,7 +10,7 @@ import fem
 from fem.parameters import with_parameters
 from rotorid import read_job, read_rotor
 from rotorid.commands.balance import BalanceOptions, balance
-from rotorid.commands.coefficients import choose, counted_before
+from rotorid.commands.choice_of_coefficients import choose, counted_before
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "calibration"

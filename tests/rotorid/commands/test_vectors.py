@@ -8,7 +8,7 @@ from scipy.io import wavfile
 
 from rotorid.commands.balance import BalanceOptions, balance
 from rotorid.commands.vectors import VectorsOptions, vectors
-from rotorid.files.problems import InputError
+from rotorid.files.input_problems import InputError
 from rotorid.samples import sample_data
 
 SAMPLE = sample_data() / "waveforms"

@@ -7,7 +7,7 @@ import pytest
 from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
-from rotorid.commands.option_quantities import limited
+from rotorid.commands.option_units import limited
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 UNBALANCES = [["run", "plane", "unbalance_g_mm", "angle_deg"], *WEIGHTS[1:]]

@@ -12,7 +12,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import ReadingErrors
 from rotorid.files import read_trials
-from rotorid.files.job_models import Errors
+from rotorid.files.job_keys import Errors
 
 
 @pytest.fixture

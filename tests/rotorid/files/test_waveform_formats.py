@@ -9,7 +9,7 @@ from scipy.io import savemat, wavfile
 from waveform_files import RATE, SUFFIXES, drawn, write
 
 from rotorid.files import InputError
-from rotorid.files.instruments import read_samples
+from rotorid.files.instrument_formats import read_samples
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -72,7 +72,7 @@ BAD_CELLS = {
 
 @each_of("kind", BAD_CELLS)
 def test_a_bad_cell_is_named_with_its_row(kind, tmp_path):
-    from rotorid.files.waveforms import read_waveforms
+    from rotorid.files.waveform_jobs import read_waveforms
 
     at, row, words = BAD_CELLS[kind]
     path = csv(tmp_path, "\n".join(["t_s,KEY,B", *ROWS[:at], row, *ROWS[at + 1 :]]))
@@ -166,7 +166,7 @@ def test_files_that_are_none(tmp_path):
 
 
 def test_a_small_archive_of_huge_arrays_is_not_unpacked(tmp_path, monkeypatch):
-    monkeypatch.setattr("rotorid.files.instruments.LARGEST", 10_000_000)
+    monkeypatch.setattr("rotorid.files.instrument_formats.LARGEST", 10_000_000)
     arrays = {"a": np.zeros(2_000_000), "fs": 1.0}
     np.savez_compressed(tmp_path / "a.npz", **arrays)
     savemat(tmp_path / "a.mat", arrays, do_compression=True)

@@ -11,7 +11,7 @@ from waveform_files import RATE, drawn, write
 
 from balancing import Labels
 from rotorid.files import InputError, read_job
-from rotorid.files.waveforms import read_waveforms
+from rotorid.files.waveform_jobs import read_waveforms
 from rotorid.samples import sample_data
 from rotorid.waveforms.record import SignalPath, TachoSettings
 

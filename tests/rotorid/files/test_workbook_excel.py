@@ -14,7 +14,7 @@ from workbook_jobs import differences, filled, rows, with_stored_values
 
 from rotorid.files import read_job
 from rotorid.files.job_excel import NAMED, template_bytes
-from rotorid.files.job_models import Errors, JobSettings, Plane, Sensor
+from rotorid.files.job_keys import Errors, JobSettings, Plane, Sensor
 
 FORM = ("runs", "weights", "planes", "sensors", "settings")
 SETTINGS = [["key", "value"], ["phase", "lag"], ["errors.phase_deg", 0.5], ["speed_tolerance_percent", 1]]

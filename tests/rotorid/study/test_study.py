@@ -11,7 +11,7 @@ from studies.drawn import SCATTER, STUDY, TWO, write
 
 import fem
 from rotorid import read_rotor
-from rotorid.files.problems import InputError
+from rotorid.files.input_problems import InputError
 from rotorid.study import StudyOptions, study
 from rotorid.study.study_file import UNDETERMINED, UNSTABLE, read_study
 

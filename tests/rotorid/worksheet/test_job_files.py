@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from rotorid.files import disk
 from rotorid.files.columns import read_grid
+from rotorid.files.input_problems import InputError, Problems
 from rotorid.files.job import read_job
-from rotorid.files.problems import InputError, Problems
 from rotorid.worksheet.job_files import JobFiles
 from rotorid.worksheet.job_text import Conflict
 

@@ -10,9 +10,7 @@ import numpy as np
 
 from balancing.convention_test import ConventionTest, assumptions
 from balancing.conventions import Labels
-from balancing.prediction import HELD, Prediction
-from balancing.regions import NORMAL_RADIUS
-from balancing.tables import (
+from balancing.printed_readings import (
     ROUNDING,
     covariance_column,
     degrees,
@@ -25,6 +23,8 @@ from balancing.tables import (
     weight_columns,
     weight_rows,
 )
+from balancing.regions import NORMAL_RADIUS
+from balancing.weights_and_prediction import HELD, Prediction
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
 from rotorid.base.json import plain

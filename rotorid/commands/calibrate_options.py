@@ -14,7 +14,7 @@ from fem.parameters import expand, numbers_of, parameter_value
 from rotorid.base.text import counted
 from rotorid.calibration import Unknown
 from rotorid.calibration.unknowns import check_different
-from rotorid.commands.quantities import number, pairs
+from rotorid.commands.option_values import number, pairs
 
 ENTRIES = {"kxx": (0, 0, 0), "kxy": (0, 0, 1), "kyx": (0, 1, 0), "kyy": (0, 1, 1)}
 ENTRIES |= {f"c{name[1:]}": (1, *place[1:]) for name, place in ENTRIES.items()}

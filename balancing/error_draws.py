@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.errors import (
+from balancing.reading_errors import (
     NO_RUN_ERRORS,
     Reading,
     RunErrors,

@@ -1,7 +1,7 @@
 """Values of options as people write them: speeds, ranges, times, nodes, sensors, names, pairs, a reader each.
 
 Each takes a text of the command line or, from Python, what it stands for, in SI. Weights, lengths and other
-quantities with units are read by `rotorid.commands.option_quantities`.
+quantities with units are read by `rotorid.commands.option_units`.
 """
 
 from __future__ import annotations

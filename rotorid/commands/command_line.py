@@ -92,7 +92,7 @@ class Destination:
             For a file that could not be written, before any work is done, and for one that was read.
         """
         from rotorid.files.disk import write_files
-        from rotorid.files.problems import printable, refusal
+        from rotorid.files.input_problems import printable, refusal
 
         asked: list[tuple[Path | None, Sequence[str], Callable[[Outcome, Path], Written]]] = [
             (self.plot, PICTURES, lambda made, path: figure_bytes(made.figure(), path)),

@@ -16,8 +16,7 @@ from rotorid.base.text import Angles, Phase, Rotation, View, listing
 from rotorid.files import units
 from rotorid.files.cells import NotANumber, parse_number
 from rotorid.files.columns import Source
-from rotorid.files.layout import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
-from rotorid.files.problems import InputError, Problems, refusal
+from rotorid.files.input_problems import InputError, Problems, refusal
 from rotorid.files.settings import (
     Count,
     Date,
@@ -37,6 +36,7 @@ from rotorid.files.settings import (
     optional,
     read_settings,
 )
+from rotorid.files.table_layouts import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, ROTATIONS
 from rotorid.files.units import Quantity
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")

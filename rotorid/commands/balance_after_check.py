@@ -6,12 +6,12 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rotorid.commands.balance_solution import Solved, correct_job
-from rotorid.commands.coefficients import choose, of_planes
+from rotorid.commands.balance_options import Solved, correct_job
+from rotorid.commands.choice_of_coefficients import choose, of_planes
 
 if TYPE_CHECKING:
     from balancing import CheckComparison, Correction, Influence, LeftToDo, Mounted, Trials, Verdict
-    from rotorid.commands.balance_solution import BalanceOptions
+    from rotorid.commands.balance_options import BalanceOptions
     from rotorid.files import Job
 
 

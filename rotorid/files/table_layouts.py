@@ -33,7 +33,7 @@ from rotorid.files.headings import (
     read_unit,
     readable,
 )
-from rotorid.files.problems import InputError, Problems, refusal
+from rotorid.files.input_problems import InputError, Problems, refusal
 from rotorid.files.units import Quantity, UnitError, spelt
 
 NUMBER = r"[+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?"

@@ -25,14 +25,14 @@ from numpy.typing import ArrayLike
 from balancing.check_run import last_run
 from balancing.conditioning import check_planes
 from balancing.conventions import Labels
-from balancing.correction import Correction
+from balancing.correction_result import Correction
 from balancing.influence import Influence, match_readings, plane_indices
 from balancing.iso21940 import Tolerance
 from balancing.methods import solve
-from balancing.prediction import Outlook
+from balancing.printed_readings import INVISIBLE, reading_columns
 from balancing.regions import NORMAL_RADIUS, Region, region_edge
-from balancing.tables import INVISIBLE, reading_columns
 from balancing.trials import Limits, Trials
+from balancing.weights_and_prediction import Outlook
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain

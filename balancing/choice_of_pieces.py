@@ -2,10 +2,10 @@
 
 Where groups hold planes together (`balancing.groups`), the pieces of each are the nearest to its weight.
 
-A set of pieces is enough where every reading passes its limit in a check run (`balancing.verdict`: all of its
-95 % region is within); without limits, where the bound of the root mean square of a check run is at most the
-larger of 1.2 times that of the exact weights and a fifth of the present vibration. Errors of a check run with
-pieces are those with the exact weights.
+A set of pieces is enough where every reading passes its limit in a check run (`balancing.pass_or_fail`: all
+of its 95 % region is within); without limits, where the bound of the root mean square of a check run is at
+most the larger of 1.2 times that of the exact weights and a fifth of the present vibration. Errors of a
+check run with pieces are those with the exact weights.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from balancing.correction import Correction
-from balancing.decision import HARDLY_BELOW
+from balancing.correction_result import Correction
 from balancing.groups import PIECES
 from balancing.holes import Holes, contents, equal_together
 from balancing.influence import Influence, in_order, match_speeds
-from balancing.pieces import FEW, LITTLE, Discrete, solve_discrete
-from balancing.prediction import rms_change
-from balancing.regions import LEVEL
-from balancing.tables import (
+from balancing.mount_decision import HARDLY_BELOW
+from balancing.pass_or_fail import largest
+from balancing.piece_search import FEW, LITTLE, Discrete, solve_discrete
+from balancing.printed_readings import (
     covariance_column,
     largest_readings,
     reading_columns,
@@ -35,8 +34,9 @@ from balancing.tables import (
     three_figures,
     vector_columns,
 )
+from balancing.regions import LEVEL
 from balancing.trials import Trials
-from balancing.verdict import largest
+from balancing.weights_and_prediction import rms_change
 from balancing.what_if import check_readings
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray

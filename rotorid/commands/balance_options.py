@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
 
 from rotorid.base.text import listing
-from rotorid.commands.coefficients import choose, counted, of_planes, stored, unknowns_of
-from rotorid.commands.option_quantities import Errors, limited, percent_and_degrees
-from rotorid.commands.quantities import Names, Speeds, names, speeds
+from rotorid.commands.choice_of_coefficients import choose, counted, of_planes, stored, unknowns_of
+from rotorid.commands.option_units import Errors, limited, percent_and_degrees
+from rotorid.commands.option_values import Names, Speeds, names, speeds
 from rotorid.report.options import file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT
 
 if TYPE_CHECKING:
     from balancing import ConventionTest, Correction, Influence, Trials
     from rotorid.base.choices import Method
-    from rotorid.commands.option_quantities import Amount, Amplitudes, Mounted, Weights
+    from rotorid.commands.option_units import Amount, Amplitudes, Mounted, Weights
     from rotorid.files import Job
     from rotorid.fleet.machine_type import TypeKnowledge
 
@@ -129,7 +129,7 @@ class BalanceOptions:
                 "give a job (.toml, .xlsx) or a runs table and a weights table; --template, without a "
                 "job, writes a form"
             )
-        from rotorid.commands.app import check_targets
+        from rotorid.commands.command_line import check_targets
         from rotorid.files.disk import write_files
         from rotorid.files.job_excel import template_bytes
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.conventions import Labels
-from balancing.errors import Reading, RunErrors
-from balancing.errors import rms as rms
+from balancing.reading_errors import Reading, RunErrors
+from balancing.reading_errors import rms as rms
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.tables import Column, records
 from rotorid.base.text import RPM, figures, rpm

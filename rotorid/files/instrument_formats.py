@@ -23,7 +23,7 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.text import listing
 from rotorid.files.cells import decode
 from rotorid.files.disk import file_content, first_bytes, why_unreadable
-from rotorid.files.problems import InputError, printable, refusal
+from rotorid.files.input_problems import InputError, printable, refusal
 from rotorid.files.units import FORCE, TIME, VIBRATION, Unit, spelt
 
 DERIVATIVE = {"length": 0, "velocity": 1, "acceleration": 2}

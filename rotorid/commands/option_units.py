@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, get_args
 
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import SHORT_ANGLES, Angles, listing
-from rotorid.commands.quantities import WITH_UNIT, degrees, number, one_of, one_speed, pairs
+from rotorid.commands.option_values import WITH_UNIT, degrees, number, one_of, one_speed, pairs
 from rotorid.files import units
 from rotorid.files.cells import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.files.units import Quantity, Unit, UnitError, UnitReader

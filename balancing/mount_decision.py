@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.conditioning import CLEAR, REMEDY, acting_alike
-from balancing.correction import Choice, Correction, MountDecision
+from balancing.correction_result import Choice, Correction, MountDecision
 from balancing.influence import in_order
-from balancing.prediction import shown
-from balancing.tables import reading_names, rms
+from balancing.printed_readings import reading_names, rms
+from balancing.weights_and_prediction import shown
 from balancing.what_if import worse_elsewhere
 from rotorid.base.text import capital, listing
 from rotorid.regression import solution

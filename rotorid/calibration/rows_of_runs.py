@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from balancing import RunErrors, Trials, reading_of, real_parts, usual_run_errors
-from balancing.noise import Noise, Whitening, kind_sizes, run_noise
+from balancing.error_draws import Noise, Whitening, kind_sizes, run_noise
 from fem import (
     MatrixChange,
     Rotor,

@@ -22,7 +22,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.record_residuals import Iterations, Problem
+from rotorid.identify.record_least_squares import Iterations, Problem
 from rotorid.identify.simulation import STEPWISE
 from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Combination, Estimate

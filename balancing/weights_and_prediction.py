@@ -15,8 +15,7 @@ from balancing.conventions import Labels
 from balancing.groups import Unknowns, mapped, static_and_couple
 from balancing.influence import Influence, Mounted, in_order
 from balancing.methods import Solution, method_words
-from balancing.regions import Region, half_width, reach
-from balancing.tables import (
+from balancing.printed_readings import (
     INVISIBLE,
     degrees,
     reading_columns,
@@ -27,6 +26,7 @@ from balancing.tables import (
     vector_columns,
     weight_columns,
 )
+from balancing.regions import Region, half_width, reach
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain

@@ -21,8 +21,8 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import RPM, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
-from rotorid.files.instruments import DERIVATIVE, read_samples
-from rotorid.files.problems import InputError, Problems, TableWarning, refusal
+from rotorid.files.input_problems import InputError, Problems, TableWarning, refusal
+from rotorid.files.instrument_formats import DERIVATIVE, read_samples
 from rotorid.files.settings import (
     Count,
     NotNegative,

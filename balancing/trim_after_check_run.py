@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from balancing.correction import Correction
+from balancing.choice_of_pieces import Mounted
+from balancing.correction_result import Correction
 from balancing.influence import in_order, match_readings
-from balancing.mount import Mounted
-from balancing.prediction import rms_change, shown
-from balancing.tables import reading_columns, rms, vector_columns, weight_rows
+from balancing.printed_readings import reading_columns, rms, vector_columns, weight_rows
 from balancing.trials import Trials
+from balancing.weights_and_prediction import rms_change, shown
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain

@@ -19,7 +19,7 @@ from rotorid.base.tables import csv_bytes
 from rotorid.base.text import listing
 from rotorid.files import units
 from rotorid.files.columns import Column, Table, read_table
-from rotorid.files.problems import InputError, Problems
+from rotorid.files.input_problems import InputError, Problems
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, optional
 from rotorid.files.units import one_of
 
