@@ -421,7 +421,17 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
 
 
 def decrements_of(lam: ComplexArray) -> FloatArray:
-    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding."""
+    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding.
+
+    Parameters
+    ----------
+    lam
+        Eigenvalues, rad/s, any shape.
+
+    Returns
+    -------
+    Decrements, of that shape.
+    """
     return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
 
 
