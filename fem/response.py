@@ -63,6 +63,7 @@ NEAR = (
     1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits, and an undamped rotor its limit
 )
 PIVOT = 1e-4  # of the equations of the supports: below, four digits are lost
+_STIFF = 1e6  # times the lowest λ: above, few digits of a mode are sure
 _DIGITS = 1e-12  # of the static contribution of the modes left out, to which their series goes
 
 
@@ -403,7 +404,8 @@ def unbalance_response(
     amplification is 70 to 900. A warning says where the mesh is too fine for six digits.
     """
     speeds = checked_speeds(speeds)
-    kept = np.array([rotor.node(n) for n in (range(1, rotor.n_nodes + 1) if nodes is None else nodes)])
+    every = range(1, rotor.n_nodes + 1)
+    kept = np.array([rotor.node(n) for n in (every if nodes is None else nodes)])
     masses: dict[int, complex] = {}
     for key, value in dict(unbalance).items():
         node, amount = rotor.node(key), complex(value)
@@ -414,7 +416,7 @@ def unbalance_response(
         raise ValueError("no unbalance is given: name at least one node")
     U, phasors = np.array(list(masses.values())), np.array([1.0, 1j])
     weights = np.column_stack((U.real, U.imag))  # one complex load is two real ones
-    receptance = Receptance(rotor, range(1, rotor.n_nodes + 1), list(masses), weights, speeds)
+    receptance = Receptance(rotor, every, list(masses), weights, speeds)
 
     def solve(speeds: FloatArray) -> Response:
         both = np.zeros((2, speeds.size, kept.size), dtype=complex)
@@ -621,15 +623,20 @@ class Series:
         m, available = 12, finite_modes(whole)
         while True:
             m = min(m, available)
-            self.modes = modes = lowest_modes(whole, m)
-            ratio = (top * top + modes.shift) / abs(modes.squares[-1] + modes.shift)
-            if m == available or ratio < 1 / 16:
+            modes = lowest_modes(whole, m)
+            size = np.abs(modes.squares + modes.shift)
+            highest = top * top + modes.shift
+            if m == available or highest < size[-1] / 16:
                 break
             m *= 2
+        # Of what is stiff beside its mass, rounding has the mass: the series needs none.
+        kept = int(np.count_nonzero(size <= max(16 * highest, _STIFF * size[0])))
+        self.modes = modes = modes.only(slice(kept))
+        ratio = highest / size[min(kept, m - 1)]
         V, signs, R = modes.vectors, np.where(modes.squares < 0, -1, 1), columns
         MV = multiply(whole.mass, V) * signs
         factors = [V[unknowns][:, None] * (columns.T @ V * signs)]
-        needed = 1 if m == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS)))
+        needed = 1 if kept == available else math.ceil(math.log(_DIGITS, max(ratio, _DIGITS)))
         for _ in range(needed):
             R = dpbtrs(modes.factor, R)[0]
             R = R - V @ (MV.T @ R)  # rounding must not bring the modes back

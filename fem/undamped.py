@@ -490,11 +490,6 @@ class Pencil:
         """Unknowns of the shaft that are deflections, shape (w, N)."""
         return self.shaft[:, :: self.matrices.stride]
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return int(self.mass.shape[1])
-
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
         S = [strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1]) for unknowns in self.shaft]
@@ -642,19 +637,26 @@ class Spectrum:
         return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
 
 
-def finite_modes(A: Matrices | Pencil) -> int:
-    """Number of modes with finite frequency: unknowns that move mass.
+def finite_modes(pencil: Pencil) -> int:
+    """Number of modes with finite frequency, the rank of the mass matrix.
+
+    It is the number of unknowns that move mass, but for tilts where there is shear and no rotary inertia.
+    The line w of the shaft depends on the slopes θ + γ alone: a tilt θ, with −θ as the shear angles γ beside
+    it, moves no mass, and only gyroscopic moments make it count.
 
     Parameters
     ----------
-    A
-        Matrices of a plane, or a pencil.
+    pencil
+        Stiffness and mass.
 
     Returns
     -------
     Their number.
     """
-    return int(np.count_nonzero(A.mass[-1]))
+    moved, model = pencil.mass[-1].copy(), pencil.rotor.model
+    if model.shear and not model.rotary_inertia:
+        moved[pencil.shaft[:, 1::4]] -= pencil.matrices.mass[-1, 1::4]
+    return int(np.count_nonzero(moved))
 
 
 def factor(pencil: Pencil) -> tuple[float, AnyArray]:
@@ -769,7 +771,7 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
     from scipy.linalg import lapack
 
     tbtrs = lapack.dtbtrs if np.isrealobj(U) else lapack.ztbtrs
-    size, block = pencil.size, 4  # equal frequencies are not missed
+    size, block = pencil.mass.shape[1], 4  # equal frequencies are not missed
     most = min(m + 1, size - rigid.shape[1])
 
     def operator(V: AnyArray) -> AnyArray:

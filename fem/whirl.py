@@ -231,7 +231,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
     ValueError
         If a support has no table at a speed, or the mesh is too fine for float64.
     """
-    most = finite_modes(P.A)
+    most = finite_modes(one_plane(P.rotor, P.A))
     modes = min(m // 2 + 3, most)  # of a plane; some more than asked for
     while True:
         spectrum, scale = reference(P, speeds, modes)
@@ -421,7 +421,17 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
 
 
 def decrements_of(lam: ComplexArray) -> FloatArray:
-    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding."""
+    """Logarithmic decrements; 0 of what neither grows nor decays, but for rounding.
+
+    Parameters
+    ----------
+    lam
+        Eigenvalues, rad/s, any shape.
+
+    Returns
+    -------
+    Decrements, of that shape.
+    """
     return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
 
 
@@ -497,5 +507,5 @@ def available_modes(rotor: Rotor) -> int:
     -------
     Their number.
     """
-    pedestals = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
-    return 2 * (finite_modes(assemble(rotor)) + pedestals)
+    pedestals = sum(bool(s.pedestal and s.pedestal.mass) for s in rotor.supports)
+    return 2 * (finite_modes(one_plane(rotor, assemble(rotor))) + pedestals)

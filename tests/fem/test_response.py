@@ -12,8 +12,10 @@ from fem_rotors import machines, rotor23, uniform
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from repetitions import FULL as WHOLE
+from scipy.linalg import eigh
 
 import fem
+from fem.assembly import assemble, dense
 
 FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 MASS, EI = 12.0, 2.1e11 * math.pi * 0.04**4 / 64
@@ -98,6 +100,26 @@ def test_fast_is_exact_is_dense(rotor, seed, uneven):
         assert not fast.backward.any()
         np.testing.assert_array_equal(fast.y, -1j * fast.x)
         np.testing.assert_array_equal(fast.major, fast.minor)
+
+
+@pytest.mark.parametrize("rotary_inertia", [False, True])
+@pytest.mark.parametrize("shear", [False, True])
+@given(machines(elements=(1, 4), tables=False))
+@settings(max_examples=10, deadline=None)
+def test_what_has_no_mass_is_no_mode_of_its_own(shear, rotary_inertia, rotor):
+    model = dataclasses.replace(rotor.model, shear=shear, rotary_inertia=rotary_inertia)
+    supports = [dataclasses.replace(support, pedestal=None) for support in rotor.supports]
+    rotor = dataclasses.replace(rotor, model=model, supports=supports)
+    pencil = fem.whole_rotor(rotor, assemble(rotor))
+    M, modes = dense(pencil.mass), fem.lowest_modes(pencil, fem.finite_modes(pencil))
+    size = np.sqrt(np.abs(M.diagonal()))
+    assert modes.squares.size == np.linalg.matrix_rank(M / np.outer(size, size), 1e-10)
+    mu = eigh(M, dense(pencil.stiffness), eigvals_only=True)
+    most = mu[np.argsort(-np.abs(mu))][: modes.squares.size]
+    np.testing.assert_allclose(1 / modes.squares, most, rtol=0, atol=1e-9 * abs(most[0]))
+    speeds = np.linspace(20.0, 2500.0, 7)
+    fast, exact = (solve(fem.unbalance_response, rotor, {1: 1.0}, speeds) for solve in SOLVERS.values())
+    np.testing.assert_array_less(np.abs(fast.x - exact.x).max(axis=1), 1e-7 * exact.largest)
 
 
 @pytest.mark.parametrize("method", SOLVERS)
