@@ -28,7 +28,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 
 UNLIKE = 1e-4
 """Chance below which no single weight leaves nothing at every reading."""
-_DRAWS, _MOST, _PLACES = 1000, 32, 8000
+_DRAWS, _MOST, _PLACES = 1000, 32, 4000
 """Draws of a minimum; choices; places of a weight."""
 _OPEN, _TINY = 3.0, 1e-300
 """Deviation of what is open, of the largest amplitude."""

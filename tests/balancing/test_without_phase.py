@@ -47,13 +47,10 @@ def misfit(T, a, s, places):
 
 
 def holds(answer, weights):
-    """Whether the printed intervals of a solution hold sizes and angles of all weights."""
-    for one in answer.solutions:
-        low, high, angle = one.intervals
-        size, off = np.abs(weights), np.abs(np.angle(weights / one.weights))
-        if ((low <= size) & (size <= high) & (off <= angle)).all():
-            return True
-    return False
+    """Whether the intervals of the first solution hold sizes and angles of weights."""
+    low, high, angle = answer.solutions[0].intervals
+    off = np.abs(np.angle(weights / answer.weights))
+    return ((low <= np.abs(weights)) & (np.abs(weights) <= high) & (off <= angle)).all()
 
 
 def polar(weight):
@@ -78,26 +75,20 @@ def test_three_points_as_printed():
     assert answer.sound
 
 
-def two_point_method(a, b, c, mass):
-    """A. Lindholm's (a reliability forum, quoted on eng-tips): size, and angle to either side of the trials.
-
-    Sides b, c and 2a are a triangle's: d² = 2b² + 2c² − 4a²; test mass : balancing mass = d : 2a.
-    """
-    d = np.sqrt(2 * b**2 + 2 * c**2 - 4 * a**2)
-    cosine = (a**2 + (d / 2) ** 2 - b**2) / (a * d)
-    return mass * 2 * a / d, np.arccos(cosine)
-
-
 def test_two_points_as_printed():
+    """A. Lindholm's (a reliability forum, quoted on eng-tips): test mass : balancing mass = d : 2a.
+
+    Readings a of the bare rotor, b and c with the mass at 0° and 180°: sides b, c and 2a are a triangle's,
+    d² = 2b² + 2c² − 4a². By the law of cosines its angles, to either side, are those of the solutions.
+    """
     rng = np.random.default_rng(20)
-    for _ in range(20):
-        mass, place, scale = rng.uniform(0.5, 2.0), np.exp(1j * rng.uniform(-3, 3)), rng.uniform(1, 20)
-        correction = rng.uniform(0.5, 2.0) * place
-        a, b, c = scale * np.abs(np.array([0, mass, -mass]) - correction)
+    for mass, size, place, scale in rng.uniform((0.5, 0.5, 0, 1), (2, 2, 2 * np.pi, 20), (20, 4)):
+        a, b, c = scale * np.abs(np.array([0, mass, -mass]) - size * np.exp(1j * place))
+        d = np.sqrt(2 * b**2 + 2 * c**2 - 4 * a**2)
+        turn = np.exp(1j * np.arccos((a**2 + d**2 / 4 - b**2) / (a * d)))
         answer = balance_without_phase(job([a, b, c], AT[180], mass, errors=ReadingErrors(0.02)))
-        size, angle = two_point_method(a, b, c, mass)
         both = sorted((one.weights[0] for one in answer.solutions), key=np.angle)
-        assert both == pytest.approx([size * np.exp(-1j * angle), size * np.exp(1j * angle)], abs=1e-6)
+        assert both == pytest.approx(2 * a / d * mass * np.array([turn.conj(), turn]), abs=1e-6)
 
 
 def test_impossible_amplitudes_are_named():

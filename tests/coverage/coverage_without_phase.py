@@ -94,7 +94,7 @@ def shares(found):
 
 def main(jobs=1000):
     """Print the table."""
-    print(f"{'':<40}" + "".join(f"{head:>8}" for head in ("holds", "sizes", "angles", "mount", "worse")))
+    print(" " * 43 + "holds   sizes  angles   mount   worse")
     for name, *line in LINES:
         found = simulate(jobs if line[1] == 1 else max(jobs // 5, 1), *line)
         print(f"{name:<40}" + "".join(f"{100 * share:>8.1f}" for share in shares(found)), flush=True)

@@ -98,11 +98,9 @@ def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
         assert test["chi_square"] > 10 * test["chi_square_other"]
         assert outcome.json["warnings"][0].startswith(f"these runs contradict '{own}'")
         assert f"'{other}' fits" in outcome.json["warnings"][0]
-        judgement = outcome.json["judgement"]
-        assert judgement["word"] == "do not mount"
-        assert judgement["cause"] == outcome.json["warnings"][0]
-        text = " ".join(cli("balance", *files, *said(*given), *errors).out.split())
-        assert text.startswith(f"Do not mount these weights: {judgement['cause']}.")
+        assert outcome.json["judgement"]["word"] == "do not mount"
+        text = cli("balance", *files, *said(*given), *errors).out
+        assert text.startswith(f"Do not mount these weights: these runs contradict '{own}'")
         if given[0] is None:
             right = on_the_tape(outcome.json["other_readings"], "with")
             np.testing.assert_allclose(right, BEST, atol=0.1 * np.abs(BEST).max())
