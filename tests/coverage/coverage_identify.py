@@ -138,7 +138,7 @@ def main(repetitions: int = 2000) -> None:
     print(f"{repetitions} repetitions; coverage of 95 % intervals, bias / std, std / |value|, ± / Cramér–Rao")
     for case in (task_5_1(), two_masses(), near_resonance()):
         print(f"\n{case.title}")
-        for method in ("equation-error", "output-error"):
+        for method in ("equation-error", "output-error")[0 if "near" in case.title else 1 :]:
             for stated in (True, False):
                 found = repeat(case, method, repetitions, stated=stated)
                 words = f"{method}, errors {'stated' if stated else 'not stated'}"
