@@ -400,11 +400,16 @@ class Correction(Prediction, Answered):
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         return f"Vibration{unit}, bare rotor before and predicted after\n{text(columns, left=2)}"
 
+    @property
+    def error_sentence(self) -> str:
+        """Errors of readings and between runs in one or two sentences."""
+        return error_words(self.influence.reading, self.influence.run_errors, self.labels)
+
     def _quality_text(self) -> str:
         """What the method makes small, what is determined, and with what errors."""
         lines = [self.method_in_words, self.conditioning.sentence()]
         if self.errors_known:
-            lines.append(error_words(self.influence.reading, self.influence.run_errors, self.labels))
+            lines.append(self.error_sentence)
         return "\n".join(fill(line, WIDTH) for line in lines)
 
 

@@ -140,14 +140,20 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
         relative, floor = whole * np.sqrt(1 - run.evenly), whole * np.sqrt(run.evenly) * run.level
         between = {f"{100 * relative:.2g} %": relative, labels.amplitude_words(floor): floor}
     stated, changes = (", ".join(w for w, size in each.items() if size) for each in (parts, between))
+    if reading.source == "residuals":
+        return f"One standard deviation of a reading and from run to run in one: {changes} ({run.origin})."
     out = f"One standard deviation of a reading: {stated or 'not known'} ({reading.source})"
     out += f"; from run to run: {changes} ({run.origin})" if changes else ""
     return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:
-    """Errors of a reading and between runs in numbers; amplitudes in the job's unit."""
-    e, scale = reading.errors, labels.vibration_scale
+    """Errors of a reading and between runs in numbers; amplitudes in the job's unit.
+
+    Where the runs tell both in one ("residuals"), those of a reading are None.
+    """
+    e = None if reading.source == "residuals" else reading.errors
+    scale = labels.vibration_scale
     whole = float(np.linalg.norm(run.typical))
     return {
         "source": reading.source,

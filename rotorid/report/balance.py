@@ -28,14 +28,6 @@ if TYPE_CHECKING:
     Headings = Mapping[str, tuple[str, Callable[[Any], str]]]
     """Heading and text of each column, by the key of its values in rows of the document."""
 
-_SOURCES = {
-    "stated": "as stated in the job",
-    "measured": "as the instrument measured them, reading by reading",
-    "repeats": "from repeated readings",
-    "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
-    "residuals": "from the disagreement of the runs",
-    "assumed": "assumed: nobody states them, and nothing measures them",
-}
 _HEAD = ("machine", "place", "date", "engineer", "instrument")
 _TWO, _THREE, _FOUR = (partial(figures, digits=n) for n in (2, 3, 4))
 LONG = 10**6
@@ -96,7 +88,7 @@ def balance_report(
         head={key: getattr(head, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD},
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
-        source=_SOURCES.get(result.influence.reading.source, ""),
+        errors=result.error_sentence,
         method=f"{result.method_in_words} {result.conditioning.sentence()}",
         seen=conventions_explained.seen_from(labels),
         conventions=conventions_explained.words(labels, places, key),
