@@ -28,14 +28,6 @@ if TYPE_CHECKING:
     Headings = Mapping[str, tuple[str, Callable[[Any], str]]]
     """Heading and text of each column, by the key of its values in rows of the document."""
 
-_SOURCES = {
-    "stated": "as stated in the job",
-    "measured": "as the instrument measured them, reading by reading",
-    "repeats": "from repeated readings",
-    "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
-    "residuals": "from the disagreement of the runs",
-    "assumed": "assumed: nobody states them, and nothing measures them",
-}
 _HEAD = ("machine", "place", "date", "engineer", "instrument")
 _TWO, _THREE, _FOUR = (partial(figures, digits=n) for n in (2, 3, 4))
 LONG = 10**6
@@ -79,16 +71,15 @@ def balance_report(
     angles = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
-    first = Path(job.files[0]).resolve()
-    names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
+    name = job.settings.machine or Path(job.files[0]).resolve().parent.name
     answers = [part.answer for part in (verdict, zones) if part]
     judged = [words for one in answers for words in (one.numbers, *one.tables) if words]
-    plain, head = left is None and mounted is None, job.settings.sheet
+    head = job.settings.sheet
     trim = left is not None and left.word == "trim"
     return render_report(
         "balance.html",
         document,
-        title=f"Balancing sheet: {', '.join(filter(None, names))}",
+        title=f"Balancing sheet: {name}",
         warnings=list(map(sentence, answer.warnings)),
         notes=" ".join(map(sentence, answer.notes)),
         provenance=provenance,
@@ -96,7 +87,6 @@ def balance_report(
         head={key: getattr(head, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD},
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
-        source=_SOURCES.get(result.influence.reading.source, ""),
         method=f"{result.method_in_words} {result.conditioning.sentence()}",
         seen=conventions_explained.seen_from(labels),
         conventions=conventions_explained.words(labels, places, key),
@@ -107,7 +97,6 @@ def balance_report(
             inline_svg(figure, f"What goes into plane {plane}")
             for plane, figure in _discs(result, job, mounted, left).items()
         ],
-        unsplit=[plane for plane in result.planes if plain and plane in job.holes],
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
         next_run=html(_with_blanks(next_run(document, labels)), LONG) if trim else "",
@@ -205,9 +194,7 @@ def _weights(document: Mapping[str, Any], c: Correction, job: Job) -> Table:
             for plane, weight in zip(c.planes, c.weights, strict=True)
         ]
         columns.append(Column(f"{unit} at radius", masses, _FOUR))
-    held = [plane for plane, limit in zip(c.planes, c.held, strict=True) if limit]
-    note = f"At its limit: {', '.join(held)}." if held else ""
-    return Table("", tuple(columns), note)
+    return Table("", tuple(columns))
 
 
 def trim_table(document: Mapping[str, Any], labels: Labels) -> Table:
