@@ -83,6 +83,12 @@ class Mounted(Answered):
         """What the pieces of each plane add up to, (P,)."""
         return self.discrete.weights
 
+    @property
+    def expected(self) -> float:
+        """Root mean square in a check run, errors included where they are known."""
+        errors = np.trace(np.nan_to_num(self.correction.after_covariance), axis1=-2, axis2=-1)
+        return float(np.sqrt(np.mean(np.abs(self.after) ** 2 + errors)))
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels
@@ -101,6 +107,7 @@ class Mounted(Answered):
                 "holes": records(_columns(self)),
                 "residuals": records(residuals),
                 **self._left(self.discrete),
+                "rms_after_95": self.check_rms * labels.vibration_scale,
             }
         )
 
@@ -126,9 +133,12 @@ class Mounted(Answered):
         if c.errors_known:
             most = figures(self.check_rms * labels.vibration_scale, 2)
             left += f"; a check run stays below {most} in 95 of 100"
-        stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
+        run = self.on_top_of
+        stays = (
+            "with all trial weights taken off" if run is None else f"beside what is mounted in run {run!r}"
+        )
         lines = [
-            f"Pieces in {labels.weight_in}{stays}:",
+            f"Pieces in {labels.weight_in}, {stays}:",
             *(f"  {line}" for line in self.in_planes()),
             f"{capital(labels.turning_in_words())}: {self._first_holes()}.",
             "",

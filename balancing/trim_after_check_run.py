@@ -69,6 +69,11 @@ class LeftToDo(Answered):
     within: FloatArray
     pieces: Mounted | None = None
 
+    @property
+    def now(self) -> float:
+        """Root mean square of the last check run."""
+        return rms(self.check.mean[-1])
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units; readings as they were read, and predicted with the trim."""
         labels, check = self.correction.labels, self.check

@@ -107,7 +107,7 @@ class WhatIf(Outlook, Answered):
             left += f" ± {figures(self.rms_within * scale, 2)}"
             bound = f", below {three_figures(self.check_rms * scale)} in 95 of 100 check runs"
         each = self.work_words(self.planes, self.weights)
-        first = f"{capital(self.word)}: with these weights rms {left} {unit}".rstrip() + f"{bound}."
+        first = f"{capital(self.word)} on the bare rotor: rms {left} {unit}".rstrip() + f"{bound}."
         on = f"On the bare rotor: {'; '.join(each) or 'nothing'}; {labels.turning_in_words()}."
         shown = f"Bare rotor, and with these weights, {unit}".rstrip(" ,")
         table = f"{shown}:\n{text(self.columns(), left=2)}"

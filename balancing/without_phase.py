@@ -161,7 +161,7 @@ class WithoutPhase(Answered):
             {
                 "judgement": self.decision.to_dict(labels),
                 "method": "without phase",
-                "conventions": labels.conventions(),
+                "conventions": {**labels.conventions(), "phase": None},
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
                 "corrections": corrections[0],
                 "solutions": [
@@ -176,7 +176,9 @@ class WithoutPhase(Answered):
                 "chi_square": self.scatter.chi_square,
                 "chi_square_dof": self.scatter.dof,
                 "errors": {"amplitude_percent": 100 * self.scatter.relative, "origin": self.scatter.origin},
-                "next_run": {
+                "next_run": None
+                if self.sound
+                else {
                     "plane": self.next_run[0],
                     **labels.weight_entry(self.next_run[1]),
                     **({"hole": self.next_run[2]} if self.next_run[2] else {}),

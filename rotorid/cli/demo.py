@@ -12,12 +12,12 @@ from typing import Annotated
 import typer
 
 _COPIED = (".csv", ".toml", ".md", ".txt")
-STEPS = {
-    "critical": "critical {}/rotor23.csv --plot {}/modes.png",
-    "balance": "balance {}/turbo_job/job.toml --plot {}/balance.png",
-    "reduce": "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --plot {}/reduction.png",
-}
-"""What is typed after `rotorid`, where {} is the folder, by the keys of the document."""
+STEPS = (
+    "critical {}/rotor23.csv --plot {}/modes.png",
+    "balance {}/turbo_job/job.toml --plot {}/balance.png",
+    "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --plot {}/reduction.png",
+)
+"""What is typed after `rotorid`, where {} is the folder."""
 
 
 def demo(
@@ -31,16 +31,14 @@ def demo(
     """
     from rotorid.cli import application
 
-    commands = {
-        key: [word.replace("{}", str(folder)) for word in line.split()] for key, line in STEPS.items()
-    }
-    pictures = [words[-1] for words in commands.values()]
+    commands = [[word.replace("{}", str(folder)) for word in line.split()] for line in STEPS]
+    pictures = [words[-1] for words in commands]
     _copy(folder, [Path(picture) for picture in pictures])
-    typed = [shlex.join(["rotorid", *words]) for words in commands.values()]
-    for number, (line, words) in enumerate(zip(typed, commands.values(), strict=True), start=1):
+    for number, words in enumerate(commands, start=1):
         with contextlib.redirect_stdout(io.StringIO()) as text:
             application(words)(words, prog_name="rotorid", standalone_mode=False)
-        typer.echo("\n".join([f"{number}. {line}", *text.getvalue().splitlines()[:6]]))
+        typed = shlex.join(["rotorid", *words])
+        typer.echo("\n".join([f"{number}. {typed}", *text.getvalue().splitlines()[:6]]))
     typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")
 
 

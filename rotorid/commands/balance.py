@@ -109,6 +109,8 @@ class Balance(Outcome):
         if mounted:
             elsewhere = "\n".join(result.decision.elsewhere)
             weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
+        elif sound and {*result.planes} & {*job.holes}:
+            weights = replace(weights, judgement=f"{weights.judgement}\nIn holes: --split.")
         judged = [*limits, *([mounted.answer] if mounted else [])]
         return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
 
@@ -117,10 +119,13 @@ class Balance(Outcome):
         parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
         parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
         document: dict[str, Any] = self.result.to_dict()
+        judgement, scale = document["judgement"], self.result.labels.vibration_scale
         if (left := self.left) is not None:  # what is mounted is not to be mounted again
-            counted = left.correction.judgement.to_dict(left.correction.labels)
-            expected = counted["rms_expected"] if left.word == "trim" else None
-            document["judgement"].update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
+            expected = left.correction.judgement.expected * scale if left.word == "trim" else None
+            judgement.update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
+            judgement["rms_before"] = left.now * scale
+        elif self.mounted:
+            judgement["rms_expected"] = self.mounted.expected * scale
         return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:

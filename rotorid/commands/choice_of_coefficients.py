@@ -80,8 +80,7 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
         baseline = unknowns(job.groups, job.influence.planes).of_runs(job.trials)
     measured = job.influence or (refine(job.trials, check) if check else estimate_influence(job.trials))
     if kind == "combined":
-        calibrated = job.rotor is not None and job.rotor.calibration
-        measured = combine(measured, as_measured(job, computed(job, 0.0 if calibrated else MODEL_ERROR)))
+        measured = combine(measured, as_measured(job, _with_errors(job)))
     return measured, baseline
 
 
@@ -123,8 +122,11 @@ def of_planes(
 
 def stored(job: Job, kind: str | None) -> Influence | None:
     """Coefficients that no runs of the job need tell: stored ones, or computed ones where these are meant."""
-    if kind != "computed":
-        return job.influence
+    return _with_errors(job) if kind == "computed" else job.influence
+
+
+def _with_errors(job: Job) -> Influence:
+    """Computed coefficients with the errors of a calibration, else those of a model."""
     return computed(job, 0.0 if job.rotor and job.rotor.calibration else MODEL_ERROR)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotorid.base.text import listing
 from rotorid.commands.option_values import check_names, number, pairs
 from rotorid.report.options import check_choices, file_of, refuse
 from rotorid.report.outcome import EQUATIONS, WITH_REPORT, Outcome, command, outcome_of
@@ -206,7 +205,6 @@ def sigmas(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     from rotorid.files.cells import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
-        check_names((name,), "--sigma", outputs, "output")
         value = number(text)
         with contextlib.suppress(NotANumber):
             check_size(value)
@@ -217,8 +215,7 @@ def sigmas(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     if isinstance(given, float | int) or (isinstance(given, str) and not {"=", ","} & set(given)):
         given = ",".join(f"{name}={given}" for name in outputs)
     deviations = pairs(_texts(given), "--sigma", positive, "y1=0.01,y2=0.02")
-    if lost := [name for name in outputs if name not in deviations]:
-        raise ValueError(f"--sigma: the standard deviation of {listing(lost, 'and')} is missing")
+    check_names(deviations, "--sigma", outputs, "output", needed=outputs)
     return deviations
 
 

@@ -79,7 +79,7 @@ def length(given: Amount, what: str, example: str = "100mm") -> float:
 
 def size(given: Amount, what: str, example: str = "100mm") -> float:
     """Read "8mm" as a length above 0, m."""
-    return _above_zero(length(given, what, example), given, what, example)
+    return above_zero(length(given, what, example), given, what, example)
 
 
 def speed_with_unit(given: Amount, what: str) -> float:
@@ -126,7 +126,7 @@ def weight(
     """
     unit = labels.weight_unit
     amount = _weight(given, what, example) if isinstance(given, str) else (given, _si(unit))
-    _above_zero(amount[0], given, what, example)
+    above_zero(amount[0], given, what, example)
     converted = units.in_job_units(Quantity(what, *amount), unit, radius)
     if converted is None:
         raise ValueError(
@@ -177,7 +177,7 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
 
 
 def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[str, complex]:
-    """Read "left=5g@120; right=10g#3+4@90": at angles as the job counts them, or in its holes.
+    """Read "left=5g@120; right=10g#3+4@90": at angles as the job counts them, or in its holes; all add.
 
     Without a unit in that of the job's weights. Where material is removed it is the place to remove it from.
 
@@ -195,10 +195,10 @@ def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[s
         size, sign, place = match.groups()
         size += labels.weight_unit * (not any(map(str.isalpha, size)))
         mass = weight(size, what, labels, job.planes[plane].radius)
-        if sign == "#":
-            at = holes[one_of(place, f"{what}: hole of {plane}", tuple(holes) or ("none in the job",))]
-        else:
-            at = degrees(place, what)
+        if sign == "#" and place not in holes:
+            there = f"holes are {next(iter(holes))} to {[*holes][-1]}" if holes else "the job states none"
+            raise ValueError(f"{what}: there is no hole {place} in plane {plane!r}: {there}")
+        at = holes[place] if sign == "#" else degrees(place, what)
         removed = -1 if job.planes[plane].remove else 1
         return removed * complex(labels.weight_from(mass, radians(at)))
 
@@ -206,8 +206,13 @@ def mounted_weights(job: Job, given: Mounted, what: str = "--weights") -> dict[s
         one_of(plane, what, tuple(job.planes))
         return sum((one(plane, part) for part in _AND.split(text)), 0j)
 
-    several = given.split(";" if ";" in given else ",") if isinstance(given, str) else given
-    return pairs(several, what, read, example)
+    if isinstance(given, Mapping):
+        return pairs(given, what, read, example)
+    total = dict[str, complex]()
+    for part in given.split(";" if ";" in given else ",") if isinstance(given, str) else given:
+        for plane, added in pairs([part], what, read, example).items():
+            total[plane] = total.get(plane, 0j) + added
+    return total
 
 
 def limited(job: Job, max_mass: Weights | None, limits: Amplitudes) -> Job:
@@ -295,11 +300,12 @@ def _limits(
                 f"{listing(map(repr, there), 'and')}"
             )
         value, unit = read_with_unit(text, what, unit_of, example) if isinstance(text, str) else (text, si)
-        limits[name] = Quantity(f"{what} {text!r}", _above_zero(value, text, what, example), unit)
+        limits[name] = Quantity(f"{what} {text!r}", above_zero(value, text, what, example), unit)
     return limits
 
 
-def _above_zero(value: float, given: object, what: str, example: str) -> float:
+def above_zero(value: float, given: object, what: str, example: str) -> float:
+    """A value above 0; ValueError for another."""
     if not value > 0:
         raise ValueError(f"{what} {str(given).strip()!r}: expected a value above 0, such as {example}")
     return value

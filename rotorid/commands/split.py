@@ -23,7 +23,7 @@ _WAYS = ("holes", "two", "drill", "planes")
 _OF_HOLES = ("pieces", "per_hole", "taken")
 _APART, _MOST = 1e-3, 1000
 """Degrees between holes that count as one; holes at most."""
-_GOOD_ENOUGH = 0.2
+GOOD_ENOUGH = 0.2
 """The fewest pieces whose error is at most this, or at most 1.2 times the least."""
 
 
@@ -129,7 +129,7 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
 def _in_holes(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:
     from balancing.one_weight import split as in_holes
 
-    return in_holes(target, _holes(labels, radius, options), good_enough=_GOOD_ENOUGH)
+    return in_holes(target, _holes(labels, radius, options), good_enough=GOOD_ENOUGH)
 
 
 def _at_two_angles(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OneWeight:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, get_args
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, get_args
 from rotorid.base.answer import together
 from rotorid.base.text import SHORT_ANGLES, Angles, Phase
 from rotorid.commands.choice_of_coefficients import choose, used_planes
-from rotorid.commands.option_units import read_with_unit, size, speed_with_unit
+from rotorid.commands.option_units import above_zero, quantity, size, speed_with_unit
 from rotorid.commands.option_values import Names, degrees, names, number, one_of
 from rotorid.files import units
 from rotorid.report.options import job_source, refuse
@@ -108,8 +108,11 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
         refuse(options, ("plane",), "needs a job with coefficients")
         weights = [_from_force(options, carried)]
     else:
-        why = "is for a trial weight without a job, which has phases, speeds and coefficients"
-        refuse(options, _WITHOUT_JOB, why)
+        refuse(
+            options,
+            _WITHOUT_JOB,
+            "is for a trial weight without a job, which has phases, speeds and coefficients",
+        )
         read = job_source(job, options.phase, options.angles)
         weights, files = _from_job(read, options, carried), read.files
     return outcome_of(
@@ -128,14 +131,12 @@ def trial_weight(job: Job | Path | str | None = None, options: TrialWeightOption
 
 def _load(given: Amount) -> float:
     """Read "250kg" or "2500N" in N."""
-    amount = given if not isinstance(given, str) else 0.0
-    if isinstance(given, str):
-        load_units = units.MASS | units.FORCE
-        value, unit = read_with_unit(given, "--load", units.one_of(load_units), "250kg or 2500N")
-        amount = unit.to_si(value) * (units.STANDARD_GRAVITY if unit.kind == "mass" else 1.0)
-    if not amount > 0:
-        raise ValueError(f"--load {given!r}: expected a value above 0, such as 250kg or 2500N")
-    return amount
+    weights = {
+        name: replace(unit, multiply=unit.multiply * units.STANDARD_GRAVITY)
+        for name, unit in units.MASS.items()
+    }
+    example = "250kg or 2500N"
+    return above_zero(quantity(given, "--load", weights | units.FORCE, example), given, "--load", example)
 
 
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:

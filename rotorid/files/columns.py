@@ -44,7 +44,7 @@ TEXT, UNCLEAR = Unit("", "text"), Unit("?", "unclear")
 """Of a column of names, and of one whose unit is none."""
 FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 Source = str | Path | Grid | tuple[Path, ...]
-"""A table: a file, the cells of a sheet, or, of runs, files with one run each."""
+"""A table: a file, the cells of a sheet, or files: of runs with one run each, of weights that add."""
 
 
 @dataclass(frozen=True)

@@ -349,12 +349,18 @@ def _stating(
 
 
 def tables_of(written: WrittenJob, settings: JobSettings) -> tuple[dict[str, Source], tuple[Path, ...]]:
-    """What tables there are, by `TABLES`, and the files with one run each."""
+    """What tables there are, by `TABLES`, and the files of those of several files."""
     runs = tuple(written.folder / name for name in settings.runs or ())
-    named = {key: written.folder / name for key, name in named_tables(vars(settings)).items()}
+    named: dict[str, Source] = {
+        key: written.folder / name for key, name in named_tables(vars(settings)).items()
+    }
     table = runs[0] if runs else written.tables["runs"]
     files = runs if len(runs) > 1 else files_of_runs(table)
-    return {**named, **written.tables, "runs": files or table}, files
+    several = settings.check_weights if isinstance(settings.check_weights, tuple) else ()
+    mounted = tuple(written.folder / name for name in several)
+    if mounted:
+        named["check_weights"] = mounted
+    return {**named, **written.tables, "runs": files or table}, (*files, *mounted)
 
 
 def _readings(

@@ -99,6 +99,10 @@ def _or_one(value: object) -> object:
     return value if isinstance(value, dict) or ":" in str(value) else {"": value}
 
 
+def _one_or_all(names: tuple[str, ...]) -> str | tuple[str, ...]:
+    return names[0] if len(names) == 1 else names
+
+
 def _share(value: object) -> tuple[float, float]:
     """A ratio at an angle in degrees, "0.8@180"; without an angle at 0."""
     ratio, _, angle = str(value).partition("@")
@@ -371,9 +375,11 @@ class JobSettings(Settings):
     influence: File | None = optional("stored coefficients instead of trial runs, or beside them")
     rotor: File | None = optional("a rotor table or file: coefficients are computed")
     check: File | None = optional("runs table of a check run, with the proposed weights mounted")
-    check_weights: File | None = optional(
+    check_weights: listed(File, _one_or_all) | None = optional(  # type: ignore[valid-type]
         "weights table of the check run, where others were mounted than proposed: the pieces of `--split` "
-        'where there are holes, else the weights; `"weights"`: these, although there are holes',
+        "where there are holes, else the weights; or a list of tables whose weights add, as of the first "
+        'pieces and of a trim; `"weights"`: the weights, although there are holes',
+        expected='a weights table, or several that add, check_weights = ["pieces.csv", "trim.csv"]',
     )
     slow_roll: File | None = optional("a runs table of one run at slow speed, subtracted from every reading")
     key_phasor: KeyPhasor | None = optional("where the key phasor stands, see below")

@@ -64,7 +64,7 @@ def read_weights(
     Parameters
     ----------
     source
-        A file, or the cells of a sheet.
+        A file, the cells of a sheet, or several files whose weights add.
     runs
         Names of the runs; None if they could not be read, so that nothing is said about them.
     conventions
@@ -72,6 +72,33 @@ def read_weights(
     problems
         Collects the complaints.
     """
+    if not isinstance(source, tuple):
+        return _read_table(source, runs, conventions, problems)
+    read = [_read_table(one, runs, conventions, problems) for one in source]
+    tables = [one for one in read if one is not None]
+    if len(tables) < len(read):
+        return None
+    first, rows = tables[0], tuple(row for one in tables for row in one.rows)
+    for file, one in zip(source, tables, strict=True):
+        if one.unit.kind != first.unit.kind:
+            problems.add(
+                f"weights that add to those of {source[0]}, in {first.unit.name}",
+                file,
+                None,
+                "weight",
+                one.unit.name,
+            )
+    planes = tuple(dict.fromkeys(plane for one in tables for plane in one.planes))
+    total = np.zeros((len(first.weights), len(planes)), dtype=complex)
+    for one in tables:
+        total[:, [planes.index(plane) for plane in one.planes]] += one.weights
+    return replace(first, planes=planes, weights=total, rows=rows)
+
+
+def _read_table(
+    source: Source, runs: tuple[str, ...] | None, conventions: Conventions, problems: Problems
+) -> Weights | None:
+    """Of one table."""
     find, before = partial(find_header, weights=True), len(problems)
     unknown = _Unknown()
     try:

@@ -71,16 +71,15 @@ def balance_report(
     angles = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
     places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
-    first = Path(job.files[0]).resolve()
-    names = [first.parent.name, first.stem] if first.stem not in ("job", "runs") else [first.parent.name]
+    name = job.settings.machine or Path(job.files[0]).resolve().parent.name
     answers = [part.answer for part in (verdict, zones) if part]
     judged = [words for one in answers for words in (one.numbers, *one.tables) if words]
-    plain, head = left is None and mounted is None, job.settings.sheet
+    head = job.settings.sheet
     trim = left is not None and left.word == "trim"
     return render_report(
         "balance.html",
         document,
-        title=f"Balancing sheet: {', '.join(filter(None, names))}",
+        title=f"Balancing sheet: {name}",
         warnings=list(map(sentence, answer.warnings)),
         notes=" ".join(map(sentence, answer.notes)),
         provenance=provenance,
@@ -99,7 +98,6 @@ def balance_report(
             inline_svg(figure, f"What goes into plane {plane}")
             for plane, figure in _discs(result, job, mounted, left).items()
         ],
-        unsplit=[plane for plane in result.planes if plain and plane in job.holes],
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
         next_run=html(_with_blanks(next_run(document, labels)), LONG) if trim else "",
@@ -197,9 +195,7 @@ def _weights(document: Mapping[str, Any], c: Correction, job: Job) -> Table:
             for plane, weight in zip(c.planes, c.weights, strict=True)
         ]
         columns.append(Column(f"{unit} at radius", masses, _FOUR))
-    held = [plane for plane, limit in zip(c.planes, c.held, strict=True) if limit]
-    note = f"At its limit: {', '.join(held)}." if held else ""
-    return Table("", tuple(columns), note)
+    return Table("", tuple(columns))
 
 
 def trim_table(document: Mapping[str, Any], labels: Labels) -> Table:

@@ -17,6 +17,7 @@ _PHASES = {
     "lag": "lag: the angle by which the rotor turns from the pulse to the next positive peak of the sensor.",
     "lead": "lead: the angle by which the rotor turns from a positive peak of the sensor to the next pulse.",
 }
+_AMPLITUDES = {"pp": "from peak to peak", "rms": "rms"}
 
 
 def seen_from(labels: Labels) -> str:
@@ -53,11 +54,8 @@ def words(labels: Labels, places: Mapping[str, float], key_phasor: float | None)
         angles = f"degrees from the mark, {labels.angle_words}{end}, {labels.side} the rotation."
     key = "its place is not stated" if key_phasor is None else f"it stands at {stated(key_phasor)} from x"
     sensors = "; ".join(f"{name} at {stated(angle)}" for name, angle in places.items())
-    unit, kind = labels.vibration_unit, "peak amplitude"
-    if unit.endswith("_pp"):
-        kind = "from peak to peak"
-    elif unit.endswith("_rms"):
-        kind = "rms"
+    unit = labels.vibration_unit
+    kind = _AMPLITUDES.get(unit.rpartition("_")[2], "peak amplitude")
     kind = f" ({kind})" if unit in units.VIBRATION else ""
     at = "mass times radius: divide by the radius to get the mass" if labels.unbalances else "at its radius"
     return {

@@ -161,8 +161,8 @@ def _linear_about_last(result: Fit) -> Equations:
     rates, _, _ = _as_written(model)
     rows: list[Row] = []
     for i, f in enumerate(rates):
-        rows += [Row("f_x", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in x]
-        rows += [Row("f_θ", [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]) for by in thetas]
+        for name, by in [*(("f_x", by) for by in x), *(("f_θ", by) for by in thetas)]:
+            rows.append(Row(name, [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]))
     for i, f in enumerate(rates):
         slopes = [usual(f.diff(by)) for by in x]
         for j, theta in enumerate(thetas):

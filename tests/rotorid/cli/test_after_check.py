@@ -38,3 +38,20 @@ def test_words_that_go_with_what_is_printed(cli):
     stated = cli("balance", BK, "--errors", "2,1", "--limit", "5").out
     assert "and the\n  ± are smaller, those of readings alone" in stated
     assert "other limits" not in stated
+
+
+def test_the_judgement_after_a_check_run_begins_with_what_it_read(cli):
+    found = cli("balance", CHECKED, "--json").json
+    assert found["judgement"]["rms_before"] == pytest.approx(0.4127, abs=1e-4)
+    assert "rms 0.413 →" in found["judgement"]["cause"]
+
+
+def test_pieces_have_their_own_expectation(cli):
+    job = CHECKED.with_name("holes.toml")
+    plain, split = (cli("balance", job, *more) for more in ((), ("--split",)))
+    assert plain.out.splitlines()[1] == "In holes: --split."
+    assert "with all trial weights taken off" in split.out
+    found = cli("balance", job, "--split", "--json").json
+    left, bound = found["mounting"]["rms_after"], found["mounting"]["rms_after_95"]
+    assert f"below {bound:.2g} in 95 of 100" in split.out
+    assert left < found["judgement"]["rms_expected"] < bound

@@ -135,7 +135,7 @@ def test_standard_deviations_are_stated_once(cli, tmp_path):
     refused(cli("fit", model, record, "--sigma", "0.1"), "column y_std", "together with --sigma")
     bare = saved(tmp_path, "bare.csv", "t_s,y,z\n0,1,2\n1,0.5,1\n2,0.26,0.5\n")
     refused(cli("fit", model, record, bare), f"{bare} has no columns NAME_std, but {record} has")
-    refused(cli("fit", model, bare, "--sigma", "y=1"), "the standard deviation of z is missing")
+    refused(cli("fit", model, bare, "--sigma", "y=1"), "the value of z is missing")
     assert cli("fit", model, bare, "--sigma", "y=1, z=2e-3").code == 0
 
 

@@ -18,7 +18,7 @@ def rows(name, size, phase):
 def test_weights_that_a_note_prints_leave_nothing(cli):
     """Brüel & Kjær 17-227."""
     ran = cli("balance", BK, "--errors", "2,1", "--weights", PRINTED)
-    assert ran.out.startswith("Better: with these weights rms 10.8 → 0.00")
+    assert ran.out.startswith("Better on the bare rotor: rms 10.8 → 0.00")
     assert "1 2.951 g at 50.2°; 2 2.844 g at 278.1°" in ran.out
     found = cli("balance", BK, "--errors", "2,1", "--weights", PRINTED, "--json").json
     usual = cli("balance", BK, "--errors", "2,1", "--json").json
@@ -59,7 +59,7 @@ def test_pieces_in_holes_are_judged_as_those_of_split(cli):
         (("--weights", "left=3"), "'3': a weight at an angle or in a hole, such as"),
         (("--weights", "lft=3@4"), "did you mean 'left'?"),
         (("--weights", "left=1g@4"), "converts only with --radius or radius_mm"),
-        (("--weights", "left=3#9"), "hole of left '9'"),
+        (("--weights", "left=3#9"), "no hole 9 in plane 'left': the job states none"),
         (("--weights", "left=-3@9"), "a value above 0"),
         (("--weights", "left=3@4", "--planes", "left"), "--planes means nothing with --weights"),
     ],
@@ -139,3 +139,20 @@ def test_weights_beyond_what_the_job_allows_are_warned_of(cli, tmp_path):
     assert cli("balance", job, *given, "--json").json["warnings"][:2] == [beyond, arc]
     assert "is more than the largest weight" in " ".join(cli("balance", job, *given).out.split())
     assert cli("balance", job, "--weights", "left=400@175;right=999@170", "--json").json["warnings"] == []
+
+
+def test_weights_of_a_plane_add_however_they_are_written(cli):
+    job = TURBO / "holes.toml"
+    one = cli("balance", job, "--weights", "left=150#1+150#2; right=5@20", "--json").json
+    assert (
+        cli("balance", job, "--weights", "left=150#1; right=5@20; left=150#2", "--json").json["weights"]
+        == (one["weights"])
+    )
+    assert "there is no hole 13 in plane 'left': holes are 1 to 12" in (
+        cli("balance", job, "--weights", "left=3#13").err
+    )
+
+
+def test_after_a_check_run_the_weights_are_still_those_of_the_bare_rotor(cli):
+    first = cli("balance", TURBO / "checked.toml", "--weights", "left=400@170").out.partition("\n")[0]
+    assert "on the bare rotor" in first

@@ -1,5 +1,6 @@
 """`rotorid balance` of runs without phases: every way in which tables lack them, and what is refused."""
 
+import cmath
 import shutil
 
 import pytest
@@ -40,6 +41,8 @@ def test_a_table_without_phases_in_any_layout(name, files, cli):
     assert made["corrections"][0]["mass"] == pytest.approx(4.77, abs=0.01)
     assert made["corrections"][0]["angle_deg"] == pytest.approx(91.6, abs=0.05)
     assert made["conventions"]["assumed"] == []
+    assert made["conventions"]["phase"] is None
+    assert (made["next_run"] is None) == (made["judgement"]["word"] == "mount")
     assert any("all phases are 0" in words for words in made["warnings"]) == (name == "zero")
 
 
@@ -54,7 +57,8 @@ def test_some_phases_are_an_error(files, cli):
 def test_options_without_meaning_are_refused_in_one_message(files, cli):
     (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
     words = [
-        "--split",
+        "--weights",
+        "P=1@2",
         "--coefficients",
         "measured",
         "--method",
@@ -68,7 +72,7 @@ def test_options_without_meaning_are_refused_in_one_message(files, cli):
     ran = cli("balance", "runs.csv", "weights.csv", *words)
     message = ran.err
     assert ran.code == 2
-    for word in ("--split", "rotorid split", "--coefficients", "--method", "--grade", "--limit", "--refine"):
+    for word in ("--weights", "--coefficients", "--method", "--grade", "--limit", "--refine"):
         assert word in message
     assert message.count("\n") == 1
 
@@ -121,3 +125,48 @@ def test_a_further_run_has_its_weight_in_a_hole_that_had_none(tmp_path, cli):
     job.write_text(f"{job.read_text()}[planes.fan]\nholes_deg = [0, 100, 200, 300]\n")
     assert "Make this run: 4.5 g at 200.0° (hole 3) in plane 'fan' alone." in cli("balance", job).out
     assert document(cli, job)["next_run"]["hole"] == "3"
+
+
+HOLES = "[planes.P]\nholes = 12\navailable_g = [1, 2]\nper_hole = 2\n"
+
+
+@pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
+def test_pieces_stand_in_the_holes_of_the_job(angles, files, cli):
+    """Angles and holes count as those of the job, whichever way that is."""
+    (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
+    job = f'runs = "runs.csv"\nweights = "weights.csv"\nangles = "{angles}"\n{HOLES}'
+    (files / "job.toml").write_text(job)
+    assert "In holes: --split." in cli("balance", "job.toml").out
+    shown = cli("balance", "job.toml", "--split").out
+    assert "In holes of P: 2 × 2 g in hole 4 (90°); error 16 % of this weight." in shown
+    made = document(cli, "job.toml", "--split")
+    (weight,) = made["corrections"]
+    turn = [
+        row["mass"] * cmath.exp(1j * cmath.pi * row["angle_deg"] / 180)
+        for row in made["mounting"]["P"]["holes"]
+    ]
+    wanted = weight["mass"] * cmath.exp(1j * cmath.pi * weight["angle_deg"] / 180)
+    assert abs(sum(turn) - wanted) < 0.2 * abs(wanted)
+    assert all(
+        row["angle_deg"] == pytest.approx(30 * (int(row["hole"]) - 1))
+        for row in made["mounting"]["P"]["holes"]
+    )
+
+
+def test_material_is_taken_away_at_its_holes(files, cli):
+    (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
+    job = f'runs = "runs.csv"\nweights = "weights.csv"\n{HOLES}remove = true\n'
+    (files / "job.toml").write_text(job)
+    made = document(cli, "job.toml", "--split")
+    angles = {row["hole"]: row["angle_deg"] for row in made["mounting"]["P"]["holes"]}
+    assert angles
+    assert all(angle == pytest.approx(30 * (int(hole) - 1)) for hole, angle in angles.items())
+    assert abs(made["corrections"][0]["angle_deg"] - 271.6) < 0.1
+    assert angles.keys() <= {"9", "10", "11"}
+
+
+def test_pieces_need_holes(files, cli):
+    (files / "runs.csv").write_text("\n".join(TABLES["no column"]) + "\n")
+    ran = cli("balance", "runs.csv", "weights.csv", "--split")
+    assert ran.code == 2
+    assert "leave --split (no plane has holes) away" in ran.err

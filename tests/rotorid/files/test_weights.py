@@ -137,3 +137,18 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     holes = job_of(tmp_path, stated, check=check, pieces=between).holes
     np.testing.assert_allclose(holes["P1"].taken, [0, 0.007, 0, 0, 0, 0, 0, 0])
     assert not holes["P2"].taken.any()
+
+
+def test_tables_of_a_check_run_add(tmp_path):
+    """Pieces and the trim beside them: one weight a plane, their holes taken, both files named."""
+    check, turn = CHECK.format(0.5, 10, 0.4, 20), np.exp(1j * np.radians([0, 135, 225]))
+    trim = "plane,action,hole,angle_deg,mass_mg,pieces\nP2,add,4,135.0,2000,2.000\nP2,remove,2,45,1000,1\n"
+    several = CHECKED.replace('"pieces.csv"', '["pieces.csv", "trim.csv"]')
+    job = job_of(tmp_path, several, check=check, pieces=PIECES, trim=trim)
+    P2 = 0.006 * turn[1] + 0.011 * turn[2]
+    np.testing.assert_allclose(job.check.weights[0], [0.003, P2], rtol=1e-12)
+    np.testing.assert_allclose(job.holes["P2"].taken, [0, 0, 0, 0.006, 0, 0.011, 0, 0])
+    assert {"pieces.csv", "trim.csv"} < {file.name for file in job.files}
+    words = refused(job_of, tmp_path, several, check=check, pieces=PIECES, trim=trim.replace("_mg", "_g_mm"))
+    assert "trim.csv" in words
+    assert "pieces.csv, in g" in words

@@ -95,6 +95,7 @@ def test_the_head_is_that_of_the_job(tmp_path):
     )
     (tmp_path / "job.toml").write_text('runs = "runs.csv"\nweights = "weights.csv"\n' + more)
     text, _, report, _ = sheet_of(tmp_path / "job.toml")
+    assert "<h1>Balancing sheet: fan 7</h1>" in text
     row = cells(text, ("machine", "place"))[1]
     assert row == ["fan 7", "hall &lt;3&gt;", "2026-03-17", "A. Rotor", ""]
     assert text.index("A. Rotor") < text.index('id="judgement"') < text.index('id="weights"')
