@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from rotorid.files.table_layouts import Conventions
 
 _NAMES = {
-    "layout": "Conventions",
+    "table_layouts": "Conventions",
     "influence": "read_influence write_influence",
     "job": "Job job_from_files read_job",
-    "job_models": "Errors",
+    "job_keys": "Errors",
     "measurements": "read_measurements read_record",
     "model": "HarmonicFile read_harmonic_model read_ode_model",
     "node_tables": "read_bow read_compliance read_modes read_unbalance",
-    "problems": "InputError Problem TableWarning",
+    "input_problems": "InputError Problem TableWarning",
     "rotor": "read_rotor rotor_files write_rotor",
     "runs": "read_trials",
     "small_model": "read_small_model",
