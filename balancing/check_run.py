@@ -38,7 +38,7 @@ from balancing.influence import (
     with_readings,
 )
 from balancing.printed_readings import (
-    ROUNDING,
+    INVISIBLE,
     covariance_column,
     largest_readings,
     reading_columns,
@@ -221,7 +221,7 @@ class CheckComparison(Answered):
     def _columns(self) -> tuple[Column, ...]:
         """One row per run, speed and sensor."""
         R, labels = len(self.runs), self.labels
-        rounding = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
+        rounding = INVISIBLE * float(np.abs(self.before).max()) * labels.vibration_scale
         before = np.broadcast_to(self.before, self.achieved.shape)
         each = (("predicted", self.predicted), ("achieved", self.achieved), ("difference", self.difference))
         vectors = (

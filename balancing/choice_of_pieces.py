@@ -83,12 +83,6 @@ class Mounted(Answered):
         """What the pieces of each plane add up to, (P,)."""
         return self.discrete.weights
 
-    @property
-    def expected(self) -> float:
-        """Root mean square in a check run, errors included where they are known."""
-        errors = np.trace(np.nan_to_num(self.correction.after_covariance), axis1=-2, axis2=-1)
-        return float(np.sqrt(np.mean(np.abs(self.after) ** 2 + errors)))
-
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels

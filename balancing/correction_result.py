@@ -11,7 +11,7 @@ import numpy as np
 from balancing.convention_test import ConventionTest, assumptions
 from balancing.conventions import Labels
 from balancing.printed_readings import (
-    ROUNDING,
+    INVISIBLE,
     covariance_column,
     degrees,
     error_document,
@@ -201,7 +201,7 @@ class Correction(Prediction, Answered):
         old = np.abs(self.before) * scale
         covariance = self.after_covariance if self.errors_known else None
         last = covariance_column(self.labels, "after_covariance", covariance, old.size)
-        residuals = (*self.vibration_columns(ROUNDING), last)
+        residuals = (*self.vibration_columns(), last)
         new = np.array(residuals[4].values)
         run, planes, weights = self.mounted
         there = bool(weights.any())
@@ -323,7 +323,7 @@ class Correction(Prediction, Answered):
         old, new = np.abs(self.before).max(), np.abs(self.after).max()
         before = f"rms {three_figures(rms(self.before) * scale)}"
         checked = figures(self.check_rms * scale, 2) if self.errors_known else ""
-        exact = new <= ROUNDING * old
+        exact = new <= INVISIBLE * old
         if checked and exact:
             return " ".join(f"{before} → below {checked} {unit} in 95 of 100 check runs".split())
         left = "0 by arithmetic," if exact else small(rms(self.after) * scale, old * scale)

@@ -15,10 +15,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.tables import Column, records
 from rotorid.base.text import RPM, figures, rpm
 
-ROUNDING = 1e-12
-"""Predicted amplitudes below this share of the largest one before are rounding."""
 INVISIBLE = 1e-9
-"""Those below this share are zero to a reader."""
+"""Predicted amplitudes below this share of the largest one before are zero to a reader."""
 
 
 def degrees(angle: float, places: int = 1) -> str:
@@ -71,7 +69,7 @@ def largest_readings(
     """
     old, new = (labels.vibration(readings)[0] for readings in (before, after))
     reach = np.full(old.shape, np.nan) if within is None else within
-    size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
+    size = new if new.max() > INVISIBLE * old.max() else np.nan_to_num(reach)
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []
     for place in np.argsort(-share, axis=None, kind="stable")[:3]:
@@ -143,8 +141,7 @@ def error_words(reading: Reading, run: RunErrors, labels: Labels) -> str:
     if reading.source == "residuals":
         return f"One standard deviation of a reading and from run to run in one: {changes} ({run.origin})."
     out = f"One standard deviation of a reading: {stated or 'not known'} ({reading.source})"
-    out += f"; from run to run: {changes} ({run.origin})" if changes else ""
-    return out + (f". Degrees of freedom: {reading.dof:.3g}." if reading.dof < 200 else ".")
+    return out + (f"; from run to run: {changes} ({run.origin})." if changes else ".")
 
 
 def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str, Any]:

@@ -469,18 +469,18 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
 
 def unseen(run: RunErrors) -> tuple[str, ...]:
     """A note about what no run measures."""
-    if run.origin == "estimated" and np.linalg.norm(run.typical) < ASSUMED_RUN / 2:
+    whole = float(np.linalg.norm(run.typical))
+    if run.origin == "estimated" and whole < ASSUMED_RUN / 2:
         return (
             "runs that should agree differ little: if the machine was not stopped between them, they do not "
             "show what changes from run to run (state run_percent)",
         )
-    if run.origin not in ("assumed", "none"):
-        return ()
-    taken = "none are stated, and the ± are smaller, those of readings alone"
-    if run.origin == "assumed":
-        whole = 100 * np.linalg.norm(run.typical)
-        taken = f"{100 * ASSUMED_RUN:g} % are assumed of each of three kinds, {whole:.2g} % in all"
-    return (
+    taken = {
+        "none": "none are stated, and the ± are smaller, those of readings alone",
+        "assumed": f"{percent(ASSUMED_RUN)} are assumed of each of three kinds, {percent(whole)} in all",
+    }.get(run.origin, "")
+    words = (
         f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more baseline "
-        "run at the end, or one more trial run, would measure them; repeated readings do not",
+        "run at the end, or one more trial run, would measure them; repeated readings do not"
     )
+    return (words,) if taken else ()

@@ -118,15 +118,9 @@ class Outlook:
             return np.full(self.before.shape, np.nan)
         return reach(self.after_covariance) * self.labels.vibration_scale
 
-    def vibration_columns(self, rounding: float = INVISIBLE) -> tuple[Column, ...]:
-        """Speed, sensor, vibration before and after, one row a reading.
-
-        Parameters
-        ----------
-        rounding
-            Amplitudes after, up to this share of the largest one before, are nothing.
-        """
-        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
+    def vibration_columns(self) -> tuple[Column, ...]:
+        """Speed, sensor, vibration before and after, one row a reading."""
+        nothing = INVISIBLE * float(np.abs(self.before).max()) * self.labels.vibration_scale
         return (
             *reading_columns(self.labels, self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),

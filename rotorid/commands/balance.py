@@ -124,8 +124,8 @@ class Balance(Outcome):
             expected = left.correction.judgement.expected * scale if left.word == "trim" else None
             judgement.update(word=left.word, cause=left.why, instead=[], rms_expected=expected)
             judgement["rms_before"] = left.now * scale
-        elif self.mounted:
-            judgement["rms_expected"] = self.mounted.expected * scale
+        elif self.mounted:  # `mounting` has that of the pieces
+            judgement["rms_expected"] = None
         return document | {key: part.to_dict() for key, part in parts.items() if part}
 
     def sheet(self) -> bytes:

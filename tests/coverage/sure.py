@@ -17,10 +17,10 @@ PROGRAMS = {
     "calibrate": ("coverage_calibrate.py", 1, 60),
     "fleet": ("coverage_fleet.py", 20, 1),
     "fits": ("coverage_fits.py", 1000),
-    "identify": ("coverage_identify.py", 1000),
+    "identify": ("coverage_identify.py", 500),
     "special": ("coverage_special.py", 1000),
     "without phase": ("coverage_without_phase.py", 1000),
-    "runup": ("coverage_runup.py", 1, 250),
+    "runup": ("coverage_runup.py", 1, 200),
     "vectors": ("coverage_vectors.py", 10),
     "what_if": ("coverage_what_if.py", 200),
 }
