@@ -477,7 +477,7 @@ def unseen(run: RunErrors) -> tuple[str, ...]:
         )
     taken = {
         "none": "none are stated, and the ± are smaller, those of readings alone",
-        "assumed": f"{percent(ASSUMED_RUN)} are assumed of each of three kinds, {percent(whole)} in all",
+        "assumed": f"{percent(ASSUMED_RUN)} % are assumed of each of three kinds, {percent(whole)} % in all",
     }.get(run.origin, "")
     words = (
         f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more baseline "

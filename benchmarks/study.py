@@ -3,8 +3,6 @@
 Run `python -m benchmarks.study [samples]` on an idle machine; 10,000 machines as built by default.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

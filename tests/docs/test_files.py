@@ -7,9 +7,9 @@ from pathlib import Path
 
 from cases import each_of
 
-from rotorid.files import attached, influence, node_tables, rotor, runs, weights
+from rotorid.files import bearings_and_seals, influence, node_tables, rotor, runs, weights
 from rotorid.files import job_excel as jobbook
-from rotorid.files import job_models as jobkeys
+from rotorid.files import job_keys as jobkeys
 from rotorid.files.settings import Settings
 from rotorid.identify.expressions import FUNCTIONS
 
@@ -26,7 +26,7 @@ CODE = re.findall(r"`([^`]+)`", TEXT.replace("```", "")) + [cells[0] for cells i
 WORDS = {word for code in CODE for word in re.findall(r"\w+", code)}
 TABLES = {
     "rotor": rotor.COLUMNS,
-    "bearing": attached.COLUMNS,
+    "bearing": bearings_and_seals.COLUMNS,
     "bow": node_tables.BOW_COLUMNS,
     "runs": runs.COLUMNS,
     "weights": weights.COLUMNS,

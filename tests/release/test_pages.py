@@ -9,7 +9,7 @@ from golden.comparing import RELATIVE
 from golden.tolerances import TOLERANCES
 
 import rotorid
-from rotorid.files import cells, disk, excel_workbook, instruments, problems, settings
+from rotorid.files import cells, disk, excel_workbook, input_problems, instrument_formats, settings
 from rotorid.files.job_keys import MOST_HOLES
 from rotorid.identify import equations, expressions
 from rotorid.worksheet import app, server
@@ -40,7 +40,7 @@ MB = 10**6
             "numbers in files, in size",
             f"from {cells.SMALLEST:g} to {cells.LARGEST:g}, or 0".replace("+", ""),
         ),
-        ("arrays of waveforms (`.npz`, `.mat`)", f"{instruments.LARGEST // 10**9} GB"),
+        ("arrays of waveforms (`.npz`, `.mat`)", f"{instrument_formats.LARGEST // 10**9} GB"),
         ("a request to the worksheet", f"{app._LARGEST // MB} MB"),
     ],
 )
@@ -50,7 +50,7 @@ def test_a_limit_on_the_page_is_that_of_the_code(limit, value):
 
 def test_the_page_of_security_knows_the_guard_and_the_words():
     assert f"serves {server.HOST} alone" in STABILITY
-    assert f"up to {problems.LONGEST_VALUE} characters" in STABILITY
+    assert f"up to {input_problems.LONGEST_VALUE} characters" in STABILITY
     assert len(expressions.FUNCTIONS) == 14
     assert "fourteen functions" in STABILITY
 

@@ -52,6 +52,7 @@ def test_pieces_have_their_own_expectation(cli):
     assert plain.out.splitlines()[1] == "In holes: --split."
     assert "with all trial weights taken off" in split.out
     found = cli("balance", job, "--split", "--json").json
-    left, bound = found["mounting"]["rms_after"], found["mounting"]["rms_after_95"]
+    bound = found["mounting"]["rms_after_95"]
     assert f"below {bound:.2g} in 95 of 100" in split.out
-    assert left < found["judgement"]["rms_expected"] < bound
+    assert found["mounting"]["rms_after"] < bound
+    assert found["judgement"]["rms_expected"] is None  # that of weights at any angle
