@@ -240,7 +240,7 @@ reduce-place-compromise     reduce {ROTOR23} --place compromise --candidates 5,8
 reduce-model-job            reduce sample_data/model_job/rotor.csv --nodes 6,12,19 --modes 2 --stability 0:9000rpm
 reduce-without-nodes        reduce {ROTOR23}
 reduce-order                reduce {ROTOR23} --nodes 12,7
-identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --errors 2,1
+identify-output-error       identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --errors 2,1
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --errors 2,1 --output i.csv --plot i.png
 identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --errors 2,1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html

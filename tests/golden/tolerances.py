@@ -59,9 +59,6 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("motion*", "reduction.frequency_error*", "rounding of frequencies", absolute=1e-10),
     *(Tolerance(case, "*chi_square*", _NOTHING, absolute=1e-20) for case in ("bk*", "static*", "index")),
     Tolerance("no-phase", "*after", _NOTHING, absolute=1e-12),
-    Tolerance(
-        "identify-output-error", "normal_matrix*", "of b and delta only a product is known", relative=0.05
-    ),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
     Tolerance("turbo-max-mass", "*", "along limits that χ² hardly tells apart", relative=1e-5),
