@@ -51,7 +51,7 @@ from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
-from rotorid.regression import covariance_root, solution, stretch, unstretch
+from rotorid.regression import covariance_root, solution, solution_and_rank, stretch, unstretch
 
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
@@ -252,8 +252,10 @@ def solve(  # noqa: PLR0913
 def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
-    check_planes(A[job.w > 0], job.planes)
-    return np.asarray(-solution(A, job.w * job.Y))
+    best, rank = solution_and_rank(A, job.w * job.Y)
+    if rank < len(job.planes):
+        check_planes(A[job.w > 0], job.planes)
+    return np.asarray(-best)
 
 
 def _fit_plain(job: Job) -> Solution:

@@ -227,7 +227,14 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
     [1.0, 2.0]
     """
-    return gain(A, rcond=rcond) @ y
+    return solution_and_rank(A, y, rcond)[0]
+
+
+def solution_and_rank(A: ArrayLike, y: ArrayLike, rcond: float = RCOND) -> tuple[Any, int]:
+    """`solution`, and the rank of A with its columns scaled, by one decomposition."""
+    unit, scale = unit_columns(np.asarray(A))
+    x, _, rank, _ = np.linalg.lstsq(unit, y, rcond)
+    return (x.T / scale).T, int(rank)
 
 
 def covariance_root(covariance: FloatArray, variance: FloatArray) -> FloatArray:
