@@ -89,8 +89,7 @@ class _Goal(NamedTuple):
 def bounds_of(W: ComplexArray, Y: ComplexArray, limits: Limits | None) -> Bounds:
     """Limits of a job for its equations, none where there are none."""
     N, P = W.shape
-    if limits is None:
-        return Bounds(W, Y, np.full(N, np.inf), np.full(P, np.inf), (None,) * P)
+    limits = limits or Limits.none(1, N, P)
     if limits.residual.size != N or len(limits.max_weight) != P:
         raise ValueError(
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "

@@ -253,9 +253,9 @@ def _closed_form(job: Job) -> ComplexArray:
     """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
     A = job.w[:, None] * job.W
     best, rank = solution_and_rank(A, job.w * job.Y)
-    if rank < len(job.planes):
+    if rank < A.shape[1]:
         check_planes(A[job.w > 0], job.planes)
-    return np.asarray(-best)
+    return -best
 
 
 def _fit_plain(job: Job) -> Solution:
@@ -400,7 +400,7 @@ def _fit_weighted(job: Job) -> Solution:
     common = np.moveaxis(real_parts(job.columns[:, on]), 0, 2)
     errors = _Errors(job.W[on], job.Y[on], job.channels[on] - common @ np.swapaxes(common, 1, 2), job.w[on])
     B, D, dof = stretch([[1.0, *start]]), start, 2 * int(on.sum() - len(start))
-    variance = float(np.trace(B @ errors.C @ B.T, axis1=1, axis2=2).mean()) / 2
+    variance = np.trace(B @ errors.C @ B.T, axis1=1, axis2=2).mean() / 2
     if not variance > 1e-12 * job.channels[:, 0, 0].mean():
         raise NoErrorsError(
             "the method weighted needs errors of the readings ([errors], --errors or repeated readings)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -284,13 +285,14 @@ class Limits:
             keep(self, **{name: array})
         arcs = np.array([arc for plane in self.forbidden for arc in plane]).reshape(-1, 2)
         start, width = arcs.T
-        kept = (np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)).all()
-        if not kept or len(self.forbidden) != len(self.max_weight):
+        whole = np.isfinite(start) & (width > 0) & (width <= 2 * np.pi)
+        if not whole.all() or len(self.forbidden) != len(self.max_weight):
             raise ValueError(
                 f"every plane needs arcs of 0 to 2π from a finite angle, or none; got {arcs.tolist()}"
             )
 
     @classmethod
+    @cache
     def none(cls, S: int, C: int, P: int) -> Limits:
         """No limits at all, for S speeds, C sensors and P planes."""
         return cls(np.full(P, np.inf), np.full((S, C), np.inf), ((),) * P)

@@ -115,7 +115,7 @@ def draw_rotor(
         ax.scatter(positions[at_sensors], below, marker="^", s=46, color=COLORS[0], edgecolor="white",
                    linewidth=0.6, zorder=5.5)  # fmt: skip
     if height is None and ax.get_legend_handles_labels()[0]:
-        legend_above(ax, marker_scale=0.7)
+        legend_above(ax, markerscale=0.7)
     return ax
 
 
@@ -129,7 +129,7 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
             words += f", {way}"
         shape = curves[:, k] / np.abs(curves[:, k]).max()
         ax.plot(x, shape, label=f"{k + 1}: {words}", linewidth=2.2, zorder=5, **look(k, x.size))
-    legend_above(ax, 2, marker_scale=0.6)
+    legend_above(ax, 2, markerscale=0.6)
     return ax
 
 
@@ -158,7 +158,7 @@ def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> 
     words = f"deflection at {response.speeds[k] * RPM:.0f} rpm, µm peak"
     ax = _over_rotor(rotor, ax, float(size.max()), words)
     ax.plot(rotor.positions[response.nodes - 1], shape, "o-", color=COLORS[0], markersize=4, zorder=5)
-    legend_above(ax, 2, marker_scale=0.6)
+    legend_above(ax, 2, markerscale=0.6)
     return ax
 
 

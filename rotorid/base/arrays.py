@@ -36,7 +36,7 @@ def significant(values: FloatArray, digits: int) -> FloatArray:
 def whole(value: object, what: str) -> int:
     """A whole number as a plain int; raise ValueError naming `what` for anything else."""
     try:
-        if isinstance(value, (bool, np.bool_)):
+        if isinstance(value, bool):
             raise TypeError
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:
@@ -101,7 +101,8 @@ def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
 
 def turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
     """Covariances (…, 2, 2) from variances along z and across."""
-    unit = np.where(z != 0, z, 1.0) / np.where(z != 0, np.abs(z), 1.0)
+    unit = np.where(z != 0, z, 1.0)
+    unit = unit / np.abs(unit)
     along, across = (np.stack((z.real, z.imag), axis=-1) for z in (unit, 1j * unit))
     parts = ((radial, along), (tangential, across))
     return np.asarray(sum(size[..., None, None] * u[..., :, None] * u[..., None, :] for size, u in parts))

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rotorid.base.text import RPM
 
 if TYPE_CHECKING:
@@ -83,7 +81,6 @@ def note(
 def legend_above(
     ax: Axes,
     columns: int = 3,
-    marker_scale: float = 1.0,
     height: float = 1.0,
     **options: Any,  # noqa: ANN401  of matplotlib
 ) -> None:
@@ -94,7 +91,6 @@ def legend_above(
         ncols=columns,
         frameon=False,
         fontsize=TEXT,
-        markerscale=marker_scale,
         **options,
     )
 
@@ -129,6 +125,6 @@ def second_scale(ax: Axes, unit: float = RPM, label: str = "speed, rad/s", side:
     """A second scale, of values in this unit, above the axes or right of them."""
     axis = "x" if side == "top" else "y"
     make: Callable[..., _AxesBase] = getattr(ax, f"secondary_{axis}axis")
-    scale = make(side, functions=(lambda x: np.asarray(x) / unit, lambda x: np.asarray(x) * unit))
+    scale = make(side, functions=(lambda x: x / unit, lambda x: x * unit))
     scale.tick_params(labelsize=TEXT)
     getattr(scale, f"set_{axis}label")(label, fontsize=TEXT)

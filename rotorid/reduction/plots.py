@@ -86,7 +86,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     height = max(1.12, 1.08 * float(np.nan_to_num(np.abs(points)).max()))
     axes.set(ylim=(-height, height), yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     axes.set_title(f"{n}-mass model (points) and {reduction.source} (lines)", pad=10)
-    legend_above(axes, 1, 0.75, -0.15)
+    legend_above(axes, 1, -0.15, markerscale=0.75)
     return axes
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.tables import Column, text
 from rotorid.regression.estimate import WORD_TOLERANCE, Estimate, unit_columns
@@ -203,7 +203,7 @@ def gain(A: ArrayLike, *, rcond: float = 1e-14) -> Any:  # noqa: ANN401
     (…, n, m), real where A is.
     """
     unit, scale = unit_columns(np.asarray(A))
-    return np.asarray(np.linalg.pinv(unit, rcond=rcond) / scale[..., None])
+    return np.linalg.pinv(unit, rcond=rcond) / scale[..., None]
 
 
 def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noqa: ANN401
@@ -230,7 +230,7 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     return solution_and_rank(A, y, rcond)[0]
 
 
-def solution_and_rank(A: ArrayLike, y: ArrayLike, rcond: float = RCOND) -> tuple[Any, int]:
+def solution_and_rank(A: ArrayLike, y: Any, rcond: float = RCOND) -> tuple[AnyArray, int]:  # noqa: ANN401
     """`solution`, and the rank of A with its columns scaled, by one decomposition."""
     unit, scale = unit_columns(np.asarray(A))
     x, _, rank, _ = np.linalg.lstsq(unit, y, rcond)
