@@ -83,8 +83,8 @@ class Conditioning:
     def sentence(self) -> str:
         """What is determined, which planes act alike, and what to do."""
         P, condition = len(self.planes), self.condition_number
-        planes = {1: "The plane is", 2: "Both planes are"}.get(P, f"All {P} planes are")
-        words = f"{planes} determined (rank {self.rank} of {P}, condition number {condition:.3g})."
+        of = f"rank {self.rank} of {P}, condition number {condition:.3g}"
+        words = f"Exact coefficients determine every plane ({of})."
         if self.rank < P:
             words = f"Rank {self.rank} of {P}: not all planes are determined."
         if condition <= NEARLY_ALIKE:

@@ -235,12 +235,10 @@ def remedies(case: Case) -> tuple[str, ...]:
     if good:
         best = min(good, key=lambda c: c.most)
         planes = listing(map(repr, best.planes), "and")
-        named = f"plane {planes} alone" if len(best.planes) == 1 else f"only planes {planes}"
-        mass = ", ".join(case.labels.weight_words(float(m)) for m in np.abs(best.weights))
-        left, most, before = (case.shown(size) for size in (best.rms, best.most, case.before))
+        left, before = map(case.shown, (best.rms, case.before))
         words.append(
-            f"{named} (--planes {','.join(best.planes)}; {mass}) would leave rms {left}, at most {most} "
-            f"with 95 %, of {before}"
+            f"weights in {planes} alone would leave about rms {left} of {before} (--planes "
+            f"{','.join(best.planes)})"
         )
     words += [_trial(case, p) for p in weak if case.trial_weight(p)]
     if case.coarse:

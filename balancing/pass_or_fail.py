@@ -133,8 +133,9 @@ class Verdict(Answered):
         why = {
             "pass": "kept",
             "fail": "not kept",
-            "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; one more "
-            "run, or stated errors, would tell",
+            "not decidable": "open: the 95 % region lies on both sides"
+            if np.isfinite(self.rows[0].high)
+            else "open: state errors, or read a run twice",
         }[self.overall]
         others = near[_SHOWN:]
         return Answer(

@@ -113,8 +113,7 @@ class LeftToDo(Answered):
             lines = ["", f"Trim with pieces, in {c.labels.weight_in}:"]
             lines += [f"  {line}" for line in self.pieces.in_planes()]
         elif self.word == "trim":
-            places = c.places(self.planes, self.trim).tolist()
-            add = zip(self.planes, self.trim.tolist(), places, strict=True)
+            add = zip(self.planes, self.trim, c.places(self.planes, self.trim), strict=True)
             cells = [
                 f"{'take away' if plane in c.remove else 'add'} {c.labels.weight_words(abs(w))} at {at:.1f}°"
                 if w
@@ -166,6 +165,7 @@ def after_check_run(
     change = rms_change(labels, check.mean[-1], made.after[pick])
     if bound is not None:
         change += f", below {figures(bound * labels.vibration_scale, 2)} in 95 of 100 check runs"
+        change += ", and it may get worse" * (judged == "fail" and bound > now)
     left = after if bound is None or judged == "fail" else bound
     worth = trim.any() and left < WORTH * now
     again = c.decision.cause if c.decision.word == "measure again" else ""

@@ -207,11 +207,18 @@ def check_readings(influence: Influence, weights: ComplexArray, look: Look = lam
 def check_run_spread(
     influence: Influence, weights: ComplexArray, *look: Look
 ) -> tuple[FloatArray, FloatArray]:
-    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN: errors are unknown."""
+    """Covariance (S, C, 2, 2) of check runs with weights (P,), and rms of each; NaN: errors are unknown.
+
+    The one draw in twenty that is farthest off counts as if it were as far as the next: where errors of runs
+    are hardly known, one in four hundred may be off by more than all others together.
+    """
     off = check_readings(influence, weights, *look)
     off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
-    read, parts = influence.baseline + influence.W @ weights + off, real_parts(off[..., None])
-    covariance = np.einsum("nsci,nscj->scij", parts, parts) / len(off)
+    read, size = influence.baseline + influence.W @ weights + off, np.abs(off)
+    near = np.minimum(1.0, np.quantile(size, LEVEL, axis=0) / np.maximum(size, 1e-300))
+    parts = real_parts((near * off)[..., None])
+    # what a normal complex number loses by this
+    covariance = np.einsum("nsci,nscj->scij", parts, parts) / (LEVEL * len(off))
     return covariance, np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2)))
 
 

@@ -112,7 +112,7 @@ class Balance(Outcome):
         elif sound and {*result.planes} & {*job.holes}:
             weights = replace(weights, judgement=f"{weights.judgement}\nIn holes: --split.")
         judged = [*limits, *([mounted.answer] if mounted else [])]
-        return together([*judged, weights, *zone] if sound else [weights, *judged, *zone])
+        return together([*judged, weights, *zone] if sound else [weights, *judged[::-1], *zone])
 
     def to_dict(self) -> dict[str, Any]:
         """The keys of the correction, and those of what is beside it."""

@@ -265,7 +265,8 @@ def correct_job(
         runs,
         planes,
         None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit),
-        refuse=options.machine_type is None,  # how a machine differs from its type is no error of readings
+        # how a machine differs from its type is no error of readings; a check run tells what weights leave
+        refuse=options.machine_type is None and not options.refine,
         method=options.method,
         limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,

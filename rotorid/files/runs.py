@@ -147,7 +147,8 @@ def make_trials(
 ) -> Trials | None:
     """Put both tables together, or None and problems."""
     names, trials = read_runs(runs, conventions, problems)
-    mounted = None if weights is None else read_weights(weights, names, conventions, problems)
+    nameless = replace(conventions, run="")  # the only run need not be named
+    mounted = None if weights is None else read_weights(weights, names, nameless, problems)
     if trials is None or len(problems):
         return None
     if isinstance(errors, ReadingErrors):
@@ -294,16 +295,15 @@ def _merge_speeds(
         if same_speed(speeds[0], speeds[-1], UNSAID):
             continue
         shown = [*map(in_unit, speeds)]
-        alike.append(f"{', '.join(words.split()[0] for words in shown)} as {in_unit(one)}")
+        alike.append(f"{shown[0]} and {shown[-1]}")
         if not same_speed(speeds[0], speeds[-1], band):
             chain = f"{len(shown)} speeds from {shown[0]} to {shown[-1]}"
             words = (
                 f"speeds that are clearly the same or not: {chain} form a chain, neighbours {_remedy(band)}"
             )
             table.as_whole("speed", words)
-    more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-    words = f"speeds within {band:g} % count as one: {'; '.join(alike[:3])}{more}"
-    return np.array(merged), dict(zip(usable, groups, strict=True)), [words] if alike else []
+    merging = [f"speeds within {band:g} % count as one, such as {each}" for each in alike[:1]]
+    return np.array(merged), dict(zip(usable, groups, strict=True)), merging
 
 
 def _remedy(tolerance_percent: float) -> str:

@@ -391,7 +391,7 @@ def _by_name(
         other = sensors[sensor].setdefault(stem, column)
         if other is not column:
             words = f"and {other.heading.name!r} could be it too: begin the name of one with note"
-            raise _unclear(grid, column, f"one column of the {stem}, {words}")
+            raise _unclear(grid, column, f"one column of the {stem} for every {key}, {words}")
     loose = {stem: column for stem, column in sensors.pop("", {}).items() if stem in pair}
     if not sensors:
         return {"": loose}

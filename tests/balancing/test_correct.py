@@ -181,7 +181,7 @@ def test_stated_errors_refuse_what_assumed_ones_only_warn_of():
     runs = job(Y0 + T @ W.T, T)
     assert "act alike" in plain(runs).answer.whole()
     stated = replace(runs, errors=ReadingErrors(0.02, 0.02))
-    with pytest.raises(UndeterminedError, match=r"act alike .*\nInstead: plane '[AB]' alone"):
+    with pytest.raises(UndeterminedError, match=r"act alike .*\nInstead: weights in '[AB]' alone"):
         plain(stated)
     assert plain(stated, refuse=False).weights.size == 2
 

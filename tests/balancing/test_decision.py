@@ -106,7 +106,7 @@ def test_weights_that_fight_without_known_errors(turn, word):
     assert c.decision.word == c.to_dict()["judgement"]["word"] == word
     if word != "mount":
         assert c.decision.cause.startswith("planes 'A' and 'B' act alike, and their weights fight each other")
-        assert c.decision.instead[0].startswith("Instead: plane ")
+        assert c.decision.instead[0].startswith("Instead: weights in '")
         assert c.decision.choices[0].rms < 0.1
 
 

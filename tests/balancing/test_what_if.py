@@ -1,5 +1,6 @@
 """What given weights leave, zones, and corrections that make it worse where they were not made for."""
 
+import sys
 from dataclasses import replace
 from functools import partial
 
@@ -52,6 +53,15 @@ def test_other_weights_leave_what_the_machine_does(job):
     assert what_if(influence, {}).word == "hardly different"
     with pytest.raises(ValueError, match="there is no plane 'C'"):
         what_if(influence, {"C": 1.0})
+
+
+def test_one_draw_far_off_widens_nothing(job, monkeypatch):
+    module, influence = sys.modules["balancing.what_if"], job[0]
+    off = complex_normal(np.random.default_rng(1), (10_000, *influence.baseline.shape)) * np.sqrt(0.5)
+    off[0] *= 1e4
+    monkeypatch.setattr(module, "check_readings", lambda *_: off)
+    covariance = module.check_run_spread(influence, np.zeros(2))[0]
+    np.testing.assert_allclose(covariance, np.broadcast_to(np.eye(2) / 2, covariance.shape), atol=0.03)
 
 
 def rigid(relative=0.01, further=1.0):

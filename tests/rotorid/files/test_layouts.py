@@ -250,7 +250,7 @@ def test_the_speeds_of_the_sensors_of_one_steady_run_are_one(tmp_path):
     runs = PUMP.replace("1485,DE", "1486.02,DE").replace("1485,NDE", "1482.7,NDE")
     trials = trials_of(tmp_path, runs)
     np.testing.assert_allclose(trials.speeds, [1484.36 * np.pi / 30], rtol=1e-12)
-    assert trials.warnings == ("speeds within 0.5 % count as one: 1482.7, 1486.02 as 1484.36 rpm",)
+    assert trials.warnings == ("speeds within 0.5 % count as one, such as 1482.7 rpm and 1486.02 rpm",)
     words = refused(trials_of, tmp_path, runs, speed_tolerance_percent=0.1)
     assert "a reading of sensor 'NDE' in run 'as found' at 1486.02 rpm" in words
 

@@ -125,8 +125,11 @@ CHECK = "run,speed_rpm,sensor,amplitude_mm_s,phase_deg\ncheck,1485,DE,{},{}\nche
 
 
 def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
-    """Their holes are taken; what the job says itself counts first; weights between holes take none."""
-    check = CHECK.format(0.5, 10, 0.4, 20)
+    """Their holes are taken; what the job says itself counts first; weights between holes take none.
+
+    The table names no run: it is the only one, whatever its name.
+    """
+    check = CHECK.format(0.5, 10, 0.4, 20).replace("check", "fifth run")
     job = job_of(tmp_path, CHECKED, check=check, pieces=PIECES)
     turn = np.exp(1j * np.radians([0, 135, 225]))
     np.testing.assert_allclose(job.check.weights[0], [0.003, 0.004 * turn[1] + 0.01 * turn[2]], rtol=1e-12)
