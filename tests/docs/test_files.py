@@ -1,5 +1,6 @@
 """docs/files.md names every column and every key that the readers know."""
 
+import os
 import re
 import sys
 from importlib import import_module
@@ -19,7 +20,8 @@ sys.path.append(str(ROOT / "docs" / "_ext"))
 from tables import key_lines, settings_of  # noqa: E402 - of docs/_ext
 
 TEXT = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
-SHOWN = [settings_of(line.split()) for line in re.findall(r"^```\{keys\} (.+)$", TEXT, re.MULTILINE)]
+BLOCKS = re.findall(r"^```\{keys\} (.+)\n(.+)$", TEXT, re.MULTILINE)
+SHOWN = [settings_of(name.split()) for name, _ in BLOCKS]
 """Settings whose keys the page lists, made with the pages."""
 KEYS = [cells for settings in SHOWN for cells in key_lines(settings)]
 CODE = re.findall(r"`([^`]+)`", TEXT.replace("```", "")) + [cells[0] for cells in KEYS]
@@ -60,6 +62,20 @@ def test_the_settings_of_every_file_are_on_the_page():
     made_from = {base for settings in defined | set(SHOWN) for base in settings.__mro__[1:]}
     assert {one.__name__ for one in defined - made_from - set(SHOWN)} == {"SealKeys"}  # as those of a bearing
     assert all(about and names for names, about, _ in KEYS)
+
+
+def test_every_key_stands_in_the_plain_text():
+    """Written anew with ROTORID_RENEW_PAGES, as the pages."""
+    text, path = "", ROOT / "docs" / "keys.txt"
+    for (_, head), settings in zip(BLOCKS, SHOWN, strict=True):
+        lines = (
+            f"  {names}: {about}{example and f'; {example}'}\n"
+            for names, about, example in key_lines(settings)
+        )
+        text += f"\n{head}\n{''.join(lines)}".replace("`", "")
+    if os.environ.get("ROTORID_RENEW_PAGES"):
+        path.write_text(text, encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == text
 
 
 def test_every_function_of_expressions_is_named():
