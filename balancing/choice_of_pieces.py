@@ -175,7 +175,7 @@ class Mounted(Answered):
         lines, every = [], records(_columns(self))
         for plane in self.correction.planes:
             here = [
-                (row["pieces"] or figures(row["mass"]), row["hole"], f"{row['angle_deg']:.1f}°")
+                (row["pieces"] or f"{row['mass']:.4g}", row["hole"], f"{row['angle_deg']:.1f}°")
                 for row in every
                 if row["plane"] == plane
             ]
