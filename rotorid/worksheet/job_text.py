@@ -267,7 +267,7 @@ class Job:
 
     def _create(self, key: str, header: Sequence[str], folder: Path) -> None:
         """Begin a table in a file that the job names then."""
-        if key not in KEYS or key in self.tables:
+        if key not in KEYS or key in self.tables or isinstance(self.settings.get(key), list):
             raise ValueError(f"a table {key!r} cannot be made: there is one, or none of this name")
         name = named_tables(self.settings).get(key)
         if name is None:

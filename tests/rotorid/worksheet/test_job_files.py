@@ -148,6 +148,14 @@ def test_a_setting_that_cannot_be_added_is_refused(tmp_path):
     assert (tmp_path / "job.toml").read_text() == text
 
 
+def test_a_list_of_tables_is_not_replaced_by_one(tmp_path):
+    (tmp_path / "job.toml").write_text('runs = "runs.csv"\ncheck_weights = ["pieces.csv", "trim.csv"]\n')
+    before = contents(tmp_path)
+    with pytest.raises(ValueError, match="there is one"):
+        JobFiles(tmp_path).apply([{"create": "check_weights", "header": ["run", "plane"]}])
+    assert contents(tmp_path) == before
+
+
 def test_steps_over_several_files_go_back_to_the_same_bytes(turbo):
     job = JobFiles(turbo)
     versions, states = [contents(turbo)], [tables_of(job)]
