@@ -253,10 +253,11 @@ def alike_words(W: ComplexArray, lost: list[int], planes: Sequence[str]) -> str:
     names = [repr(planes[p]) for p in lost]
     if len(lost) != 2:
         return f"planes {', '.join(names)} act alike: the effect of each follows from the others"
-    ratio = abs(complex(solution(W[:, [lost[1]]], W[:, lost[0]])[0]))
+    ratio = complex(solution(W[:, [lost[1]]], W[:, lost[0]])[0])
     return (
         f"planes {names[0]} and {names[1]} act alike at every sensor and speed "
-        f"(a weight in {names[0]} does what {ratio:.4g} times that weight does in {names[1]})"
+        f"(a weight in {names[0]} does what {abs(ratio):.4g} times that weight does in {names[1]}, turned by "
+        f"{np.degrees(np.angle(ratio)):.0f}° with the rotation)"
     )
 
 

@@ -238,7 +238,7 @@ def remedies(case: Case) -> tuple[str, ...]:
         left, before = map(case.shown, (best.rms, case.before))
         words.append(
             f"weights in {planes} alone would leave about rms {left} of {before} (--planes "
-            f"{','.join(best.planes)})"
+            f"{','.join(best.planes)}, or use = false for others)"
         )
     words += [_trial(case, p) for p in weak if case.trial_weight(p)]
     if case.coarse:

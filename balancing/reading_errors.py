@@ -463,7 +463,7 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
     return (
         f"the runs disagree by {percent(size)} % of the readings{stated}, most of all in run "
         f"{trials.runs[worst]!r}: the rotor does not repeat itself or is not linear, or a row is missing in "
-        f"the weights table{hint}",
+        f"the weights table (of a check run: check_weights){hint}",
     )
 
 

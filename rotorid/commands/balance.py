@@ -29,6 +29,7 @@ from rotorid.commands.choice_of_coefficients import (
     counted,
     needs_trial_run,
     of_planes,
+    used_planes,
 )
 from rotorid.commands.option_units import mounted_weights
 from rotorid.commands.option_values import one_of, speeds
@@ -111,8 +112,8 @@ class Balance(Outcome):
             weights = replace(_behind(weights), judgement=elsewhere if sound else weights.judgement)
         elif sound and {*result.planes} & {*job.holes}:
             weights = replace(weights, judgement=f"{weights.judgement}\nIn holes: --split.")
-        judged = [*limits, *([mounted.answer] if mounted else [])]
-        return together([*judged, weights, *zone] if sound else [weights, *judged[::-1], *zone])
+        shown = [mounted.answer, weights] if mounted else [weights]
+        return together([*(shown if sound else shown[::-1]), *limits, *zone])
 
     def to_dict(self) -> dict[str, Any]:
         """The keys of the correction, and those of what is beside it."""
@@ -283,7 +284,9 @@ def corrected(
 
         if read.trials.relative is not None:
             raise ValueError(f"{path.name}: {read.trials.special}")
-        return influence_bytes(path, as_measured(read, influence))
+        used = [influence.planes.index(plane) for plane in used_planes(read, influence)]
+        part = influence.part(range(len(influence.speeds)), planes=used)
+        return influence_bytes(path, as_measured(read, part))
 
     outcome = Balance(
         result=result,

@@ -261,7 +261,7 @@ def make_holes(planes: Mapping[str, Plane], labels: Labels, problems: Problems) 
 def with_taken(
     holes: Mapping[str, Holes], weights: Source, check: Trials, conventions: Conventions
 ) -> dict[str, Holes]:
-    """The holes with what stands in them since the last check run, where the job does not say what is taken.
+    """The holes with what stands in them since the last check run, beside what the job says is taken.
 
     A plane whose weights are not all in its holes, or fill all of them, stays as it is.
     """
@@ -273,6 +273,6 @@ def with_taken(
         off = np.abs(mounted[:, None] - size[:, None] * holes_at)
         taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
         in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
-        if in_holes and taken.any() and not taken.all() and not free.taken.any():
-            out[plane] = replace(free, taken=taken)
+        if in_holes and taken.any() and not taken.all():
+            out[plane] = replace(free, taken=np.maximum(taken, free.taken))
     return out

@@ -130,7 +130,7 @@ def to_do(
     nothing = "Nothing: no piece makes it better." if not plain and left is None else ""
     return {
         "weights": shown(_weights(document, result, job)) if plain else "",
-        "trim": "" if left is None else shown(trim_table(document, result.labels)),
+        "trim": "" if left is None else (html if pieces else shown)(trim_table(document, result.labels)),
         "holes": shown(Table("", tuple(holes))) if pieces else nothing,
     }
 
@@ -232,7 +232,8 @@ def _readings(document: Mapping[str, Any], c: Correction, check: CheckComparison
         if c.limits is not None and np.isfinite(c.limits.residual).any():
             limits = document["limits"]["amplitude"]
             more.append(Column("limit", limits, _FOUR, "limits.amplitude.*"))
-        return html(_with_blanks(Table("", (*columns, *more))), LONG)
+        table = Table("", (*columns, *more))
+        return html(table if "left_to_do" in document else _with_blanks(table), LONG)
     return html(Table("", tuple(columns)), LONG)
 
 
