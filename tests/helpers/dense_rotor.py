@@ -108,7 +108,7 @@ def whirl(rotor, speed):
 
 
 def synchronous(rotor, speeds):
-    """K and N of undamped whirl at each speed itself, K q = Ω² N q; of the forward plane where that is all."""
+    """K and N of undamped whirl at each speed itself, K q = Ω² N q; of the forward plane if that is all."""
     still = assemble(replace(rotor, supports=[], material_damping=0.0), 1.0).C
     for speed in speeds:
         D = assemble(rotor, speed)
