@@ -367,6 +367,7 @@ def _along(
     m, n = Q.shape
     states = np.empty((m, 5 + 2 * n, n))
     for i in range(m):
-        states[i, 0], states[i, 1] = Q[i], V[i]
+        np.positive(Q[i], states[i, 0])
+        np.positive(V[i], states[i, 1])
         evaluate(equations, (angles[i], speed, 0.0), 0.0, states[i], True)
     return states

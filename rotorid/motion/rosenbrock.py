@@ -176,7 +176,7 @@ def attempt(
             for j in range(n):
                 rate += inverse[i, j] * right[j]
             p[stage, i], w[stage, i] = slip[i] + GAMMA * h * rate, rate
-    now[:2] += stages[:, 7]
+    np.add(now[:2], stages[:, 7], now[:2])
     evaluate(equations, turning, t + h, now, True)
     return bool(np.isfinite(now[2]).all())
 
@@ -191,13 +191,12 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     tolerance: float,
     others: FloatArray,
     origin: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
+    moving: FloatArray,
     largest: FloatArray,
     times: FloatArray,
     out: FloatArray,
 ) -> tuple[int, float, float, int, int]:
-    """Advance q and v, in place, through a time in which C and K are linear in speed.
+    """Advance a motion, in place, through a time in which C and K are linear in speed.
 
     Parameters
     ----------
@@ -219,8 +218,8 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
         0 for deflections, 1 for other unknowns, (n,).
     origin
         Where the motion began, (n,).
-    q, v
-        Where it begins now and then where it ends, (n,).
+    moving
+        q and v where it begins now and then where it ends, (2, n).
     largest
         How far each of q has been from its origin, (n,); changed.
     times, out
@@ -231,11 +230,11 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     How it ends, see `DONE`, or which force's journal is at its wall; the time; the next step; how many steps;
     how many of `times` are written.
     """
-    places, n = equations[2], len(q)
+    places, n, q = equations[2], len(origin), moving[0]
     t, end = span
     h, least = steps
     state, now, stages = np.empty((5 + 2 * n, n)), np.empty((5 + 2 * n, n)), np.empty((2, 8, n))
-    state[0], state[1] = q, v
+    np.positive(moving, state[:2])  # an assignment to a slice takes seconds to compile
     done, written = 0, 0
     evaluate(equations, turning, t, state, True)
     while t < end:
@@ -248,8 +247,8 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
         error, ways = math.inf, largest
         if attempt(equations, turning, t, step, state, now, stages):
             ways = np.maximum(largest, np.abs(now[0] - origin))
-            sizes = np.maximum(ways, 0.01 * np.max(ways * (1.0 - others)))
-            sizes = np.where(others > 0.0, np.max(ways * others), sizes) + 1e-300
+            sizes = (1.0 - others) * np.maximum(ways, 0.01 * np.max(ways * (1.0 - others)))
+            sizes += others * np.max(ways * others) + 1e-300
             error = np.max(np.abs(stages[0, 7]) / sizes) / tolerance
         if not error <= 1.0:
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
@@ -259,10 +258,11 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
         while written < len(times) and times[written] <= then:  # by the method's polynomial of degree 4
             part = (times[written] - t) / step
             bend = bends[0] + part * (bends[1] + part * bends[2])
-            out[written] = (1.0 - part) * state[0] + part * (now[0] + (1.0 - part) * bend)
+            np.add((1.0 - part) * state[0], part * (now[0] + (1.0 - part) * bend), out[written])
             written += 1
         state, now = now, state
-        q[:], v[:], largest[:] = state[0], state[1], ways
+        np.positive(state[:2], moving)
+        np.positive(ways, largest)
         t = then
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)

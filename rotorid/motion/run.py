@@ -167,8 +167,8 @@ def run(
         )
     times = np.linspace(0.0, time, count + 1)
     deflections = np.empty((count + 1, *places.shape))
-    q, v = (np.array(part, dtype=float) for part in start)
-    _consistent(system, q, v, (angle, first, (last - first) / time))
+    q, v = moving = np.array(start, dtype=float)
+    _consistent(system, moving, (angle, first, (last - first) / time))
     deflections[0] = q[places]
     others, origin = np.array([float(name[0] not in "xy") for name in system.coordinates]), q.copy()
     largest = _SMALLEST * np.where(others, np.abs(q * others).max(), np.abs(q * (1 - others)).max())
@@ -176,7 +176,7 @@ def run(
     h, least, done, steps, stopped = 1e-3 * shorter, 1e-10 * shorter, 1, 0, ""
     exact = not system.forces and first == last and np.linalg.cond(system.M) < 1 / _MASSLESS
     if exact:
-        deflections, done, steps = _follow(system, q, v, angle, first, times, places), times.size, count
+        deflections, done, steps = _follow(system, moving, angle, first, times, places), times.size, count
     for (begin, end), equations, turning in (
         () if exact else _pieces(system, (first, last), time, angle, count)
     ):
@@ -184,7 +184,7 @@ def run(
         out = np.empty((at.size, system.size))
         span, at = (0.0, end - begin), np.minimum(at, end) - begin
         settings = equations, turning, system.walls, span, (max(h, least), least), tolerance
-        how, now, h, more, written = advance(*settings, others, origin, q, v, largest, at, out)
+        how, now, h, more, written = advance(*settings, others, origin, moving, largest, at, out)
         deflections[done : done + written] = out[:written, places]
         done, steps = done + written, steps + more
         if how != DONE:
@@ -203,37 +203,36 @@ def run(
 
 def _follow(
     system: MotionSystem,
-    q: FloatArray,
-    v: FloatArray,
+    moving: FloatArray,
     angle: float,
     speed: float,
     times: FloatArray,
     places: IndexArray,
 ) -> FloatArray:
-    """Some unknowns at the times, of constant coefficients; q and v are those at the last then."""
+    """Some unknowns at the times, of constant coefficients; `moving`, q and v, is that at the last then."""
     from scipy.linalg import expm
 
     C, K = system.linear(speed)
-    n = len(q)
+    n = system.size
     A = np.zeros((2 * n + 2, 2 * n + 2), complex)
     A[:n, n : 2 * n] = np.eye(n)
     A[n : 2 * n] = np.linalg.solve(
         system.M, np.column_stack((-K, -C, system.weight, system.unbalance * speed**2 + system.bow))
     )
     A[-1, -1] = 1j * speed
-    y = np.concatenate((q, v, [1.0, np.exp(1j * angle)]))
-    kept, before = [q[places]], 0.0
+    y = np.concatenate((*moving, [1.0, np.exp(1j * angle)]))
+    kept, before = [moving[0, places]], 0.0
     for step in np.diff(times):
         if abs(step - before) > 1e-9 * before:
             change, before = expm(A * step), step
         y = change @ y
         kept.append(y[places].real)
-    q[:], v[:] = y[:n].real, y[n : 2 * n].real
+    moving[:] = y[: 2 * n].real.reshape(2, n)
     return np.array(kept)
 
 
-def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> None:
-    """Change velocities so that the forces on what has no mass are in equilibrium.
+def _consistent(system: MotionSystem, moving: FloatArray, turning: Turning) -> None:
+    """Change the velocities of `moving`, q and v, so that the forces on what has no mass are in equilibrium.
 
     Raises
     ------
@@ -243,7 +242,7 @@ def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Tur
     n, free = system.size, np.flatnonzero(~system.M.any(axis=1))
     state, equations = np.zeros((5 + 2 * n, n)), equations_of(system, turning[1], turning[1])
     for _ in range(20 if free.size else 0):
-        state[0], state[1] = q, v
+        state[:2] = moving
         evaluate(equations, turning, 0.0, state, True)
         J = state[5 + n :][np.ix_(free, free)]
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
@@ -253,8 +252,8 @@ def _consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Tur
                 "mass, or a bearing with damping"
             )
         change = np.linalg.solve(J, state[2, free])
-        v[free] -= change
-        if np.abs(change).max() <= 1e-13 * np.abs(v).max():
+        moving[1, free] -= change
+        if np.abs(change).max() <= 1e-13 * np.abs(moving[1]).max():
             break
 
 

@@ -20,7 +20,7 @@ FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 def test_any_rotor_against_dense_matrices(rotor):
     rotor = dataclasses.replace(rotor, model=dataclasses.replace(rotor.model, shear=False))
     found = fem.critical_speeds(rotor, 4)
-    K, N = dense_rotor.synchronous(rotor, 0.0)
+    ((K, N),) = dense_rotor.synchronous(rotor, [0.0])
     mu = eigh(N, K, eigvals_only=True)[::-1]
     np.testing.assert_allclose(found.frequencies, 1 / np.sqrt(mu[:4]), rtol=1e-7)
     if rotor.symmetric:

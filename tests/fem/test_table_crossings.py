@@ -11,17 +11,15 @@ from whirl_rotors import on_tables
 import fem
 
 DRAWN = 200 if FULL else 25
-SCAN = 1500 if FULL else 300
+SCAN = 1500 if FULL else 150
 
 
 def missed(rotor):
     """Crossings that a dense scan sees and the search does not, or the other way round."""
     first, last = rotor.supports[0].speeds[0], rotor.supports[0].speeds[-1]
     speeds = np.linspace(first, last, SCAN)
-    at = (dense_rotor.synchronous(rotor, speed) for speed in speeds)
-    seen = np.array(
-        [(np.linalg.eigvalsh(K - v**2 * N) < 0).sum() for v, (K, N) in zip(speeds, at, strict=True)]
-    )
+    at = zip(speeds, dense_rotor.synchronous(rotor, speeds), strict=True)
+    seen = np.array([(np.linalg.eigvalsh(K - v**2 * N) < 0).sum() for v, (K, N) in at])
     try:
         found = fem.critical_speeds(rotor, 100).frequencies
     except ValueError as problem:

@@ -107,17 +107,18 @@ def whirl(rotor, speed):
     return 1 / values[finite] + shift, vectors[D.x][:, finite].T, vectors[D.y][:, finite].T
 
 
-def synchronous(rotor, speed):
-    """K and N of undamped whirl at the speed itself, K q = Ω² N q; of the forward plane where that is all."""
-    D = assemble(rotor, speed)
+def synchronous(rotor, speeds):
+    """K and N of undamped whirl at each speed itself, K q = Ω² N q; of the forward plane if that is all."""
     still = assemble(replace(rotor, supports=[], material_damping=0.0), 1.0).C
-    K, N = (D.K + D.K.T) / 2, D.M.astype(complex)
-    N[: len(still), : len(still)] -= 1j * still
-    if not rotor.symmetric:
-        return K, N
-    feet = np.arange(len(still), len(K), 2)
-    x, y = np.concatenate((D.x, D.x + 1, feet)), np.concatenate((D.y, D.y + 1, feet + 1))
-    return tuple(A[np.ix_(x, x)] - 1j * A[np.ix_(x, y)] for A in (K, N))
+    for speed in speeds:
+        D = assemble(rotor, speed)
+        K, N = (D.K + D.K.T) / 2, D.M.astype(complex)
+        N[: len(still), : len(still)] -= 1j * still
+        if rotor.symmetric:
+            feet = np.arange(len(still), len(K), 2)
+            x, y = np.concatenate((D.x, D.x + 1, feet)), np.concatenate((D.y, D.y + 1, feet + 1))
+            K, N = (A[np.ix_(x, x)] - 1j * A[np.ix_(x, y)] for A in (K, N))
+        yield K, N
 
 
 def response(rotor, unbalance, speed):
