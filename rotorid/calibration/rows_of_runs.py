@@ -31,7 +31,7 @@ from fem import (
     unit_loads,
 )
 from fem.assembly import assemble, multiply, supported
-from fem.parameters import typical_size, with_changes, with_parameters
+from fem.parameters import as_change, typical_size, with_changes, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.calibration.unknowns import as_they_stand
@@ -106,12 +106,18 @@ class RunReadings:
             loads.append(self._bow_loads(start, rotor))
 
         def change(path: str) -> MatrixChange:
-            step = STEP * sizes[path]
-            return matrix_change(lambda by: with_changes(rotor, {path: by}), step, speeds)
+            # what a coefficient adds is the same at all values, unless a pedestal gives way
+            constant = as_change(start, path).endswith("offset") and not any(s.pedestal for s in start.supports)
+            at, key = start if constant else rotor, (path, speeds.tobytes())
+            kept = vars(at).setdefault("_changes", {})  # with the rotor
+            if key not in kept:
+                step = STEP * sizes[path]
+                kept[key] = matrix_change(lambda by: with_changes(at, {path: by}), step, speeds)
+            return kept[key]
 
         of_rotor = [path for path in derivatives if not is_reading(path)]
         # also of a number near 0
-        sizes = {path: max(typical_size(each, path) for each in (start, rotor)) for path in of_rotor}
+        sizes = {path: max(typical_size(start, path), abs(values[path])) for path in of_rotor}
         receptance = receptance_with_derivatives(
             rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in of_rotor]
         )

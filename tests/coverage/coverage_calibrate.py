@@ -333,7 +333,7 @@ def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: 
         name: Sensor(node=probe.node, angle_deg=probe.angle)
         for name, probe in zip(PROBES, machine.sensors, strict=True)
     }
-    return balance(Job(runs, None, Conventions(), (), planes, sensors, rotor=rotor))
+    return balance(Job(runs, None, Conventions(), (), planes, sensors=sensors, rotor=rotor))
 
 
 def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:
