@@ -12,7 +12,7 @@ covariance", Schmidt 1966).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -53,11 +53,8 @@ class _Equations:
         self.size = 0
         self._coefficients = lru_cache(LATEST)(self._computed)
 
-    def values(self, theta: Iterable[float]) -> dict[str, float]:
-        return dict(zip(self.paths, theta, strict=True))
-
     def _computed(self, *theta: float) -> list[tuple[ComplexArray, ComplexArray]]:
-        values = self.values(theta)
+        values = dict(zip(self.paths, theta, strict=True))
         return [data.coefficients(self.rotor, values, self.paths) for data in self.readings]
 
     def at(self, theta: FloatArray) -> list[tuple[ReadingRows, ComplexArray, ComplexArray]]:
@@ -83,11 +80,6 @@ class _Equations:
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         return np.vstack([rows.jacobian(W, dW) for rows, W, dW in self.at(theta)])
-
-    def by(self, paths: Sequence[str], values: dict[str, float]) -> FloatArray:
-        """Derivatives by any numbers that have values."""
-        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, paths)) for rows in self.rows]
-        return np.vstack(parts)
 
 
 def calibrate(
@@ -168,10 +160,7 @@ def _searches(
     lower, upper = bounds.T
 
     def search(begin: FloatArray) -> list[tuple[float, FloatArray]]:
-        begin = np.clip(begin, lower, upper)
-        if not np.isfinite(residual(begin)).all():
-            return []
-        end = search_from(residual, begin, jacobian, limit=LIMIT)
+        end = search_from(residual, np.clip(begin, lower, upper), jacobian, limit=LIMIT)
         return [end] if end is not None and ((lower <= end[1]) & (end[1] <= upper)).all() else []
 
     ends = search(first)
@@ -193,7 +182,8 @@ def _judged(
 ) -> CalibratedRotor:
     """The rotor with these numbers, and whether the model explains the data."""
     theta, rotor, rows = fit.estimate.solution, equations.rotor, equations.rows
-    K, r, values = equations.jacobian(theta), equations.residual(theta), equations.values(theta.tolist())
+    K, r = equations.jacobian(theta), equations.residual(theta)
+    values = dict(zip(equations.paths, theta.tolist(), strict=True))
     bare = [each.bare(W, dW) for each, W, dW in equations.at(theta)]
     spent = sum(each.rank for each in bare)
 
@@ -205,8 +195,9 @@ def _judged(
     times = max(chi_square / dof, 1.0) if chance < LEVEL else 1.0
     covariance *= times
     if off := {number.path: number.prior for number in exact if number.prior}:
-        H = equations.by([*off], values | {path: value for path, (value, _) in off.items()})
-        H = np.vstack((H * [std for _, std in off.values()], np.zeros((len(prior), len(off)))))
+        both = values | {path: value for path, (value, _) in off.items()}
+        parts = [each.jacobian(*each.data.coefficients(rotor, both, [*off])) for each in rows]
+        H = np.vstack((*parts, np.zeros((len(prior), len(off))))) * [std for _, std in off.values()]
         moved = solution(prior.below(K), H)
         covariance = covariance + moved @ moved.T
     to = as_they_stand(rotor, values)
