@@ -101,7 +101,7 @@ def shots(rng, drawn, kind, m):
             found.append(None)
             continue
         after = W @ (answer.weights - D)
-        left = float(np.linalg.norm(after) / np.linalg.norm(W @ D))
+        left = np.linalg.norm(after) / np.linalg.norm(W @ D)
         found.append(judged(answer, D, left, read(rng, after), chance < LEVEL))
     return found
 
