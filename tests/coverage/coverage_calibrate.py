@@ -242,7 +242,9 @@ def least_std(machine, truth, data, bare, numbers):
     along = np.concatenate(
         (READING.amplitude * each, 1j * READING.phase * each, run, 1j * run, free, 1j * free)
     )
-    E, J = (real_parts(A.reshape(len(A), -1)) for A in (along, np.einsum("nscp,rp->nrsc", dW, TRIAL)))
+    E, J = (
+        real_parts(A.reshape(len(A), -1)) for A in (along, np.einsum("nscp,rp->nrsc", dW[..., :2], TRIAL))
+    )
     known = np.diag([one.prior[1] ** -2.0 for one in numbers])
     return np.sqrt(np.diag(np.linalg.inv(J @ np.linalg.solve(E.T @ E, J.T) + known)))
 

@@ -121,8 +121,8 @@ def judged(
     """Against the truth, and a check run."""
     off = stretch((check - found.after).ravel()).reshape(-1, 2, 1)
     far = (np.swapaxes(off, 1, 2) @ np.linalg.solve(found.after_covariance.reshape(-1, 2, 2), off)).ravel()
-    size = float(np.sqrt(np.mean(np.abs(check) ** 2)))
-    readings = float(np.mean(far < NORMAL_RADIUS**2))
+    size = np.sqrt(np.mean(np.abs(check) ** 2))
+    readings = np.mean(far < NORMAL_RADIUS**2)
     weights = found.region().holds(D)
     return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings), foreign)
 
