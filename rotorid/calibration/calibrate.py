@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -21,7 +22,7 @@ from scipy.special import chdtrc
 
 from fem import Calibration, Rotor, is_reading
 from fem.parameters import with_parameters
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.calibration.result import LEVEL, CalibratedRotor
 from rotorid.calibration.rows_of_runs import ReadingRows, RunReadings
 from rotorid.calibration.unknowns import Unknown, as_they_stand, check_different
@@ -39,6 +40,8 @@ TINY = 1e-9
 """Mean χ² that is none: no degree of freedom is left."""
 AS_WELL = 4.0
 """Of χ²: other numbers that explain the data so nearly as well are reported."""
+LATEST = 3
+"""Numbers at which coefficients are kept: accepted, tried, and those before."""
 
 
 class _Equations:
@@ -48,20 +51,25 @@ class _Equations:
         self.rotor, self.paths, self.readings = rotor, paths, readings
         self.rows: list[ReadingRows] = []
         self.size = 0
+        self._coefficients = lru_cache(LATEST)(self._computed)
 
-    def values(self, theta: FloatArray) -> dict[str, float]:
-        return dict(zip(self.paths, theta.tolist(), strict=True))
+    def _computed(self, *theta: float) -> list[tuple[ComplexArray, ComplexArray]]:
+        values = dict(zip(self.paths, theta, strict=True))
+        return [data.coefficients(self.rotor, values, self.paths) for data in self.readings]
+
+    def at(self, theta: FloatArray) -> list[tuple[ReadingRows, ComplexArray, ComplexArray]]:
+        """Of all data: rows, coefficients at these numbers, and their derivatives."""
+        each = self._coefficients(*theta.tolist())
+        return [(rows, *both) for rows, both in zip(self.rows, each, strict=True)]
 
     def weigh(self, theta: FloatArray) -> None:
         """Take the errors of the readings as they are at these numbers."""
-        values = self.values(theta)
-        self.rows = [data.rows(data.coefficients(self.rotor, values)[0]) for data in self.readings]
+        each = self._coefficients(*theta.tolist())
+        self.rows = [data.rows(W) for data, (W, _) in zip(self.readings, each, strict=True)]
 
     def residual(self, theta: FloatArray) -> FloatArray:
-        values = self.values(theta)
         try:
-            W = [data.coefficients(self.rotor, values)[0] for data in self.readings]
-            parts = [rows.residual(each)[0] for rows, each in zip(self.rows, W, strict=True)]
+            parts = [rows.residual(W)[0] for rows, W, _ in self.at(theta)]
         except (ValueError, np.linalg.LinAlgError):
             if not self.size:
                 raise
@@ -71,12 +79,7 @@ class _Equations:
         return residuals
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
-        return self.by(self.paths, self.values(theta))
-
-    def by(self, paths: Sequence[str], values: dict[str, float]) -> FloatArray:
-        """Derivatives by any numbers that have values."""
-        parts = [rows.jacobian(*rows.data.coefficients(self.rotor, values, paths)) for rows in self.rows]
-        return np.vstack(parts)
+        return np.vstack([rows.jacobian(W, dW) for rows, W, dW in self.at(theta)])
 
 
 def calibrate(
@@ -157,10 +160,7 @@ def _searches(
     lower, upper = bounds.T
 
     def search(begin: FloatArray) -> list[tuple[float, FloatArray]]:
-        begin = np.clip(begin, lower, upper)
-        if not np.isfinite(residual(begin)).all():
-            return []
-        end = search_from(residual, begin, jacobian, limit=LIMIT)
+        end = search_from(residual, np.clip(begin, lower, upper), jacobian, limit=LIMIT)
         return [end] if end is not None and ((lower <= end[1]) & (end[1] <= upper)).all() else []
 
     ends = search(first)
@@ -182,8 +182,9 @@ def _judged(
 ) -> CalibratedRotor:
     """The rotor with these numbers, and whether the model explains the data."""
     theta, rotor, rows = fit.estimate.solution, equations.rotor, equations.rows
-    K, r, values = equations.jacobian(theta), equations.residual(theta), equations.values(theta)
-    bare = [each.bare(*each.data.coefficients(rotor, values, equations.paths)) for each in rows]
+    K, r = equations.jacobian(theta), equations.residual(theta)
+    values = dict(zip(equations.paths, theta.tolist(), strict=True))
+    bare = [each.bare(W, dW) for each, W, dW in equations.at(theta)]
     spent = sum(each.rank for each in bare)
 
     def mismatch(theta: FloatArray) -> float:
@@ -194,12 +195,13 @@ def _judged(
     times = max(chi_square / dof, 1.0) if chance < LEVEL else 1.0
     covariance *= times
     if off := {number.path: number.prior for number in exact if number.prior}:
-        H = equations.by([*off], values | {path: value for path, (value, _) in off.items()})
-        H = np.vstack((H * [std for _, std in off.values()], np.zeros((len(prior), len(off)))))
+        both = values | {path: value for path, (value, _) in off.items()}
+        parts = [each.jacobian(*each.data.coefficients(rotor, both, [*off])) for each in rows]
+        H = np.vstack((*parts, np.zeros((len(prior), len(off))))) * [std for _, std in off.values()]
         moved = solution(prior.below(K), H)
         covariance = covariance + moved @ moved.T
     to = as_they_stand(rotor, values)
-    lack = _lack_of_fit(equations, values) if chance < LEVEL else 0.0
+    lack = _lack_of_fit(equations, theta) if chance < LEVEL else 0.0
     explained = chance >= LEVEL and fit.converged and fit.estimate.full_rank
     calibration = Calibration(
         names=tuple(equations.paths),
@@ -242,11 +244,10 @@ def _of_errors(
     that of g χ²(ν) of the same mean and variance; mean over what errors between runs may be.
     """
     theta = fit.estimate.solution
-    estimated, values = fit.estimate.solution_covariance, equations.values(theta)
+    estimated = fit.estimate.solution_covariance
     free = np.flatnonzero(np.zeros(theta.size) if estimated is None else ~np.isnan(np.diag(estimated)))
     G = prior.below(equations.jacobian(theta))[:, free]
-    W = [rows.data.coefficients(equations.rotor, values)[0] for rows in equations.rows]
-    every = [rows.spreads(each) for rows, each in zip(equations.rows, W, strict=True)]
+    every = [rows.spreads(W) for rows, W, _ in equations.at(theta)]
     count, covariance = max(map(len, every)), np.zeros((theta.size,) * 2)
     chances = []
     for k in range(count):
@@ -260,14 +261,13 @@ def _of_errors(
     return float(np.mean(chances)), covariance
 
 
-def _lack_of_fit(equations: _Equations, values: dict[str, float]) -> float:
+def _lack_of_fit(equations: _Equations, theta: FloatArray) -> float:
     """What the model leaves of what weights do beyond the errors: relative rms over speeds and sensors.
 
     The mean over all readings of a job counts as two more rows of each speed and sensor.
     """
     relative = []
-    for rows in equations.rows:
-        W = rows.data.coefficients(equations.rotor, values)[0]
+    for rows, W, _ in equations.at(theta):
         bare = np.einsum("scq,q->sc", W[..., len(rows.data.nodes) :], rows.residual(W)[2])[:, None]
         left = rows.raw(W) + bare
         square = (np.abs(left) ** 2 / 2 - rows.variance).sum(axis=1)

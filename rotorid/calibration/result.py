@@ -120,9 +120,11 @@ class CalibratedRotor:
     @property
     def bare(self) -> list[str]:
         """Of what `unbalance` is, one set of runs after the other."""
-        nodes = [[f"node {node}" for node in data.unbalance] for data in self.readings]
-        bows = [[f"bow {k + 1}" for k in range(data.bow)] for data in self.readings]
-        return [name for each in zip(nodes, bows, strict=True) for part in each for name in part]
+        return [
+            name
+            for data in self.readings
+            for name in [f"node {n}" for n in data.unbalance] + [f"bow {k + 1}" for k in range(data.bow)]
+        ]
 
     @property
     def undetermined(self) -> str:

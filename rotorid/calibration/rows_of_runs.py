@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -31,7 +31,7 @@ from fem import (
     unit_loads,
 )
 from fem.assembly import assemble, multiply, supported
-from fem.parameters import typical_size, with_changes, with_parameters
+from fem.parameters import as_change, typical_size, with_changes, with_parameters
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 from rotorid.calibration.unknowns import as_they_stand
@@ -105,13 +105,21 @@ class RunReadings:
         if self.bow:
             loads.append(self._bow_loads(start, rotor))
 
+        on_pedestals = any(support.pedestal for support in start.supports)
+
         def change(path: str) -> MatrixChange:
-            step = STEP * sizes[path]
-            return matrix_change(lambda by: with_changes(rotor, {path: by}), step, speeds)
+            # a coefficient acts the same at all values, unless a pedestal gives way
+            constant = as_change(start, path).endswith("offset") and not on_pedestals
+            at, key = start if constant else rotor, (path, speeds.tobytes())
+            kept: dict[Any, MatrixChange] = vars(at).setdefault("_changes", {})  # with the rotor
+            if key not in kept:
+                step = STEP * sizes[path]
+                kept[key] = matrix_change(lambda by: with_changes(at, {path: by}), step, speeds)
+            return kept[key]
 
         of_rotor = [path for path in derivatives if not is_reading(path)]
         # also of a number near 0
-        sizes = {path: max(typical_size(each, path) for each in (start, rotor)) for path in of_rotor}
+        sizes = {path: max(typical_size(start, path), abs(values[path])) for path in of_rotor}
         receptance = receptance_with_derivatives(
             rotor, np.hstack(loads), rows, angles, speeds, [change(path) for path in of_rotor]
         )
@@ -125,9 +133,9 @@ class RunReadings:
         W = receptance.H * factor
         out = np.zeros((len(derivatives), *W.shape), dtype=complex)
         to = as_they_stand(start, {path: values[path] for path in of_rotor})
-        for k, path in enumerate(of_rotor):  # what rounding leaves of a number that does nothing
-            seen = np.abs(receptance.by_number[k]).max() * sizes[path]
-            receptance.by_number[k] *= seen > UNSEEN * np.abs(receptance.H).max()
+        for path, by in zip(of_rotor, receptance.by_number, strict=True):
+            # what rounding leaves of a number that does nothing
+            by *= np.abs(by).max() * sizes[path] > UNSEEN * np.abs(receptance.H).max()
         by_number = np.tensordot(to.T, receptance.by_number, 1)
         for k, path in enumerate(derivatives):
             if path in of_rotor:
@@ -201,6 +209,11 @@ def run_errors(trials: Trials) -> RunErrors:
     return _AnyShare(sizes, np.full(len(sizes), 1 / len(sizes)), run.origin, run.level, run.evenly)
 
 
+def _beside(basis: FloatArray, columns: FloatArray) -> FloatArray:
+    """What a basis (m, 2q) leaves of columns (m, k)."""
+    return columns - basis @ solution(basis, columns) if basis.size else columns
+
+
 class Bare(NamedTuple):
     """Unbalances and bows u (q,) of a bare rotor, NaN where not determined, and what their errors come from.
 
@@ -265,7 +278,7 @@ class ReadingRows:
             if k == len(run.sizes):
                 shared = block_diag(*shared.reshape(S, C * n, -1)).reshape(S, C, n, -1)
             E = self.whitening.white(np.concatenate((alone.reshape(S, C, n, -1), shared), axis=-1))
-            spreads.append(E - basis @ solution(basis, E) if basis.size else E)
+            spreads.append(_beside(basis, E))
         return spreads
 
     def raw(self, W: ComplexArray) -> ComplexArray:
@@ -285,11 +298,8 @@ class ReadingRows:
 
     def jacobian(self, W: ComplexArray, dW: ComplexArray) -> FloatArray:
         """Derivatives (m, n) of the residuals by n numbers, dW (n, S, C, P + q)."""
-        if not self.data.modelled:
-            return self._changes(dW)
         _, basis, u = self.residual(W)
-        J = self._changes(dW, u)
-        return np.asarray(J - basis @ solution(basis, J))
+        return _beside(basis, self._changes(dW, u))
 
     def bare(self, W: ComplexArray, dW: ComplexArray) -> Bare:
         """What the rows say of the bare rotor besides."""
@@ -301,12 +311,10 @@ class ReadingRows:
         assert alone.solution_covariance is not None
         return Bare(u, alone.solution_covariance, solution(basis, self._changes(dW, u)), alone.rank)
 
-    def _changes(self, dW: ComplexArray, u: ComplexArray | None = None) -> FloatArray:
+    def _changes(self, dW: ComplexArray, u: ComplexArray) -> FloatArray:
         """Derivatives (m, n) of what the rows say, with what dW makes of the unknowns u."""
-        change = self.effect(dW)
-        if u is not None:
-            bare = np.einsum("nscq,q->nsc", dW[..., len(self.data.nodes) :], u)
-            change = change + bare[:, :, None, :] * self.take.sum(axis=1)[:, None]
+        bare = np.einsum("nscq,q->nsc", dW[..., len(self.data.nodes) :], u)
+        change = self.effect(dW) + bare[:, :, None, :] * self.take.sum(axis=1)[:, None]
         return self._white(np.moveaxis(change, 0, -1))
 
     def _project(self, W: ComplexArray, r: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray]:

@@ -1,6 +1,7 @@
 """Does a calibrated rotor balance in one shot, do its intervals hold, is a misfit seen? Drawn machines.
 
-Run `python tests/coverage/coverage_calibrate.py [seed] [machines]`, machines of each case (1, 510: 3 hours).
+Run `python tests/coverage/coverage_calibrate.py [SEED [MACHINES [LACKING]]]`: how many of each case,
+and of those in which the model lacks something (1, 510, 510: 3 hours).
 
 A machine is the compressor of `sample_data`, its rotor23 on unlike bearings, or an overhung fan of drawn
 sizes on soft pedestals. Its bearings differ by 20 % from what is believed, each coefficient on its own,
@@ -14,24 +15,24 @@ gives the weights.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from coverage_balance import normal, percent
+from coverage_balance import normal, of_runs, percent
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 import fem
 from balancing import Labels, ReadingErrors, Region, RunScatter, Trials, UndeterminedError, compare_check
+from balancing.regions import real_parts
 from fem import receptance_with_derivatives
 from fem.assembly import assemble, multiply
 from fem.parameters import with_parameters
 from rotorid import read_rotor
-from rotorid.calibration import CalibratedRotor, RunReadings, Unknown, calibrate
-from rotorid.commands.balance import Balance, balance
+from rotorid.calibration import RunReadings, calibrate
+from rotorid.commands.balance import balance
 from rotorid.commands.calibrate_options import unknowns
 from rotorid.files import Job
 from rotorid.files.job_keys import Plane, Sensor
@@ -39,7 +40,6 @@ from rotorid.files.table_layouts import Conventions
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
-Random = np.random.Generator
 
 RPM = np.pi / 30
 PROBES = ("DE x", "DE y", "NDE x", "NDE y")
@@ -65,11 +65,11 @@ class Machine(NamedTuple):
     speeds: FloatArray
 
     @property
-    def sensors(self) -> tuple[fem.Sensor, ...]:
+    def sensors(self):
         """Two probes at each end."""
         return tuple(fem.Sensor(node, angle) for node in self.probes for angle in (45.0, 135.0))
 
-    def unknowns(self, *, exact: bool = False) -> list[Unknown]:
+    def unknowns(self, *, exact=False):
         """What `rotorid calibrate --estimate "bearing[*].*" --prior "…=20%"` takes as unknown."""
         prior = "bearing[*].k*=20%, bearing[*].c*=20%"
         return unknowns(self.rotor, PROBES, "bearing[*].*", prior, exact=exact)
@@ -90,9 +90,9 @@ class Outcome(NamedTuple):
 
     `left_exact` is what the exact model would leave from the same reading, `left_believed` the uncalibrated
     one. Of the numbers: errors over deviations (NaN at a bound), those that the data tell more of than was
-    known before, and dᵀ C⁻¹ d of all; whether the joint region of the weights holds the true ones; of a check
-    run: whether each reading is within its region, and whether all are, jointly. `chance` is that of a larger
-    χ², `told` that a trial run is needed.
+    known before, dᵀ C⁻¹ d of all, and `width`, their deviations over the least possible; whether the joint
+    region of the weights holds the true ones; of a check run: whether each reading is within its region, and
+    whether all are, jointly. `chance` is that of a larger χ², `told` that a trial run is needed.
     """
 
     left: float
@@ -107,20 +107,21 @@ class Outcome(NamedTuple):
     chance: float
     told: bool
     words: tuple[str, ...]
+    width: FloatArray
 
     @property
-    def good(self) -> bool:
+    def good(self):
         """Whether the shot is as good as wanted."""
         return self.left <= max(GOOD, NEAR * self.left_exact)
 
 
-def compressor(_: Random) -> Machine:
+def compressor(_):
     """Of the samples."""
     rotor = read_rotor(SAMPLES / "compressor" / "rotor.toml")
     return Machine(rotor, (8, 10, 12, 14, 16), (8, 16), (3, 23), np.array([2500, 3500, 4300, 6000]) * RPM)
 
 
-def rotor23(_: Random) -> Machine:
+def rotor23(_):
     """Twelve discs on bearings that are unlike in x and y and couple both."""
     plain = read_rotor(SAMPLES / "rotor23.csv")
     discs = [replace(d, polar_inertia=0.02 * d.mass, diametral_inertia=0.011 * d.mass) for d in plain.discs]
@@ -130,17 +131,17 @@ def rotor23(_: Random) -> Machine:
     return Machine(rotor, (7, 9, 11, 13, 15), (7, 15), (3, 21), np.array([1000, 1500, 3000, 4500]) * RPM)
 
 
-def overhung(random: Random) -> Machine:
+def overhung(random):
     """A fan whose wheel, shaft, bearings and soft pedestals are drawn."""
 
-    def between(low: float, high: float) -> float:
-        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+    def between(low, high):
+        return np.exp(random.uniform(np.log(low), np.log(high)))
 
     mass, size = between(60, 200), between(0.7, 1.2)
     wheel = fem.Disc(17, mass, mass * size**2 / 10, mass * size**2 / 17)
     hub = fem.Disc(1, between(8, 25), 0.1, 0.06)
 
-    def bearing(node: int) -> fem.Support:
+    def bearing(node):
         k, c = between(8e7, 3e8), between(5e4, 2e5)
         stiffness = ((k, 0.05 * k), (-0.03 * k, k * between(0.5, 1)))
         stand = (between(3e7, 1e8), between(3e7, 1e8))
@@ -155,18 +156,18 @@ def overhung(random: Random) -> Machine:
         supports=bearings,
         model=fem.Model(True, True, True),
     )
-    critical = float(fem.critical_speeds(rotor, n=1).frequencies[0])
+    critical = fem.critical_speeds(rotor, n=1).frequencies[0]
     return Machine(rotor, (1, 6, 9, 16, 17), (1, 17), (4, 13), critical * np.array([0.7, 0.9, 1.1, 1.4]))
 
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
-MACHINES: dict[str, Callable[[Random], Machine]] = {
+MACHINES = {
     "compressor": compressor,
     "rotor23": rotor23,
     "overhung": overhung,
 }
 
-CASES: dict[str, dict[str, Any]] = {
+CASES = {
     "four speeds": {},
     "one speed": {"one_speed": True},
     "exact, four speeds": {"exact": True},
@@ -179,15 +180,15 @@ WHOLE = ("four speeds", "one speed")
 """Cases in which the model lacks nothing."""
 
 
-def third_bearing(random: Random, rotor: fem.Rotor) -> fem.Rotor:
+def third_bearing(random, rotor):
     """A further bearing somewhere between the two, a tenth as stiff to as stiff as these."""
     first, last = (support.node for support in rotor.supports[:2])
-    k = float(rotor.supports[0].at(200.0)[0][0, 0]) * 10 ** random.uniform(-1.0, 0.0)
+    k = rotor.supports[0].at(200.0)[0][0, 0] * 10 ** random.uniform(-1.0, 0.0)
     further = fem.Support(int(random.integers(first + 2, last - 1)), k, 1e-3 * k, kind="seal")
     return replace(rotor, supports=(*rotor.supports, further))
 
 
-def bent(rotor: fem.Rotor, sensors: Sequence[fem.Sensor], speeds: FloatArray) -> ComplexArray:
+def bent(rotor, sensors, speeds):
     """What the probes read of a rotor bent like a parabola by 1 m between its ends, (S, C)."""
     A = assemble(rotor)
     x = np.append(0.0, np.cumsum(rotor.length)) / np.sum(rotor.length)
@@ -199,9 +200,7 @@ def bent(rotor: fem.Rotor, sensors: Sequence[fem.Sensor], speeds: FloatArray) ->
     return receptance_with_derivatives(rotor, multiply(A.shaft, v), rows, angles, speeds, ()).H[..., 0]
 
 
-def draw(
-    random: Random, machine: Machine, *, one_speed: bool, third: bool = False, bow: float = 0.0
-) -> Truth:
+def draw(random, machine, *, one_speed, third=False, bow=0.0):
     """A machine of this kind as it really is."""
     numbers = {u.path: random.normal(*u.prior) for u in machine.unknowns() if u.prior}
     rotor = with_parameters(machine.rotor, numbers)
@@ -216,7 +215,7 @@ def draw(
     return Truth(numbers, speeds, W_stations, W, of_bow)
 
 
-def read(random: Random, Y: ComplexArray) -> ComplexArray:
+def read(random, Y):
     """Runs (R, S, C) as they are read."""
     R, S, C = Y.shape
     kinds = normal(random, R, 1, 1) + normal(random, R, S, 1) + normal(random, R, S, C)
@@ -225,7 +224,7 @@ def read(random: Random, Y: ComplexArray) -> ComplexArray:
     return run * (1 + READING.amplitude * a) * np.exp(1j * READING.phase * b)
 
 
-def trials(machine: Machine, speeds: FloatArray, readings: ComplexArray, weights: ComplexArray) -> Trials:
+def trials(machine, speeds, readings, weights):
     """Runs of this machine."""
     names = tuple(f"run {k + 1}" for k in range(len(readings)))
     planes = tuple(f"plane {node}" for node in machine.planes)
@@ -233,16 +232,33 @@ def trials(machine: Machine, speeds: FloatArray, readings: ComplexArray, weights
     return Trials(names, speeds, PROBES, planes, readings, weights, READING, labels, run_errors=RUN)
 
 
+def least_std(machine, truth, data, bare, numbers):
+    """Least standard deviations (n,) of numbers, by Cramér and Rao, with the true errors and the priors."""
+    Y = np.stack([bare + truth.W @ T for T in TRIAL])
+    _, dW = data.coefficients(machine.rotor, truth.numbers, [one.path for one in numbers])
+    each, *common = (of_runs(kind, Y, Y) for kind in ("independent", "common at a speed", "common to a run"))
+    run = RUN.relative / np.sqrt(3) * np.concatenate((each, *common))
+    free = 0 * Y + 100 * np.abs(Y).max() * np.eye(bare.size).reshape(-1, 1, *bare.shape)
+    along = np.concatenate(
+        (READING.amplitude * each, 1j * READING.phase * each, run, 1j * run, free, 1j * free)
+    )
+    E, J = (
+        real_parts(A.reshape(len(A), -1)) for A in (along, np.einsum("nscp,rp->nrsc", dW[..., :2], TRIAL))
+    )
+    known = np.diag([one.prior[1] ** -2.0 for one in numbers])
+    return np.sqrt(np.diag(np.linalg.inv(J @ np.linalg.solve(E.T @ E, J.T) + known)))
+
+
 def one_machine(
-    random: Random,
-    name: str,
+    random,
+    name,
     *,
-    one_speed: bool = False,
-    exact: bool = False,
-    third: bool = False,
-    bow: float = 0.0,
-    modelled: int | None = None,
-) -> Outcome:
+    one_speed=False,
+    exact=False,
+    third=False,
+    bow=0.0,
+    modelled=None,
+):
     """Draw a machine, calibrate it, balance it another day, see.
 
     `exact`: only the bearings are unknown. `modelled`: the bare rotor's readings count by unknown unbalances
@@ -263,8 +279,9 @@ def one_machine(
     numbers = machine.unknowns(exact=exact)
     held = [one for one in machine.unknowns() if exact and one.beside]
     found = calibrate(machine.rotor, numbers, [data], exact=held, side_starts=False)
+    width = found.std / least_std(machine, truth, data, bare, numbers)
     try:
-        return shot(random, machine, truth, found)
+        return shot(random, machine, truth, found)._replace(width=width)
     except UndeterminedError as error:  # which leaves the machine as it is
         nothing, words = np.zeros(0), (*found.warnings, str(error))
         return Outcome(
@@ -280,10 +297,11 @@ def one_machine(
             found.chance,
             True,
             words,
+            nothing,
         )
 
 
-def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor) -> Outcome:
+def shot(random, machine, truth, found):
     """Balance another day, and a third with unbalance in the planes alone: true weights are known then."""
     vibration = truth.W_stations @ (UNBALANCE * normal(random, 5)) + truth.bow
     measured = read(random, vibration[None])
@@ -297,11 +315,11 @@ def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor)
     d = found.fit.estimate.solution - true
     free = found.std > 0
 
-    def left(W: ComplexArray) -> float:
+    def left(W):
         return left_by(-np.linalg.lstsq(W.reshape(-1, 2), measured.ravel(), rcond=None)[0])
 
-    def left_by(D: ComplexArray) -> float:
-        return float(np.linalg.norm(vibration + truth.W @ D) / np.linalg.norm(vibration))
+    def left_by(D):
+        return np.linalg.norm(vibration + truth.W @ D) / np.linalg.norm(vibration)
 
     believed = fem.influence(machine.rotor, list(machine.planes), list(machine.sensors), truth.speeds)
     return Outcome(
@@ -313,19 +331,20 @@ def shot(random: Random, machine: Machine, truth: Truth, found: CalibratedRotor)
         distance(d[free], found.covariance[np.ix_(free, free)]),
         Region.of(other.draws, other.weights).holds(-U),
         check.distance.ravel() ** 2 < chdtri(2, 0.05),
-        bool(check.explained),
+        check.explained,
         found.chance,
         not found.explained,
         found.warnings,
+        found.std,
     )
 
 
-def distance(d: FloatArray, covariance: FloatArray) -> float:
+def distance(d, covariance):
     """Square of an error by its covariance."""
-    return float(d @ np.linalg.solve(covariance, d)) if d.size else np.inf
+    return d @ np.linalg.solve(covariance, d) if d.size else np.inf
 
 
-def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: ComplexArray) -> Balance:
+def corrected(machine, rotor, speeds, readings):
     """Weights by this calibrated rotor, as `rotorid balance` finds them."""
     runs = trials(machine, speeds, readings, np.zeros((1, 2)))
     planes = {name: Plane(node=node) for name, node in zip(runs.planes, machine.planes, strict=True)}
@@ -333,16 +352,16 @@ def corrected(machine: Machine, rotor: fem.Rotor, speeds: FloatArray, readings: 
         name: Sensor(node=probe.node, angle_deg=probe.angle)
         for name, probe in zip(PROBES, machine.sensors, strict=True)
     }
-    return balance(Job(runs, None, Conventions(), (), planes, sensors, rotor=rotor))
+    return balance(Job(runs, None, Conventions(), (), planes, sensors=sensors, rotor=rotor))
 
 
-def simulate(machines: int, seed: int, name: str, case: str) -> list[Outcome]:
+def simulate(machines, seed, name, case):
     """So many machines of a kind."""
     key = [seed, list(MACHINES).index(name), list(CASES).index(case)]
     return [one_machine(np.random.default_rng([*key, k]), name, **CASES[case]) for k in range(machines)]
 
 
-def shots(name: str, found: Sequence[Outcome]) -> str:
+def shots(name, found):
     """How many shots are good, and what they leave."""
     parts = [[one.good for one in found if bool(one.words) == said] for said in (False, True)]
     left = np.nanmedian([(one.left_believed, one.left, one.left_exact) for one in found], axis=0)
@@ -350,11 +369,18 @@ def shots(name: str, found: Sequence[Outcome]) -> str:
     return f"{name:<28}{counts}" + "".join(f"{value:9.3f}" for value in left)
 
 
-def intervals(name: str, found: Sequence[Outcome]) -> str:
-    """How many intervals hold the truth."""
-    z, seen = (np.concatenate([one[k] for one in found]) if found else np.zeros(0) for k in (3, 4))
+def row(name, found, columns):
+    """How many machines, and per cent."""
+    return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>10}" for column in columns)
+
+
+def intervals(name, found):
+    """How many intervals hold the truth, and of numbers seen the median ± over the least."""
+    parts = [(one.numbers, one.seen, one.width) for one in found]
+    z, seen, width = np.concatenate([np.zeros((3, 0)), *parts], axis=1)
     known = ~np.isnan(z)
-    columns: list[Sequence[Any]] = [
+    ratios = width[known & (seen > 0)]
+    columns = [
         np.abs(z[known]) < NORMAL,
         np.abs(z[known & (seen > 0)]) < NORMAL,
         [one.joint < chdtri(np.sum(~np.isnan(one.numbers)), 0.05) for one in found],
@@ -362,27 +388,31 @@ def intervals(name: str, found: Sequence[Outcome]) -> str:
         [inside for one in found for inside in one.readings],
         [one.check for one in found],
     ]
-    return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>9}" for column in columns)
+    return row(name, found, columns) + (f"{np.median(ratios):9.2f}" if ratios.size else "")
 
 
-def lacks(name: str, found: Sequence[Outcome]) -> str:
+def lacks(name, found):
     """How many are recognised, and what the others' answers are worth."""
-    columns: list[Sequence[Any]] = [
+    columns = [
         [one.told for one in found],
         [one.told or one.inside for one in found],
         [one.told or one.check for one in found],
         [one.told or one.good for one in found],
         [one.good for one in found],
     ]
-    return f"{name:<36}{len(found):5d}" + "".join(f"{percent(column):>10}" for column in columns)
+    return row(name, found, columns)
 
 
-def main(seed: int = 1, machines: int = 510) -> None:
+def main(seed=1, machines=510, lacking=510):
     """Print the tables."""
-    report(lambda name, case: simulate(-(-machines // len(MACHINES)), seed, name, case))
+
+    def outcomes(name, case):
+        return simulate((machines if case in WHOLE else lacking) // len(MACHINES), seed, name, case)
+
+    report(outcomes)
 
 
-def report(outcomes: Callable[[str, str], list[Outcome]]) -> None:
+def report(outcomes):
     """The tables of outcomes by machine and case."""
     cells = {(name, case): outcomes(name, case) for case in CASES for name in MACHINES}
     of = {case: [one for name in MACHINES for one in cells[name, case]] for case in CASES}
@@ -391,13 +421,12 @@ def report(outcomes: Callable[[str, str], list[Outcome]]) -> None:
         "a. One shot: leaves at most 0.1 of the vibration, or 1.3 times what the exact model leaves, per cent"
     )
     print(f"{'':<28}{'silent':>15}{'warned':>15}{'  left: believed, calibrated, exact':>26}")
-    for case in CASES:
-        if case in WHOLE:
-            for name in MACHINES:
-                print(shots(f"{name}: {case}", cells[name, case]))
+    for case in WHOLE:
+        for name in MACHINES:
+            print(shots(f"{name}: {case}", cells[name, case]))
 
     print("\nb. 95 % intervals that hold the truth, per cent")
-    print(f"{'':<41}  numbers     seen  jointly  weights readings    check")
+    print(f"{'':<41}   numbers      seen   jointly   weights  readings     check    ±/C–R")
     for case in WHOLE:
         for said, word in ((False, "silent"), (True, "warned")):
             print(intervals(f"{case}, {word}", [one for one in of[case] if bool(one.words) == said]))
@@ -413,8 +442,7 @@ def report(outcomes: Callable[[str, str], list[Outcome]]) -> None:
     print(f"{'':<41}        1         5        20        50")
     for case in WHOLE:
         chance = np.array([one.chance for one in of[case]])
-        shares = "".join(f"{percent(chance < level):>10}" for level in (0.01, 0.05, 0.2, 0.5))
-        print(f"{case:<36}{len(chance):5d}{shares}")
+        print(row(case, chance, [chance < level for level in (0.01, 0.05, 0.2, 0.5)]))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ from coverage_balance import normal
 from numpy.typing import NDArray
 
 from balancing import (
-    Correction,
     Labels,
     ReadingErrors,
     Trials,
@@ -26,7 +25,7 @@ from balancing import (
     correct,
 )
 from balancing.regions import NORMAL_RADIUS
-from rotorid.fleet.machine_type import LEVEL, MachineRecord, MachineType, fit_type, update
+from rotorid.fleet.machine_type import LEVEL, MachineRecord, fit_type, update
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
@@ -59,7 +58,7 @@ class Type(NamedTuple):
     planes: tuple[str, ...]
 
 
-def draw(rng: np.random.Generator, kind: str, machines: int = MACHINES) -> Type:
+def draw(rng, kind, machines=MACHINES):
     """A type of 1 to 3 planes, 1 to 3 speeds, 2 to 4 sensors."""
     S, C, P = (int(rng.integers(*ends)) for ends in ((1, 4), (2, 5), (1, 4)))
     C = max(C, P // S + 1)
@@ -74,19 +73,19 @@ def draw(rng: np.random.Generator, kind: str, machines: int = MACHINES) -> Type:
     return Type(W, records, 100.0 * np.arange(1, S + 1), *names)
 
 
-def record(m: int, W: ComplexArray) -> MachineRecord:
+def record(m, W):
     """Coefficients as they were measured, and their covariance."""
     return MachineRecord(f"M{m + 1}", str(m), W, RUN * np.abs(W))
 
 
-def shots(rng: np.random.Generator, drawn: Type, kind: MachineType, m: int) -> list[Shot | None]:
+def shots(rng, drawn, kind, m):
     """Machine m from its baseline, with one trial run, and with all of them; None: refused."""
     prior, W = kind.influence(Labels()), drawn.W[m]
     D = normal(rng, len(drawn.planes))
     T = np.zeros((len(D) + 1, len(D)), dtype=complex)
     T[np.arange(1, len(T)), np.arange(len(D))] = 0.5 * np.exp(2j * np.pi * rng.random(len(D)))
     Y = read(rng, np.einsum("scp,rp->rsc", W, T - D))
-    found: list[Shot | None] = []
+    found = []
     for runs in (1, 2, len(T)):
         trials = Trials(
             tuple(map(str, range(runs))),
@@ -102,33 +101,33 @@ def shots(rng: np.random.Generator, drawn: Type, kind: MachineType, m: int) -> l
             found.append(None)
             continue
         after = W @ (answer.weights - D)
-        left = float(np.linalg.norm(after) / np.linalg.norm(W @ D))
+        left = np.linalg.norm(after) / np.linalg.norm(W @ D)
         found.append(judged(answer, D, left, read(rng, after), chance < LEVEL))
     return found
 
 
-def read(rng: np.random.Generator, Y: ComplexArray) -> ComplexArray:
+def read(rng, Y):
     """Readings with their errors."""
     return np.asarray(Y * (1 + RUN * normal(rng, *Y.shape)))
 
 
 def judged(
-    found: Correction,
-    D: ComplexArray,
-    left: float,
-    check: ComplexArray,
-    foreign: bool,
-) -> Shot:
+    found,
+    D,
+    left,
+    check,
+    foreign,
+):
     """Against the truth, and a check run."""
     off = stretch((check - found.after).ravel()).reshape(-1, 2, 1)
     far = (np.swapaxes(off, 1, 2) @ np.linalg.solve(found.after_covariance.reshape(-1, 2, 2), off)).ravel()
-    size = float(np.sqrt(np.mean(np.abs(check) ** 2)))
-    readings = float(np.mean(far < NORMAL_RADIUS**2))
+    size = np.sqrt(np.mean(np.abs(check) ** 2))
+    readings = np.mean(far < NORMAL_RADIUS**2)
     weights = found.region().holds(D)
     return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings), foreign)
 
 
-def odd_machines(rng: np.random.Generator, drawn: Type) -> tuple[list[tuple[str, bool, bool]], list[bool]]:
+def odd_machines(rng, drawn):
     """Of three odd machines: what is wrong, found, reason found; of the others: called odd."""
     records, chosen = list(drawn.records), rng.choice(len(drawn.records), len(ODD), replace=False).tolist()
     C = len(drawn.sensors)
@@ -148,7 +147,7 @@ def odd_machines(rng: np.random.Generator, drawn: Type) -> tuple[list[tuple[str,
     return told, [each.job in odd for m, each in enumerate(records) if m not in chosen]
 
 
-def line(name: str, shots: list[Shot]) -> None:
+def line(name, shots):
     """One of the first table."""
     if shots:
         left, *held = np.array([shot[:4] for shot in shots], dtype=float).T
@@ -158,14 +157,14 @@ def line(name: str, shots: list[Shot]) -> None:
         )
 
 
-def main(types: int = 20, seed: int = 1, machines: int = MACHINES) -> None:
+def main(types=20, seed=1, machines=MACHINES):
     """Print the tables."""
     stages = "baseline alone", "one trial run", "all trial runs"
     print("a. Corrections of further machines: median of what is left; 95 % regions that hold the truth, %")
     print(f"{'':<52}{'number':>6}{'left':>8}{'weights':>9}{'readings':>10}{'rms <':>8}")
     for kind in KINDS:
         rng = np.random.default_rng([seed, list(KINDS).index(kind)])
-        rows: list[list[Shot | None]] = []
+        rows = []
         for _ in range(types):
             drawn = draw(rng, kind, machines)
             known = fit_type(drawn.records, *drawn[2:])

@@ -14,8 +14,8 @@ HERE = Path(__file__).resolve().parent
 PAGE = HERE.parents[1] / "docs" / "sure.md"
 PROGRAMS = {
     "balance": ("coverage_balance.py", 1000),
-    "calibrate": ("coverage_calibrate.py", 1, 60),
-    "fleet": ("coverage_fleet.py", 20, 1),
+    "calibrate": ("coverage_calibrate.py", 1, 90, 9),
+    "fleet": ("coverage_fleet.py", 50, 1),
     "fits": ("coverage_fits.py", 1000),
     "identify": ("coverage_identify.py", 500),
     "special": ("coverage_special.py", 1000),

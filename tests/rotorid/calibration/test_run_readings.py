@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 
 import fem
 from balancing import ReadingErrors, RunScatter, usual_run_errors
-from fem.parameters import with_parameters
+from fem.parameters import parameter_value, with_parameters
 
 ERRORS = ReadingErrors(0.02, 0.03)
 
@@ -23,14 +23,18 @@ def coefficients_of(runs, rotor):
     return np.moveaxis(each.readings(rotor), 0, -1)
 
 
-def test_derivatives_are_differences_of_the_dense_rotor():
+@pytest.mark.parametrize("pedestal", [None, machine().supports[1].pedestal])
+def test_derivatives_are_differences_of_the_dense_rotor(pedestal):
+    """Also at further numbers, after those of the rotor as it is."""
     runs = Runs(derivative=1, planes={"P": (4, 0.12)}, weights=((0,), (1,)), free=False)
-    data, rotor = runs.data(runs.readings(machine())), machine()
+    first, second = machine().supports
+    rotor = replace(machine(), supports=[first, replace(second, pedestal=pedestal)])
+    data = runs.data(runs.readings(rotor))
     values = {
         "bearing[1].kxx": 4.4e7,
         "bearing[1].kxx.offset": 2e6,
         "bearing[2].kyy.scale": 1.2,
-        "bearing[2].pedestal_stiffness.scale": 0.9,
+        "bearing[2].damping.offset": 3e3,
         "disc[1].scale": 1.05,
         "disc[2].mass": 17.0,
         "material.youngs_modulus.scale": 0.98,
@@ -38,13 +42,14 @@ def test_derivatives_are_differences_of_the_dense_rotor():
         "probe[a].angle": 3.0,
         "probe[b].gain": 1.1,
         "key_phasor.angle": -4.0,
-    }
+    } | ({"bearing[2].pedestal_stiffness.scale": 0.9} if pedestal else {})
 
     def W(at):
         shown = replace(runs, turned={"a": at["probe[a].angle"]}, gains={"b": at["probe[b].gain"]})
         shown.key_phasor = at["key_phasor.angle"]
         return coefficients_of(shown, with_parameters(rotor, at))
 
+    data.coefficients(rotor, {path: parameter_value(rotor, path) for path in values}, list(values))
     _, found = data.coefficients(rotor, values, list(values))
     for (path, value), own in zip(values.items(), found, strict=True):
         h = 1e-4 * abs(value)
