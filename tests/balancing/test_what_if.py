@@ -61,7 +61,7 @@ def test_one_draw_far_off_widens_nothing(job, monkeypatch):
     off[0] *= 1e4
     monkeypatch.setattr(module, "check_readings", lambda *_: off)
     covariance = module.check_run_spread(influence, np.zeros(2))[0]
-    np.testing.assert_allclose(covariance, np.broadcast_to(np.eye(2) / 2, covariance.shape), atol=0.03)
+    assert np.abs(covariance - np.eye(2) / 2).max() < 0.03
 
 
 def rigid(relative=0.01, further=1.0):

@@ -68,11 +68,8 @@ def test_every_key_stands_in_the_plain_text():
     """Written anew with ROTORID_RENEW_PAGES, as the pages."""
     text, path = "", ROOT / "docs" / "keys.txt"
     for (_, head), settings in zip(BLOCKS, SHOWN, strict=True):
-        lines = (
-            f"  {names}: {about}{example and f'; {example}'}\n"
-            for names, about, example in key_lines(settings)
-        )
-        text += f"\n{head}\n{''.join(lines)}".replace("`", "")
+        lines = ["  {}: {}; {}".format(*cells).removesuffix("; ") for cells in key_lines(settings)]
+        text += "\n".join(("", head, *lines, "")).replace("`", "")
     if os.environ.get("ROTORID_RENEW_PAGES"):
         path.write_text(text, encoding="utf-8")
     assert path.read_text(encoding="utf-8") == text

@@ -23,7 +23,7 @@ def balance(cli, name, *options):
         ),
         ("tiny_trial", "the weight in plane 'P2' is 6.738 g ± ", "of plane 'P2' with at least "),
         ("one_digit", "the readings have one digit (steps of 0.10 µm pp", "that shows more digits"),
-        ("alike_planes", "planes 'P1' and 'P2' act alike", "plane 'P2' alone (--planes P2; "),
+        ("alike_planes", "planes 'P1' and 'P2' act alike", "weights in 'P2' alone would leave about"),
     ],
 )
 @each_of("method", ["least-squares", "weighted"])
@@ -64,7 +64,7 @@ def test_runs_that_disagree_are_named_before_what_follows(cli, name, run):
         cause, follows, *rest = ran.err.splitlines()
         assert cause.startswith("rotorid: the runs disagree by ")
         assert f"most of all in run '{run}'" in cause
-        assert cause.endswith("or a row is missing in the weights table")
+        assert cause.endswith("(of a check run: check_weights)")
         assert follows.startswith("the trial weight in plane 'P1'")
         assert follows.endswith("mend the table, or measure these runs again until they agree")
         assert not rest

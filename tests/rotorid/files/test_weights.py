@@ -125,7 +125,7 @@ CHECK = "run,speed_rpm,sensor,amplitude_mm_s,phase_deg\ncheck,1485,DE,{},{}\nche
 
 
 def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
-    """Their holes are taken; what the job says itself counts first; weights between holes take none.
+    """Their holes are taken; what the job says is taken, too; weights between holes take none.
 
     The table names no run: it is the only one, whatever its name.
     """
@@ -138,7 +138,7 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     stated = CHECKED.replace("[planes.P2]", 'taken = { "2" = 7 }\n[planes.P2]')
     between = PIECES.replace("135.0", "140.0").replace(",4,", ",,")
     holes = job_of(tmp_path, stated, check=check, pieces=between).holes
-    np.testing.assert_allclose(holes["P1"].taken, [0, 0.007, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(holes["P1"].taken, [0.003, 0.007, 0, 0, 0, 0, 0, 0])
     assert not holes["P2"].taken.any()
 
 
