@@ -575,7 +575,7 @@ def _pencil(
     K, M = bands
     shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
     for node, form, pedestal in held:
-        hold += float(form[0, 0].real)
+        hold += form[0, 0].real
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
             foot = next(stands)
