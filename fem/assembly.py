@@ -150,7 +150,8 @@ def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     )
 
 
-def _internal(rotor: Rotor) -> list[InternalDamping]:
+def internal_damping(rotor: Rotor) -> list[InternalDamping]:
+    """Those of the forces at nodes that are internal damping, which turns with the shaft."""
     return [force for force in rotor.forces if isinstance(force, InternalDamping)]
 
 
@@ -196,7 +197,7 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     ValueError
         If a speed lies outside a bearing table.
     """
-    dampers = _internal(rotor)
+    dampers = internal_damping(rotor)
     attached = [support.node for support in rotor.supports] + [damper.node for damper in dampers]
     nodes = tuple(dict.fromkeys(attached))
     stiffness = np.zeros((len(nodes), 2, 2, speeds.size), complex)
@@ -347,7 +348,7 @@ def project(P: Planes, basis: FloatArray) -> Reduced:
     for support in P.rotor.supports:
         tilt = basis[P.A.deflection(support.node) + 1]
         K += support.tilting_stiffness * np.outer(tilt, tilt)
-    for damper in _internal(P.rotor):
+    for damper in internal_damping(P.rotor):
         w = basis[P.A.deflection(damper.node)]
         B += damper.damping * np.outer(w, w)
     M, G = (basis.T @ multiply(band, basis) for band in (P.A.mass, P.A.gyroscopic))

@@ -145,10 +145,11 @@ def receptance_with_derivatives(
         H[part] = F / turn + b * turn
         by_angle[part] = 1j * (b * turn - F / turn)
         omega = speeds[part, None, None]
-        on_planes: tuple[tuple[Any, Any], ...] = (
+        square = omega**2
+        on_planes: Any = (
             (1.0, 1.0),
-            (-(omega**2), -(omega**2)),
-            (omega**2, -(omega**2)),
+            (-square, -square),
+            (square, -square),
             (0.0, 2j * omega),
         )
         for change, derivative in zip(changes, by_number[:, part], strict=True):

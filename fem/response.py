@@ -578,7 +578,8 @@ class Receptance:
         F = np.zeros((planes, a, b, omega.size), complex)
         F[0] = H[0][:a, :b]
         for k, force in enumerate(system[:, :b]):
-            F[k // s] -= H[k // s][:a, k % s - s, None].astype(complex) * force
+            for i, row in enumerate(H[k // s][:a, k % s - s]):  # one by one they stay in the cache
+                F[k // s, i] -= row * force
         return F, lost
 
     @cached_property

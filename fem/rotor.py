@@ -277,7 +277,7 @@ class Support:
         """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
         rows = (*self.stiffness, *self.damping) if self.speeds else (self.stiffness, self.damping)
         matrices = [row if isinstance(row, tuple) else ((row, 0.0), (0.0, row)) for row in rows]
-        return np.reshape(matrices, (2, -1, 2, 2))
+        return np.array(matrices).reshape(2, -1, 2, 2)
 
 
 def _canonical(value: Any, shape: tuple[int, ...], what: str, signed: bool = False) -> Any:  # noqa: ANN401
@@ -469,7 +469,8 @@ class Rotor:
             object.__setattr__(self, name, array)
             self._every((low < array) & (array < high), name, limit)
         least = f"1/{SHORTEST} of its longer neighbour's at least, for float64 (join the two)"
-        self._every(~_too_short(self.length), "length", least)
+        beside = np.hstack((0.0, self.length, 0.0))
+        self._every(SHORTEST * self.length >= np.maximum(beside[:-2], beside[2:]), "length", least)
         thinner = self.inner_diameter < self.outer_diameter
         self._every(thinner, "inner_diameter", "smaller than outer_diameter")
         for name, kind in (("discs", Disc), ("supports", Support), ("forces", NodeForce)):
@@ -546,8 +547,7 @@ class Rotor:
     @cached_property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        positions = np.zeros(self.n_nodes)
-        self.length.cumsum(out=positions[1:])
+        positions = np.append(0.0, self.length.cumsum())
         read_only(positions)
         return positions
 
@@ -581,12 +581,12 @@ class Rotor:
         ring = (1 + m2) ** 2
         return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2)
 
-    @property
+    @cached_property
     def symmetric(self) -> bool:
         """Whether every support is rotationally symmetric, so that one complex coordinate is enough."""
         return all(support.symmetric for support in self.supports)
 
-    @property
+    @cached_property
     def constant(self) -> bool:
         """Whether no support depends on speed."""
         return all(support.constant for support in self.supports)
@@ -620,22 +620,6 @@ _PER_ELEMENT = {
     "material_damping": _FROM_ZERO,
 }
 """What is given for each element: between which values, and their words."""
-
-
-def _too_short(length: FloatArray) -> BoolArray:
-    """Which elements are too short beside their longer neighbour, from lengths of shape (n,).
-
-    Parameters
-    ----------
-    length
-        m, shape (n,).
-
-    Returns
-    -------
-    Shape (n,).
-    """
-    beside: FloatArray = np.hstack((0.0, length, 0.0))
-    return SHORTEST * length < np.maximum(beside[:-2], beside[2:])
 
 
 def refined(rotor: Rotor, times: int) -> Rotor:

@@ -20,8 +20,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fem.assembly import both_planes
-from fem.forces import InternalDamping
+from fem.assembly import both_planes, internal_damping
 from fem.orbits import DIRECTION_NAMES
 from fem.result import Result, holding_arrays
 from fem.rotor import Rotor
@@ -211,10 +210,9 @@ class Stability(Result):
 
 def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     """Frequency above which no mode grows at each speed, rad/s, shape (S,); 0: none grows, inf: not known."""
-    turning = np.any(rotor.material_damping) or any(isinstance(one, InternalDamping) for one in rotor.forces)
-    bound = np.where(turning, speeds, 0.0)
+    bound = speeds * bool(rotor.material_damping.any() or internal_damping(rotor))
     for support in rotor.supports:
-        k, c = support.at(speeds)
+        k, c = support.table if support.constant else support.at(speeds)
         tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
         stiffness, damping = (np.linalg.eigvalsh((one + one.swapaxes(1, 2)) / 2)[:, 0] for one in (k, c))
         driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2

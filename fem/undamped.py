@@ -288,31 +288,32 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
     """
     if most < 1:
         raise ValueError(f"{most} critical speeds cannot be found: ask for 1 or more")
-    A, warnings, cut, rigid = assemble(rotor), ignored_inertia(rotor), "", 0
+    A, warnings, cut = assemble(rotor), ignored_inertia(rotor), ""
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
         rigid = pencil.rigid.shape[1]
-        modes = _positive(pencil, most + rigid)
+        last = most + rigid
+        modes = _positive(pencil, last)
         if (count := modes.squares.size - rigid) < least:
             raise ValueError(
                 f"{least} critical speeds cannot be found: the model has 1 to {count}; divide the shaft into "
                 "more elements (discs whose polar inertia exceeds the diametral one take some away)"
             )
-        last = most + rigid
         squares, rounding, motion = modes.squares[:last], modes.rounding[:last], modes.motion[..., :last]
     else:
         parts, beyond, cut = _over_speed(rotor, A, most)
         warnings = beyond + warnings
         squares, rounding = np.array([(*part.squares, *part.rounding) for part in parts]).T
         motion = np.concatenate([part.motion for part in parts], axis=2)
-    largest = np.abs(motion[:2]).max(axis=1)
-    major = np.where(largest[0] >= largest[1] * (1 - 1e-6), motion[::2], motion[1::2])
+    major, direction = motion[::2], squares.size * ("forward",)
+    if not rotor.symmetric:
+        largest, ways = np.abs(motion[:2]).max(axis=1), whirl_direction(*motion[:2].swapaxes(1, 2))
+        major = np.where(largest[0] >= largest[1] * (1 - 1e-6), major, motion[1::2])
+        direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
     size = np.abs(major[0])
-    first = np.where(size[0] > 1e-6 * size.max(axis=0), 0, size.argmax(axis=0))
-    scale = 1 / major[0, first, np.arange(squares.size)]
+    size[0] *= 1e6  # 1 there, unless it is a node of the mode
+    scale = 1 / major[0, size.argmax(axis=0), range(squares.size)]
     x, y = motion[:2] * scale
-    ways = np.ones(squares.size) if rotor.symmetric else whirl_direction(x.T, y.T)
-    direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
     frequencies, (shapes, slopes) = np.sqrt(squares), (major * scale).real
     warnings += fine_mesh_warning(rotor, rounding)
     return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings, cut)
@@ -513,7 +514,7 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: int = 0, springs: Iterable[tuple
     -------
     Stiffness and mass of the plane.
     """
-    return _pencil(rotor, A, (whirl,), [(node, np.full((1, 1), k), None) for node, k in springs])
+    return _pencil(rotor, A, (whirl,), [(node, k, 0.0, None) for node, k in springs])
 
 
 def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
@@ -532,20 +533,28 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     -------
     Stiffness and mass.
     """
-    k = np.reshape([support.at(speed)[0] for support in rotor.supports], (-1, 2, 2))
-    # Antisymmetric stiffness does work over an orbit, as damping does: it belongs to no conservative rotor.
-    forms: AnyArray = on_waves((k + k.swapaxes(1, 2)) / 2)
-    forms = forms if forms.imag.any() else forms.real
-    held = [(s.node, form, s.pedestal) for s, form in zip(rotor.supports, forms, strict=True)]
+    held = []
+    for support in rotor.supports:
+        (xx, xy), (yx, yy) = support.at(speed)[0].tolist()
+        # Antisymmetric stiffness does work over an orbit, as damping does: no conservative rotor has it.
+        cross = xy + yx
+        held.append((support.node, (xx + yy) / 2, (xx - yy + (cross and 1j * cross)) / 2, support.pedestal))
     return _pencil(rotor, A, (1,) if rotor.symmetric else (1, -1), held)
 
 
 def _pencil(
-    rotor: Rotor, A: Matrices, whirls: Sequence[int], held: list[tuple[int, AnyArray, Pedestal | None]]
+    rotor: Rotor,
+    A: Matrices,
+    whirls: Sequence[int],
+    supports: Iterable[tuple[int, float, complex, Pedestal | None]],
 ) -> Pencil:
-    """Pencil on springs: node, stiffness of the waves, shape (2, 2), and what they stand on."""
+    """Pencil on springs: node, stiffness of each wave, force on the forward of the backward one, pedestal."""
     planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
-    held = [(node, form[:planes, :planes], foot) for node, form, foot in held if form.any()]
+    held = [
+        (node, np.array(((k, beside), (beside.conjugate(), k)))[:planes, :planes], stand)
+        for node, k, beside, stand in supports
+        if k or beside
+    ]
     kind = np.result_type(float, *(form for _, form, _ in held))
     bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
     for wave, whirl in enumerate(whirls):
@@ -566,16 +575,17 @@ def _pencil(
     K, M = bands
     shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
     for node, form, pedestal in held:
-        hold += float(form.trace().real) / planes
+        hold += form[0, 0].real
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
             foot = next(stands)
             springs.append((foot, on_waves(np.diag(pedestal.xy("stiffness")))[:planes, :planes].real))
             unknowns, form = np.append(unknowns, foot), np.kron(((1, -1), (-1, 1)), form)
         springs.append((unknowns, form))
-    for unknowns, form in springs:
-        for b, j in enumerate(unknowns):  # they ascend
-            K[unknowns[: b + 1] - j - 1, j] += form[: b + 1, b]
+    entries = ((u[a], u[b], k) for u, form in springs for (a, b), k in np.ndenumerate(form))
+    for i, j, k in entries:
+        if i <= j:
+            K[i - j - 1, j] += k
     span = rotor.positions[-1]
     for support in rotor.supports:  # in the shaft's matrices already
         if support.tilting_stiffness:
@@ -659,8 +669,8 @@ def finite_modes(pencil: Pencil) -> int:
     return int(np.count_nonzero(moved))
 
 
-def factor(pencil: Pencil) -> tuple[float, AnyArray]:
-    """Shift σ and Cholesky factor of K + σ M; σ = 0 if the supports hold the rotor firmly.
+def factor(pencil: Pencil) -> tuple[float, AnyArray, AnyArray]:
+    """Shift σ, K + σ M and its Cholesky factor; σ = 0 if the supports hold the rotor firmly.
 
     Else σ is about the square of the first bending frequency of the free rotor.
 
@@ -671,7 +681,7 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     """
     from scipy.linalg import lapack
 
-    rotor, free = pencil.rotor, pencil.rigid.shape[1] > 0
+    rotor, free = pencil.rotor, pencil.rigid.size
     mass = rotor.total_mass
     if not mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
@@ -679,9 +689,10 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     scale = float(bending / mass)
     pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
     for shift in (scale,) if free else (0.0,) if pencil.hold >= 1e-3 * bending else (scale, 0.0):
-        U, info = pbtrf(pencil.stiffness + shift * pencil.mass)
+        K = pencil.stiffness + shift * pencil.mass
+        U, info = pbtrf(K)
         if info == 0:
-            return shift, U
+            return shift, K, U
     raise ValueError(NO_MASS if free and (pencil.mass[-1] >= 0).all() else _UNSTABLE)
 
 
@@ -704,7 +715,7 @@ def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
     ValueError
         If the mesh is so fine that float64 carries fewer than about two digits of a shape.
     """
-    shift, U = factor(pencil)
+    shift, K, U = factor(pencil)
     fixed, free = pencil.rigid, pencil.rigid.shape[1]
     loads = fixed
     if free:
@@ -716,9 +727,8 @@ def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
         loads = multiply(pencil.mass, fixed)
     # Ritz vectors of energies that are exact mend what rounding of K did; rigid motions are exact already.
     elastic = max(m - free, 0)
-    K = pencil.stiffness + shift * pencil.mass
-    moving = _vectors(pencil, K, U, elastic, loads)
-    mu, Y = _largest(moving.conj().T @ multiply(pencil.mass, moving), elastic, pencil.energy(moving))
+    moving, pushed = _vectors(pencil, U, elastic, loads)
+    mu, Y = _largest(moving.conj().T @ pushed, elastic, pencil.energy(moving))
     X = moving @ (Y / np.sqrt(np.abs(mu)))
     if free:
         X, mu = np.hstack((fixed, X))[:, :m], np.append(np.full(free, np.inf), mu)[:m]
@@ -745,40 +755,41 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     )
 
 
-def _largest(
-    T: AnyArray, m: int, energy: AnyArray | None = None, ends: tuple[int, int] | None = None
-) -> tuple[FloatArray, AnyArray]:
-    """The m eigenvalues of largest size, of those from to, from 1, and their vectors of energy 1."""
+def _largest(T: AnyArray, m: int, energy: AnyArray | None = None) -> tuple[FloatArray, AnyArray]:
+    """The m eigenvalues of largest size of a Hermitian matrix, and their vectors of length, or energy, 1."""
     from scipy.linalg import lapack
 
-    if energy is None:
-        mu, Q = np.linalg.eigh(T)
-    else:
-        solve = lapack.dsygvx if np.isrealobj(T) else lapack.zhegvx
-        first, last = ends or (1, len(T))
-        mu, Q, _, _, info = solve(T, energy, range="I", il=first, iu=last)
+    real, info = np.isrealobj(T), 1
+    if energy is not None:
+        mu, Q, info = (lapack.dsygv if real else lapack.zhegv)(T, energy)
         if info:
             raise ValueError(_UNSTABLE)
-    order = np.argsort(-np.abs(mu[: Q.shape[1]]), kind="stable")[:m]
+    elif real:  # tridiagonal first: few vectors take half as long as all
+        packed, d, e, tau, _ = lapack.dsytrd(T, lower=True)
+        mu, size = lapack.dsterf(d, e)[0], np.full(d.size, d.size)
+        mu = mu[-m:] if mu[0] + mu[-m] > 0 else mu  # all where large ones may be negative
+        Q, info = lapack.dstein(d, e, mu, size // d.size, size)
+        Q[1:] = lapack.dormqr("L", "N", packed[1:, :-1], tau, Q[1:], T.size)[0]
+    if info:
+        mu, Q = np.linalg.eigh(T)
+    order = np.argsort(-np.abs(mu), kind="stable")[:m]
     return mu[order], Q[:, order]
 
 
-def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) -> AnyArray:
-    """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues: m, and one that may be less exact.
+def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """U⁻¹ times eigenvectors of U⁻ᴴ M U⁻¹ of the largest eigenvalues, and M times these.
 
-    None of them is a rigid motion: `rigid` is M times these.
+    They are m, and one that may be less exact; none of them is a rigid motion: `rigid` is M times these.
     """
-    from scipy.linalg import lapack
+    from scipy.linalg import blas, lapack
 
-    tbtrs = lapack.dtbtrs if np.isrealobj(U) else lapack.ztbtrs
+    tbtrs, trsm = (lapack.dtbtrs, blas.dtrsm) if np.isrealobj(U) else (lapack.ztbtrs, blas.ztrsm)
     size, block = pencil.mass.shape[1], 4  # equal frequencies are not missed
-    most = min(m + 1, size - rigid.shape[1])
+    most = max(min(m + 1, finite_modes(pencil) - rigid.shape[1]), 1)
 
     def operator(V: AnyArray) -> AnyArray:
         W = tbtrs(U, V)[0]
-        loads = multiply(pencil.mass, W)
-        if rigid.size:
-            loads -= rigid @ (rigid.conj().T @ W)
+        loads = multiply(pencil.mass, W) - rigid @ (rigid.conj().T @ W)
         return np.asarray(tbtrs(U, loads, trans="C")[0])
 
     if size > DENSE:
@@ -800,9 +811,9 @@ def _vectors(pencil: Pencil, K: AnyArray, U: AnyArray, m: int, rigid: AnyArray) 
             outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
-                return np.asarray(tbtrs(U, image @ Q)[0])
-    ends = None  # M - G may be negative
-    if not pencil.matrices.gyroscopic.any():
-        most = min(max(m, 1), most)
-        ends = size - most + 1, size
-    return _largest(dense(pencil.mass) - rigid @ rigid.conj().T, most, dense(K), ends)[1]
+                X = tbtrs(U, image @ Q)[0]
+                return X, multiply(pencil.mass, X)
+    M, R = dense(pencil.mass), dense(U)  # the triangle above the diagonal of R counts
+    half = trsm(1.0, R, M - rigid @ rigid.conj().T if rigid.size else M, trans_a=2)
+    X = tbtrs(U, _largest(trsm(1.0, R, half, side=1), most)[1])[0]
+    return X, M @ X

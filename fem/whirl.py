@@ -405,9 +405,8 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
         is too fine for float64.
     """
     speeds = checked_speeds([speed])
-    P = both_planes(rotor)
     n = checked_number(rotor, n)
-    whirl = solve_whirl(P, speeds, n)
+    whirl = solve_whirl(both_planes(rotor), speeds, n)
     there = np.isfinite(whirl.values[0])
     if not there.any():
         raise ValueError(

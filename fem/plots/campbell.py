@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from fem.campbell import Campbell
     from fem.critical_speed_map import SpeedMap
+    from fem.stability import Window
 
 _HIGHEST = 3.0  # logarithmic decrements above it are not drawn to scale
 _PALE = 0.35
@@ -42,10 +43,15 @@ _STYLES: dict[float, dict[str, Any]] = {
 }
 
 
-def shade_unstable(ax: Axes, ranges: Iterable[tuple[float, float]]) -> None:
-    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm."""
-    for k, (first, last) in enumerate(ranges):
-        band = ax.axvspan(first * RPM, last * RPM, label="" if k else "unstable: no steady state", alpha=0.14)
+def shade_unstable(ax: Axes, windows: Iterable[Window]) -> None:
+    """Hatch ranges of speed in which the rotor is unstable, on axes in rpm."""
+    for k, window in enumerate(windows):
+        band = ax.axvspan(
+            window.first * RPM,
+            window.last * RPM,
+            label="" if k else "unstable: no steady state",
+            alpha=0.14,
+        )
         band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
 
 
@@ -88,7 +94,7 @@ def draw_campbell(
     if (campbell.log_decrements > campbell.heavy).any():
         ax.plot([], [], color=QUIET, alpha=_PALE, label=f"pale: decrement above {campbell.heavy:g}")
     shade_operating(ax, operating)
-    shade_unstable(ax, [(window.first, window.last) for window in campbell.windows])
+    shade_unstable(ax, campbell.windows)
     plain(ax)
     second_scale(ax, 60.0, "whirl frequency, Hz", "right")
     legend_above(ax)

@@ -249,7 +249,7 @@ def _over_speed(
         there, curve = ~within(windows, omega) & (reading != 0), np.full(omega.size, np.nan)
         curve[there] = value(reading[there])
         ax.plot(omega * RPM, curve, label=name, linewidth=1.6, **look(k, omega.size))
-    shade_unstable(ax, [(window.first, window.last) for window in windows])
+    shade_unstable(ax, windows)
     ax.set_xlabel("speed, rpm")
     ax.margins(0.03, 0.1)  # whole marks at the ends
     plain(ax)

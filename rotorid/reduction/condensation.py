@@ -45,7 +45,7 @@ def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
     free[unknowns] = 0.0
     K = band * free
     for off, row in enumerate(K[::-1]):
-        row *= np.roll(free, off)
+        row[off:] *= free[: free.size - off]
     K[-1, unknowns] = 1.0
     return K
 
@@ -71,8 +71,7 @@ def static_shapes(
         force[masters] = 0.0
         return np.asarray(dpbtrs(factor, force)[0])
 
-    unit = np.zeros((band.shape[1], len(masters)))
-    unit[masters, np.arange(len(masters))] = 1.0
+    unit = (np.arange(band.shape[1])[:, None] == masters).astype(float)
     return unit + carried(-multiply(band, unit)), carried
 
 
