@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 
 
 _TOLERANCE = ("grade", "rotor_mass", "service_speed")
-_NEEDLESS = ("method", "planes", "ridge", "max_mass", "split", *_TOLERANCE)
+_NEEDLESS = ("method", "ridge", "max_mass", "split", *_TOLERANCE)
 """Options that mean nothing beside `weights`."""
 
 

@@ -61,7 +61,7 @@ def test_pieces_in_holes_are_judged_as_those_of_split(cli):
         (("--weights", "left=1g@4"), "converts only with --radius or radius_mm"),
         (("--weights", "left=3#9"), "no hole 9 in plane 'left': the job states none"),
         (("--weights", "left=-3@9"), "a value above 0"),
-        (("--weights", "left=3@4", "--planes", "left"), "--planes means nothing with --weights"),
+        (("--weights", "left=3@4", "--ridge", "0.1"), "--ridge means nothing with --weights"),
     ],
 )
 def test_what_is_refused(cli, options, words):
