@@ -24,8 +24,6 @@ from rotorid.base.choices import did_you_mean
 from rotorid.identify import expressions
 from rotorid.identify.expression_functions import Compiled, Expression, jacobian, real, signs
 
-BIG = 2.0**60
-"""So large a state or input that nothing of its slope is lost beside constants."""
 UNROLLED = 300
 """Products in f_x S below which they are written out."""
 
@@ -109,23 +107,25 @@ class OdeModel:
         """
         if not self.linear_driven:
             raise ValueError("this model is not linear with constant coefficients; it has no matrices")
-        n, nu = len(self.states), len(self.inputs)
-        # where one state or input is BIG and the others 0, and where all are 0
-        points = BIG * np.insert(np.eye(n + nu), n, 0.0, axis=0)
-        table = self.f(np.zeros(len(points)), points[:, :n], theta, points[:, n:])
-        columns = np.delete(table, np.s_[1 : 1 + n], axis=-1)
-        others = np.arange(n + 1 + nu) != n
-        columns[others] = (columns[others] - columns[n]) / BIG
-        return np.moveaxis(columns, (0, 2), (2, 0))
+        table, n = self._alone("coefficients", theta), len(self.states)
+        tables = table.T.reshape(table.shape[1], n, -1)
+        if self.inertia:
+            inverse, slopes = self._inverse(theta)
+            tables = inverse @ tables
+            tables[1:] -= inverse @ slopes @ tables[0]
+        return tables
 
     def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
         """Rates of z = [x | S], (n_x, 1 + k): of the states, and where k = n_p of S = ∂x/∂θ."""
-        if z.size * len(z) < UNROLLED and not self.inertia:
-            made: Compiled | None = self.memory.get(z.shape)
-            made = made or self.memory.setdefault(z.shape, self._unrolled(z.shape))
-            return made.one([t, *z.ravel().tolist(), *theta.tolist(), *u.tolist()])
         table, n = self.f(t, z[:, 0], theta, u), len(z)
         return np.hstack((table[:, :1], table[:, 1 : 1 + n] @ z[:, 1:] + table[:, 1 + n : n + z.shape[1]]))
+
+    @cached_property
+    def coefficients(self) -> tuple[Expression, ...]:
+        """[A b B] of the rates before E⁻¹, row by row, if these are linear."""
+        x, u = (self.symbols[1:][: len(self.states)], self.symbols[1 + len(self.states) + len(self.start) :])
+        rest = dict.fromkeys((*x, *u), 0)
+        return tuple(part for e in self.rates for part in (*map(e.diff, x), e.subs(rest), *map(e.diff, u)))
 
     @cached_property
     def linear_driven(self) -> bool:
@@ -172,16 +172,23 @@ class OdeModel:
         """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
 
-    def _unrolled(self, shape: tuple[int, ...]) -> Compiled:
-        """Rates of x, and of S if wanted, with the products of f_x S written out: quicker if they are few."""
+    def unrolled(self, columns: int) -> Compiled | None:
+        """`augmented` for [x | S] of so many columns with the products written out, if they are few: quicker."""
         import sympy
 
-        n, rates = len(self.states), sympy.Matrix(self.rates)
-        first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
-        S = sympy.Matrix(n, shape[1] - 1, lambda *_: sympy.Dummy())
-        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if len(S) else S
-        z = sympy.Matrix([*x]).row_join(S)
-        return Compiled([*first, *z, *p, *u], [*rates.row_join(slopes)], shape)
+        n = len(self.states)
+        if n**2 * columns >= UNROLLED or self.inertia:
+            return None
+        key = "unrolled", columns
+        if key not in self.memory:
+            rates = sympy.Matrix(self.rates)
+            first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
+            S = sympy.Matrix(n, columns - 1, lambda *_: sympy.Dummy())
+            slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if len(S) else S
+            z = sympy.Matrix([*x]).row_join(S)
+            self.memory[key] = Compiled([*first, *z, *p, *u], [*rates.row_join(slopes)], (n, columns))
+        made: Compiled = self.memory[key]
+        return made
 
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
@@ -197,10 +204,12 @@ class OdeModel:
         )
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
-        """Expressions of the parameters alone, with the derivatives by these."""
-        n = len(self.states)
-        table = self._values(what, 0.0, np.zeros(n), theta, np.zeros(len(self.inputs)))
-        return np.delete(table, np.s_[1 : 1 + n], axis=1)
+        """Expressions of the parameters alone, with the derivatives by these, (m, 1 + n_p)."""
+        if what not in self.memory:
+            exprs, by = getattr(self, what), self.symbols[1 + len(self.states) :][: len(self.start)]
+            self.memory[what] = Compiled(by, jacobian(exprs, by), (len(exprs), 1 + len(by)))
+        table: Compiled = self.memory[what]
+        return table.one(np.asarray(theta, dtype=float).tolist())
 
     def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""

@@ -18,7 +18,7 @@ from rotorid.identify.records import Record, inputs_of
 STEPWISE = (*HEUN, "rk4")
 """Integrators without error control, of one step from sample to sample."""
 INTEGRATORS: tuple[Method[None], ...] = (
-    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", None),
+    Method("auto", "expm if possible, else lsoda or dop853, whichever is quicker", None),
     Method("expm", "the exact solution of a linear model with constant coefficients", None),
     Method("dop853", "error control, for smooth models", None),
     Method("lsoda", "error control, for stiff models", None),
