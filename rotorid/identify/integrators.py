@@ -15,15 +15,15 @@ so that a matrix exponential leads from sample to sample. Other parameters act b
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.expression_functions import Compiled
-from rotorid.identify.ode import OdeModel
+from rotorid.identify.ode import OdeModel, SimulationError
 
 SAME_STEP = 4e-15
 """Steps that differ by less than this share of the largest time are one step (rounded times)."""
@@ -57,8 +57,8 @@ class System:
         self.k = len(theta) if sensitivities else 0
         self.first = model.x0(theta)[:, : 1 + self.k]
         """z at the first time."""
-        self.steps = 0
-        """Of an integration with error control."""
+        self.calls, self.most, self.latest = 0, np.inf, self.first
+        """Rates asked for so far, and at most; for which states and sensitivities."""
 
     @cached_property
     def rates(self) -> Compiled | None:
@@ -66,7 +66,14 @@ class System:
         return self.model.unrolled(1 + self.k)
 
     def __call__(self, time: float, z: FloatArray) -> FloatArray:
-        """Rates, of the shape of z; flat for a flat one."""
+        """Rates, of the shape of z; flat for a flat one. SimulationError for one too many."""
+        self.calls, self.latest = self.calls + 1, z
+        if self.calls > self.most:
+            raise SimulationError(
+                f"the integration needs too many steps: it has come to t = {time:.6g} only, of "
+                f"{self.t[-1]:.6g} s. Are the times in seconds, and not in ms? Choose other parameters or "
+                "bounds, or lsoda (stiff models)"
+            )
         u = [float(np.interp(time, self.t, column)) for column in self.u.T]
         if self.rates:
             return self.rates.one([time, *z.ravel().tolist(), *self.given, *u]).reshape(z.shape)
@@ -96,14 +103,10 @@ def exact(system: System) -> FloatArray:
     parts = np.concatenate([tables[:1], tables[moving] * scale[:, None, None]]).reshape(m, -1)
     M[n:m, :n], M[:m, m : m + 1 + nu] = parts[n:, :n], parts[:, n:]
     M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
-    steps = np.diff(t)
-    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
-    # of steps that differ by rounding the mean is taken: an error of one would add up over the record
-    kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
-    _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
-    lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    z = np.zeros((len(t), n, 1 + k))
+    lengths, which = _lengths(t.tobytes())
+    steps, z = np.diff(t), np.zeros((len(t), n, 1 + k))
     z[0], size = system.first, max(1, BATCH // M.size)
+    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
     for low in range(0, len(steps), size):
         back = slice(low, min(low + size, len(steps)))
         rows, (used, place) = slice(low + 1, back.stop + 1), np.unique(which[back], return_inverse=True)
@@ -117,25 +120,35 @@ def exact(system: System) -> FloatArray:
     return z
 
 
+@lru_cache(maxsize=8)
+def _lengths(times: bytes) -> tuple[FloatArray, IntArray]:
+    """Lengths that steps between times have, and which of them each step has."""
+    t = np.frombuffer(times)
+    steps = np.diff(t)
+    # of steps that differ by rounding the mean is taken: an error of one would add up over the record
+    kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
+    _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
+    return steps[one] + np.bincount(which, steps - steps[one][which]) / count, which
+
+
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
     """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k), by doubling spans.
 
     P is (n, m, m), or one for all, which then multiplies all steps at once.
     """
     n, m, k = push.shape
-    y = push.copy()
+    y, span = push.copy(), 1
     y[0] += P[0] @ first
-    flat = np.moveaxis(y, 0, 1).reshape(m, -1)
-    span = 1
+    if len(P) == 1:
+        flat, power = y.swapaxes(0, 1).reshape(m, -1), P[0]
+        while span < n:
+            flat[:, span * k :] += power @ flat[:, : -span * k]
+            power, span = power @ power, 2 * span
+        return flat.reshape(m, n, k).swapaxes(0, 1)
     while span < n:
-        if len(P) > 1:
-            y[span:] += P[span:] @ y[:-span]
-            P = np.concatenate([P[:span], P[span:] @ P[:-span]])
-        else:
-            flat[:, span * k :] += P[0] @ flat[:, : -span * k]
-            P = P @ P
-        span *= 2
-    return y if len(P) > 1 else flat.reshape(m, n, k).swapaxes(0, 1)
+        y[span:] += P[span:] @ y[:-span]
+        P, span = np.concatenate([P[:span], P[span:] @ P[:-span]]), 2 * span
+    return y
 
 
 def heun_step(

@@ -122,17 +122,17 @@ class OdeModel:
 
     @cached_property
     def coefficients(self) -> tuple[Expression, ...]:
-        """[A b B] of the rates before E⁻¹, row by row, if these are linear."""
-        x, u = (self.symbols[1:][: len(self.states)], self.symbols[1 + len(self.states) + len(self.start) :])
+        """Of E dx/dt = A x + b + B u, where the rates are such: [A b B], row by row."""
+        n = len(self.states)
+        x, u = self.symbols[1 : 1 + n], self.symbols[1 + n + len(self.start) :]
         rest = dict.fromkeys((*x, *u), 0)
         return tuple(part for e in self.rates for part in (*map(e.diff, x), e.subs(rest), *map(e.diff, u)))
 
     @cached_property
     def linear_driven(self) -> bool:
         """Whether dx/dt = A x + b + B u with constant A, b and B: no explicit time."""
-        by = [s for s in self.symbols if s.name in {*self.states, *self.inputs}]
         # such as sign(v): its derivative is 0, but it is not constant
-        parts = [part for e in self.rates for part in (*map(e.diff, by), *signs(e))]
+        parts = [*self.coefficients, *(part for e in self.rates for part in signs(e))]
         varying = {"t", *self.states, *self.inputs}
         return bool(self.states) and not self.timed and not any(expressions.names(e) & varying for e in parts)
 
@@ -173,7 +173,7 @@ class OdeModel:
         return {}
 
     def unrolled(self, columns: int) -> Compiled | None:
-        """`augmented` for [x | S] of so many columns with the products written out, if they are few: quicker."""
+        """`augmented` of so many columns with the products of f_x S written out: quicker if they are few."""
         import sympy
 
         n = len(self.states)
@@ -199,9 +199,7 @@ class OdeModel:
         parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
         if np.ndim(t) == 0:
             return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
-        return table.many(
-            np.shape(t), [t, *(column for part in parts for column in np.moveaxis(part, -1, 0))]
-        )
+        return table.many(np.shape(t), [t, *(part[..., j] for part in parts for j in range(part.shape[-1]))])
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
         """Expressions of the parameters alone, with the derivatives by these, (m, 1 + n_p)."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,8 +21,8 @@ from rotorid.regression.prior import prior_rows
 
 LARGEST = 1e140
 """Residuals and sensitivities beyond this size have no sum of squares."""
-RTOL = 1e-10
-"""Of the integration during a fit."""
+RTOL, LSODA = 1e-10, 7
+"""Of the integration during a fit; rates of lsoda that take as long as one of dop853."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,24 +153,21 @@ class Problem:
         theta = np.frombuffer(values)
         if not np.isfinite(theta).all():
             raise SimulationError("the parameters grow beyond all bounds")
+        runs = self._simulated(theta)
         if not self.runs and self.quick == "auto" and len({*self.models}) == 1:
-            self.quick = "taylor" if worth_compiling(self.model, partial(self._steps, theta)) else "auto"
-        runs = self._simulated(theta, rtol=self.rtol)
+            calls = sum(run.calls / (LSODA if run.integrator == "lsoda" else 1) for run in runs)
+            if worth_compiling(self.model, calls):
+                self.quick = "taylor"
+                runs = self._simulated(theta)
         r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
         J = self.vector([run.y_theta for run in runs])
         if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
             raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
         return r, J, runs
 
-    def _steps(self, theta: FloatArray) -> float:
-        """Steps of dop853 that take as long as a solution, about: a rough one tells."""
-        each = {"lsoda": 1 / 16, "dop853": 1 if self.model.timed else 4, "none": 0}
-        runs = self._simulated(theta, rtol=1e-6, sensitivities=False)
-        return sum(each[run.integrator] * run.steps for run in runs)
-
-    def _simulated(self, theta: FloatArray, **options: Any) -> tuple[Trajectory, ...]:  # noqa: ANN401
+    def _simulated(self, theta: FloatArray) -> tuple[Trajectory, ...]:
         pairs = zip(self.models, self.records, strict=True)
-        return tuple(simulate(m, theta, record, integrator=self.quick, **options) for m, record in pairs)
+        return tuple(simulate(m, theta, one, integrator=self.quick, rtol=self.rtol) for m, one in pairs)
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""

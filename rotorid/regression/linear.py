@@ -160,7 +160,7 @@ def least_squares(
     unit, scale = unit_columns(white)
     U, s, Vt = np.linalg.svd(unit, full_matrices=False)
     rank = int(np.count_nonzero(s > rcond * s[0]))
-    Vt[:, ~white.any(axis=0)] = 0.0  # rounding, beside which there is nothing
+    Vt[:, s**2 @ Vt**2 < 0.5] = 0.0  # a column of zeros: rounding, beside which there is nothing
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
@@ -272,5 +272,6 @@ class NormalMatrix(NamedTuple):
 
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
-    full = np.linalg.matrix_rank(unit_columns(K)[0], JACOBIAN_RCOND) == len(names)
-    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(K) ** 2:.4g}") if full else np.inf)
+    R = np.linalg.qr(K, "r")
+    full = np.linalg.matrix_rank(unit_columns(R)[0], JACOBIAN_RCOND) == len(names)
+    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(R) ** 2:.4g}") if full else np.inf)
