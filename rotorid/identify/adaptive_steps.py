@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import pairwise
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.integrators import System
+from rotorid.identify.integrators import System, written_out
 from rotorid.identify.ode import OdeModel, SimulationError
 
 LARGEST = 1e100
@@ -61,23 +62,26 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
             return table, "taylor"
         integrator = "dop853"  # says why
     *tries, last = [(name, rtol, most) for name, most in STEPS[integrator]]
-    if integrator == "auto" and rtol >= QUICK and system.rates and not system.model.driven:
+    if (
+        integrator == "auto"
+        and rtol >= QUICK
+        and written_out(system.model, system.k)
+        and not system.model.driven
+    ):
         tries.insert(0, ("lsoda", 0.1 * rtol, 10_000))
     for one in tries:
-        try:
+        with suppress(SimulationError):
             return _solve(system, *one), one[0]
-        except SimulationError:
-            continue
     return _solve(system, *last), last[0]
 
 
-def worth_compiling(model: OdeModel, calls: float) -> bool:
+def worth_compiling(model: OdeModel, calls: int) -> bool:
     """Whether heyoka knows the model, and a fit by solutions of so many rates takes longer than compiling.
 
-    Both were measured: compiling takes as long as a fit whose solutions have 15 size² rates of dop853, about.
+    Both were measured: compiling takes as long as a fit whose solutions have 60 size² rates, about.
     """
     size = len(model.states) * (1 + len(model.parameters))
-    if not 0 < 15 * size**2 <= calls or find_spec("heyoka") is None:
+    if not 0 < 60 * size**2 <= calls or find_spec("heyoka") is None:
         return False
     try:
         return taylor(model) is not None
@@ -109,14 +113,12 @@ def _lsoda(system: System, t: FloatArray, first: FloatArray, options: dict[str, 
     with warnings.catch_warnings():
         warnings.simplefilter("error", ODEintWarning)
         try:
-            y: FloatArray = odeint(
-                system, first, t, tfirst=True, mxstep=10**6, hmax=_longest_step(system), **options
-            )
-        except ODEintWarning as error:
-            raise SimulationError(f"lsoda comes no further: {error}") from error
+            y = odeint(system, first, t, tfirst=True, mxstep=10**6, hmax=_longest_step(system), **options)
+        except ODEintWarning:
+            y = np.array([np.inf])
     if not np.abs(y).max() < LARGEST:
-        raise SimulationError("lsoda comes no further: the solution diverges")
-    return y
+        raise SimulationError("lsoda leads no further: the solution diverges, or is too stiff")
+    return np.asarray(y)
 
 
 def _dop853(system: System, t: FloatArray, first: FloatArray, options: dict[str, Any]) -> FloatArray:

@@ -24,9 +24,6 @@ from rotorid.base.choices import did_you_mean
 from rotorid.identify import expressions
 from rotorid.identify.expression_functions import Compiled, Expression, jacobian, real, signs
 
-UNROLLED = 300
-"""Products in f_x S below which they are written out."""
-
 
 class SimulationError(ValueError):
     """A solution that does not exist, or cannot be computed, up to the last time."""
@@ -115,11 +112,6 @@ class OdeModel:
             tables[1:] -= inverse @ slopes @ tables[0]
         return tables
 
-    def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates of z = [x | S], (n_x, 1 + k): of the states, and where k = n_p of S = ∂x/∂θ."""
-        table, n = self.f(t, z[:, 0], theta, u), len(z)
-        return np.hstack((table[:, :1], table[:, 1 : 1 + n] @ z[:, 1:] + table[:, 1 + n : n + z.shape[1]]))
-
     @cached_property
     def coefficients(self) -> tuple[Expression, ...]:
         """Of E dx/dt = A x + b + B u, where the rates are such: [A b B], row by row."""
@@ -172,30 +164,9 @@ class OdeModel:
         """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
 
-    def unrolled(self, columns: int) -> Compiled | None:
-        """`augmented` of so many columns with the products of f_x S written out: quicker if they are few."""
-        import sympy
-
-        n = len(self.states)
-        if n**2 * columns >= UNROLLED or self.inertia:
-            return None
-        key = "unrolled", columns
-        if key not in self.memory:
-            rates = sympy.Matrix(self.rates)
-            first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
-            S = sympy.Matrix(n, columns - 1, lambda *_: sympy.Dummy())
-            slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if len(S) else S
-            z = sympy.Matrix([*x]).row_join(S)
-            self.memory[key] = Compiled([*first, *z, *p, *u], [*rates.row_join(slopes)], (n, columns))
-        made: Compiled = self.memory[key]
-        return made
-
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
-        if what not in self.memory:
-            exprs, by = getattr(self, what), self.symbols[1 : 1 + len(self.states) + len(self.start)]
-            self.memory[what] = Compiled(self.symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
-        table: Compiled = self.memory[what]
+        table = self._compiled(what, self.symbols, 1)
         parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
         if np.ndim(t) == 0:
             return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
@@ -203,11 +174,17 @@ class OdeModel:
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
         """Expressions of the parameters alone, with the derivatives by these, (m, 1 + n_p)."""
-        if what not in self.memory:
-            exprs, by = getattr(self, what), self.symbols[1 + len(self.states) :][: len(self.start)]
-            self.memory[what] = Compiled(by, jacobian(exprs, by), (len(exprs), 1 + len(by)))
-        table: Compiled = self.memory[what]
+        n = 1 + len(self.states)
+        table = self._compiled(what, self.symbols[n : n + len(self.start)], 0)
         return table.one(np.asarray(theta, dtype=float).tolist())
+
+    def _compiled(self, what: str, symbols: list[Any], first: int) -> Compiled:
+        """Expressions of these symbols, with the derivatives by those of states and parameters from `first`."""
+        if what not in self.memory:
+            exprs, by = getattr(self, what), symbols[first : len(symbols) - first * len(self.inputs)]
+            self.memory[what] = Compiled(symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
+        made: Compiled = self.memory[what]
+        return made
 
     def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""

@@ -21,8 +21,8 @@ from rotorid.regression.prior import prior_rows
 
 LARGEST = 1e140
 """Residuals and sensitivities beyond this size have no sum of squares."""
-RTOL, LSODA = 1e-10, 7
-"""Of the integration during a fit; rates of lsoda that take as long as one of dop853."""
+RTOL = 1e-10
+"""Of the integration during a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +154,10 @@ class Problem:
         if not np.isfinite(theta).all():
             raise SimulationError("the parameters grow beyond all bounds")
         runs = self._simulated(theta)
-        if not self.runs and self.quick == "auto" and len({*self.models}) == 1:
-            calls = sum(run.calls / (LSODA if run.integrator == "lsoda" else 1) for run in runs)
-            if worth_compiling(self.model, calls):
-                self.quick = "taylor"
-                runs = self._simulated(theta)
+        first = not self.runs and self.quick == "auto" and len({*self.models}) == 1
+        if first and worth_compiling(self.model, sum(run.calls for run in runs)):
+            self.quick = "taylor"
+            runs = self._simulated(theta)
         r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
         J = self.vector([run.y_theta for run in runs])
         if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):

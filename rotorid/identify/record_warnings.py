@@ -24,8 +24,8 @@ from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_least_squares import Iterations, Problem
 from rotorid.identify.simulation import STEPWISE
-from rotorid.regression import least_squares
-from rotorid.regression.estimate import Combination, Estimate, unit_columns
+from rotorid.regression import gain, least_squares
+from rotorid.regression.estimate import Combination, Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
 from rotorid.regression.prior import effect
 
@@ -151,11 +151,8 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     """
     from scipy.special import fdtrc
 
-    unit, lengths = unit_columns(J)
-    Q, s, Vt = np.linalg.svd(unit, full_matrices=False)
-    kept = s > JACOBIAN_RCOND * s[0]
-    Q, G = Q[:, kept], (Vt[kept].T / s[kept]) @ Q[:, kept].T / lengths[:, None]
-    t, parts = problem.by_time([record.t for record in problem.records]), np.vstack((r, Q.T)) * problem.scale
+    t, Q = problem.by_time([record.t for record in problem.records]), np.linalg.svd(J, full_matrices=False)[0]
+    parts, G = np.vstack((r, Q.T)) * problem.scale, gain(J, rcond=JACOBIAN_RCOND)
     # of noise it is χ² of two
     best, frequency, span, series = 20.0 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
     for _, rows in problem.series:
@@ -177,7 +174,8 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
         frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
     C, waves = np.zeros((len(r), 2)), np.exp(2j * np.pi * frequency * t[series])
     C[series] = problem.scale[series, None] * np.column_stack((waves.real, waves.imag))
-    outside, free = C - Q @ (Q.T @ C), len(r) - len(Q.T) - 2
+    outside = C - J @ (G @ C)  # what the parameters take of y is J G y
+    free = len(r) - round(float(np.sum(G.T * J))) - 2
     amount, _, _, size = np.linalg.lstsq(outside, -r, rcond=None)
     if not frequency or free < 3 or size[1] <= 1e-6 * np.abs(C).max():
         return "", False

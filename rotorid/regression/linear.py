@@ -272,6 +272,5 @@ class NormalMatrix(NamedTuple):
 
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
-    R = np.linalg.qr(K, "r")
-    full = np.linalg.matrix_rank(unit_columns(R)[0], JACOBIAN_RCOND) == len(names)
-    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(R) ** 2:.4g}") if full else np.inf)
+    full = np.linalg.matrix_rank(unit_columns(K)[0], JACOBIAN_RCOND) == len(names)
+    return NormalMatrix(names, K.T @ K, float(f"{np.linalg.cond(K) ** 2:.4g}") if full else np.inf)
