@@ -97,11 +97,6 @@ def written_out(model: OdeModel, k: int) -> Compiled | None:
 def exact(system: System) -> FloatArray:
     """States and sensitivities (n, n_x, 1 + k) of a linear model; not finite where they overflow."""
     model, t, k = system.model, system.t, system.k
-    if not model.linear_driven:
-        raise ValueError(
-            "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
-            "or auto"
-        )
     from scipy.linalg import expm
 
     n, nu, tables = len(model.states), system.u.shape[1], model.matrices(system.theta)[: 1 + k]

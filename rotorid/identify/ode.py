@@ -80,7 +80,7 @@ class OdeModel:
         """Rates of the states, then their derivatives by states and parameters, (*B, n_x, 1 + n_x + n_p)."""
         table = self._values("rates", t, x, theta, u)
         if self.inertia:
-            inverse, slopes = self._inverse(theta)
+            inverse, slopes = self.inverse(theta)
             table = inverse @ table
             moved = np.tensordot(inverse @ slopes, table[..., 0], (2, -1))
             table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-1, -2))
@@ -103,11 +103,14 @@ class OdeModel:
             The model is not linear with constant coefficients.
         """
         if not self.linear_driven:
-            raise ValueError("this model is not linear with constant coefficients; it has no matrices")
+            raise ValueError(
+                "expm solves linear models with constant coefficients, without explicit time; use dop853, "
+                "lsoda, or auto"
+            )
         table, n = self._alone("coefficients", theta), len(self.states)
         tables = table.T.reshape(table.shape[1], n, -1)
         if self.inertia:
-            inverse, slopes = self._inverse(theta)
+            inverse, slopes = self.inverse(theta)
             tables = inverse @ tables
             tables[1:] -= inverse @ slopes @ tables[0]
         return tables
@@ -179,15 +182,21 @@ class OdeModel:
         return table.one(np.asarray(theta, dtype=float).tolist())
 
     def _compiled(self, what: str, symbols: list[Any], first: int) -> Compiled:
-        """Expressions of these symbols, with the derivatives by those of states and parameters from `first`."""
+        """Expressions of these symbols, with the derivatives by those of states and parameters."""
         if what not in self.memory:
             exprs, by = getattr(self, what), symbols[first : len(symbols) - first * len(self.inputs)]
             self.memory[what] = Compiled(symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
         made: Compiled = self.memory[what]
         return made
 
-    def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
+    def inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """E⁻¹ (n_x, n_x) and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters.
+
+        Raises
+        ------
+        SimulationError
+            E is singular.
+        """
         values, n, memory = np.asarray(theta, dtype=float), len(self.states), self.memory
         if memory.get("inverse at") != values.tobytes():
             table = np.moveaxis(self._alone("inertia", values).reshape(n, n, -1), -1, 0)

@@ -124,8 +124,6 @@ class Problem:
             )
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
-        self.quick = integrator
-        """That of the evaluations: for "auto" that which is quick for this model and these times."""
         self._latest = lru_cache(maxsize=3)(self._evaluated)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
@@ -153,20 +151,19 @@ class Problem:
         theta = np.frombuffer(values)
         if not np.isfinite(theta).all():
             raise SimulationError("the parameters grow beyond all bounds")
-        runs = self._simulated(theta)
-        first = not self.runs and self.quick == "auto" and len({*self.models}) == 1
+        runs = tuple(
+            simulate(model, theta, record, integrator=self.integrator, rtol=self.rtol)
+            for model, record in zip(self.models, self.records, strict=True)
+        )
+        first = not self.runs and self.integrator == "auto" and len({*self.models}) == 1
         if first and worth_compiling(self.model, sum(run.calls for run in runs)):
-            self.quick = "taylor"
-            runs = self._simulated(theta)
+            self.integrator = "taylor"
+            return self._evaluated(values)
         r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
         J = self.vector([run.y_theta for run in runs])
         if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
             raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
         return r, J, runs
-
-    def _simulated(self, theta: FloatArray) -> tuple[Trajectory, ...]:
-        pairs = zip(self.models, self.records, strict=True)
-        return tuple(simulate(m, theta, one, integrator=self.quick, rtol=self.rtol) for m, one in pairs)
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""
