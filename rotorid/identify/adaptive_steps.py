@@ -11,7 +11,6 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
-from importlib.util import find_spec
 from itertools import pairwise
 from typing import Any
 
@@ -74,10 +73,9 @@ def worth_compiling(model: OdeModel, calls: int) -> bool:
     Both were measured: compiling takes as long as a fit whose solutions have 60 size² rates, about.
     """
     size = len(model.states) * (1 + len(model.parameters))
-    if not 0 < 60 * size**2 <= calls or find_spec("heyoka") is None:
-        return False
-    with suppress(ValueError):
-        return taylor(model) is not None
+    if 0 < 60 * size**2 <= calls:
+        with suppress(ValueError):  # not installed, or not for this model
+            return taylor(model) is not None
     return False
 
 

@@ -156,12 +156,12 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     # of noise it is χ² of two
     best, frequency, span, series = 20.0 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
     for _, rows in problem.series:
-        times, n = t[rows], rows.stop - rows.start
+        times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
         even = np.linspace(times[0], times[-1], n)
         w, *A = np.fft.rfft([np.interp(even, times, part) for part in parts[:, rows]], 4 * n)[:, 4:]
-        half = float(problem.scale[rows] @ problem.scale[rows]) / 2
+        half = float(size @ size) / 2
         Z = np.square(A)
         P, Z = half - np.abs(Z).sum(axis=0) / 2, Z.sum(axis=0) / 2
         det = P**2 - np.abs(Z) ** 2

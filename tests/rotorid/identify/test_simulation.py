@@ -299,7 +299,6 @@ def test_fits_are_the_same_with_and_without(heyoka, monkeypatch):
     np.testing.assert_allclose(quick.std, slow.std, rtol=1e-6)
     assert quick.warnings == slow.warnings
     monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
-    monkeypatch.setattr("rotorid.identify.adaptive_steps.find_spec", lambda name: None)
     plain = fit(model_of(RATES), record)
     np.testing.assert_allclose(plain.values, slow.values, rtol=1e-8)
     with pytest.raises(ValueError, match="needs heyoka: pip install heyoka"):
