@@ -160,7 +160,7 @@ def least_squares(
     unit, scale = unit_columns(white)
     U, s, Vt = np.linalg.svd(unit, full_matrices=False)
     rank = int(np.count_nonzero(s > rcond * s[0]))
-    Vt[:, s**2 @ Vt**2 < 0.5] = 0.0  # a column of zeros: rounding, beside which there is nothing
+    Vt[:, ~white.any(axis=0)] = 0.0  # rounding, beside which there is nothing
     inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / scale[:, None]
     x = inverse @ white_y
     # one step of refinement costs nothing and recovers the last digits of badly scaled problems
