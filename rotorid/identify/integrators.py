@@ -74,9 +74,10 @@ class System:
         u = [float(np.interp(time, self.t, column)) for column in self.u.T]
         if (rates := written_out(self.model, self.k)) is not None:
             return rates.one([time, *z.ravel().tolist(), *self.theta.tolist(), *u]).reshape(z.shape)
-        x, S = np.split(z.reshape(self.first.shape), [1], axis=1)
-        f, f_x, f_theta = np.split(self.model.f(time, x[:, 0], self.theta, u), [1, 1 + len(x)], axis=1)
-        return np.hstack((f, f_x @ S + f_theta[:, : self.k])).reshape(z.shape)
+        x, n = z.reshape(self.first.shape), len(self.first)
+        table = self.model.f(time, x[:, 0], self.theta, u)
+        slopes = table[:, 1 : 1 + n] @ x[:, 1:] + table[:, 1 + n :][:, : self.k]
+        return np.hstack((table[:, :1], slopes)).reshape(z.shape)
 
 
 @lru_cache(maxsize=64)
