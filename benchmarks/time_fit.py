@@ -153,7 +153,7 @@ def with_chain(casadi: bool = False) -> Row:
 
 
 def with_duffing() -> list[Row]:
-    with patch("rotorid.identify.adaptive_steps.find_spec", lambda name: None):  # as if not installed
+    with patch.dict("sys.modules", heyoka=None):  # as if not installed
         plain, record = duffing()
         optimum = fit(plain, record, integrator="dop853", rtol=1e-12).values
         lmfit = partial(with_lmfit, plain, record, duffing_rates)

@@ -9,25 +9,25 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
-from importlib.util import find_spec
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.integrators import System
+from rotorid.identify.integrators import System, written_out
 from rotorid.identify.ode import OdeModel, SimulationError
 
 LARGEST = 1e100
 """States beyond this size (in the units of the model) have diverged."""
 STEPS = {
-    "auto": (("dop853", 3_000, 4), ("lsoda", 30_000, 10)),
-    "dop853": (("dop853", 10_000, 10),),
-    "lsoda": (("lsoda", 30_000, 10),),
+    "auto": (("dop853", 45_000), ("lsoda", 60_000)),
+    "dop853": (("dop853", 150_000),),
+    "lsoda": (("lsoda", 60_000), ("dop853", 150_000)),
 }
-"""What is tried, with so many steps at most, or so many for each sample; then a model is stiff for dop853."""
+"""What is tried, with so many rates at most, or 150 for each sample; dop853 says why lsoda failed."""
 LEVEL = 1e-4
 """Smallest size that counts, relative to the largest."""
 
@@ -56,71 +56,72 @@ def adaptive(system: System, rtol: float, integrator: str) -> tuple[FloatArray, 
         if table is not None:
             return table, "taylor"
         integrator = "dop853"  # says why
-    t, name, reached = system.t, "", 0.0
-    for name, most, each in STEPS[integrator]:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
-            table, reached = _solve(system, name, rtol, max(most, each * len(t)))
-        if reached == t[-1]:
-            return table, name
-    raise SimulationError(
-        f"{name} needs too many steps: it has come to t = {reached:.6g} only, of {t[-1]:.6g} s. Are the "
-        "times in seconds, and not in ms? Choose other parameters or bounds, or lsoda (stiff models)"
-    )
+    # with a tenth of the tolerance lsoda keeps it as well as dop853, in less time where rates cost little
+    few = not system.model.driven and written_out(system.model, system.k)
+    *tries, last = [(name, rtol, most) for name, most in STEPS[integrator]]
+    if few and integrator == "auto" and rtol >= 1e-10:
+        tries.insert(0, ("lsoda", 0.1 * rtol, 10_000))
+    for one in tries:
+        with suppress(SimulationError):
+            return _solve(system, *one), one[0]
+    return _solve(system, *last), last[0]
 
 
-def worth_compiling(model: OdeModel, steps: int) -> bool:
-    """Whether heyoka knows the model, and a fit by solutions of so many steps takes longer than compiling.
+def worth_compiling(model: OdeModel, calls: int) -> bool:
+    """Whether heyoka knows the model, and a fit by solutions of so many rates takes longer than compiling.
 
-    Both were measured: compiling takes as long as a fit whose solutions have size² steps, about.
+    Both were measured: compiling takes as long as a fit whose solutions have 60 size² rates, about.
     """
     size = len(model.states) * (1 + len(model.parameters))
-    if not 0 < size**2 <= steps or find_spec("heyoka") is None:
-        return False
-    try:
-        return taylor(model) is not None
-    except ValueError:
-        return False
+    if 0 < 60 * size**2 <= calls:
+        with suppress(ValueError):  # not installed, or not for this model
+            return taylor(model) is not None
+    return False
 
 
-def _solve(system: System, name: str, rtol: float, most: int) -> tuple[FloatArray, float]:
-    """By scipy's "dop853" or "lsoda", and the time that it comes to in so many steps at most."""
-    from scipy.integrate import DOP853, LSODA
-
+def _solve(system: System, name: str, rtol: float, most: int) -> FloatArray:
+    """By scipy's "dop853" or "lsoda", with so many rates at most."""
     t, theta = system.t, np.abs(system.theta[: system.k])
     table = np.full((len(t), *system.first.shape), np.nan)
+    table[0], system.most = system.first, system.calls + max(most, 150 * len(t))
     # of a sensitivity times its parameter as of the state
-    limits = (
-        0.01 * rtol * np.outer(first_sizes(system), [1.0, *1.0 / np.where(theta > 0, theta, 1.0)]).ravel()
-    )
-    table[0] = system.first
+    sizes = np.outer(first_sizes(system), [1.0, *1.0 / np.where(theta > 0, theta, 1.0)]).ravel()
+    piece, options = _dop853 if name == "dop853" else _lsoda, {"rtol": rtol, "atol": 0.01 * rtol * sizes}
     # inputs have corners at the samples: no step may cross one
-    corners = range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)
-    for begin, end in pairwise(corners):
-        options: dict[str, Any] = {"rtol": rtol, "atol": limits, "max_step": _longest_step(system)}
-        span = t[begin], table[begin].ravel(), t[end]
-        if name == "lsoda":
-            solver: Any = LSODA(system, *span, **options)
-        else:
-            solver = DOP853(system, *span, first_step=t[begin + 1] - t[begin], **options)
-        row = begin + 1
-        while row <= end:
-            if not most:
-                return table, solver.t
-            most, system.steps = most - 1, system.steps + 1
-            solver.step()
-            z, done = solver.y.reshape(system.first.shape), solver.status == "finished"
-            if solver.status == "failed" or not (np.isfinite(z).all() and np.abs(z[:, 0]).max() < LARGEST):
-                # no step leads on: the state that changes fastest for its size is lost
-                rates = np.abs(system(solver.t, z)[:, 0]) / np.maximum(np.abs(z[:, 0]), 1e-300)
-                table[row] = z
-                table[row, np.argmax(np.where(np.isfinite(rates), rates, np.inf)), 0] = np.inf
-                return table, float(t[-1])
-            upto = end + 1 if done else int(np.searchsorted(t[: end + 1], solver.t, side="right"))
-            if upto > row:
-                table[row:upto] = solver.dense_output()(t[row:upto]).T.reshape(-1, *system.first.shape)
-            row = upto
-    return table, float(t[-1])
+    for begin, end in pairwise(range(len(t)) if system.model.driven or len(t) < 2 else (0, len(t) - 1)):
+        y = piece(system, t[begin : end + 1], table[begin].ravel(), options)
+        table[begin : begin + len(y)] = y.reshape(-1, *system.first.shape)
+        if not np.isfinite(table[end]).all():
+            break
+    return table
+
+
+def _lsoda(system: System, t: FloatArray, first: FloatArray, options: dict[str, Any]) -> FloatArray:
+    """Without Python between the samples."""
+    from scipy.integrate import ODEintWarning, odeint
+
+    with warnings.catch_warnings(), suppress(ODEintWarning):
+        warnings.simplefilter("error", ODEintWarning)
+        y = odeint(system, first, t, tfirst=True, mxstep=10**6, hmax=_longest_step(system), **options)
+        if np.abs(y).max() < LARGEST:
+            return np.asarray(y)
+    raise SimulationError("lsoda leads no further: the solution diverges, or is too stiff")
+
+
+def _dop853(system: System, t: FloatArray, first: FloatArray, options: dict[str, Any]) -> FloatArray:
+    """Up to where no step leads on; the row there has what is lost, the state that changes fastest."""
+    from scipy.integrate import solve_ivp
+
+    options |= {"max_step": _longest_step(system), "first_step": t[1] - t[0]}
+    steps = solve_ivp(system, t[[0, -1]], first, "DOP853", t[1:], **options).y
+    y = np.vstack((first, *np.transpose(steps)))
+    if len(y) < len(t):
+        last = system.latest.reshape(system.first.shape).copy()
+        x, size = last[:, 0], np.abs(system(t[len(y)], last)[:, 0])
+        rates = size / np.maximum(np.abs(x), 1e-300) + 0 * x  # no number where x is infinite
+        x[np.argmax(rates)] = np.inf
+        y = np.vstack((y, last.ravel()))
+    return y
 
 
 def _longest_step(system: System) -> float:

@@ -7,6 +7,7 @@ record. The methods of [Q] and [F] stand beside it as they are printed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -132,11 +133,11 @@ def fit(  # noqa: PLR0913
         )
         return Iterations(**vars(reached))
 
-    begins = spread_starts(begin, problem.model.bounds, OTHERS if starts is None else count, seed)
-    paths, more = _searched(search, problem, begins[:count]), ""
+    spread = partial(spread_starts, begin, problem.model.bounds, seed=seed)
+    paths, more = _searched(search, problem, spread(count)), ""
     path = min(paths, key=_cost)
     if starts is None and method == "levenberg-marquardt" and (path.converged or path.iterations > 20):
-        path, more = _from_elsewhere(search, problem, path, begins[1:], loss)
+        path, more = _from_elsewhere(search, problem, path, spread, loss)
     judged, theta = judge(problem, path, loss), path.estimate.solution
     words = [*judged.pop("warnings"), more, *_rivals(paths, path)]
     if ((theta < low) | (theta > high)).any():
@@ -198,12 +199,16 @@ def _searched(
 
 
 def _from_elsewhere(
-    search: Searching, problem: Problem, path: Iterations, begins: Sequence[FloatArray], loss: str
+    search: Searching,
+    problem: Problem,
+    path: Iterations,
+    spread: Callable[[int], Sequence[FloatArray]],
+    loss: str,
 ) -> tuple[Iterations, str]:
     """A better minimum from other starts and words, where the first does not describe the record."""
     if not misfit(problem, path.estimate, path.estimate.residuals, loss):
         return path, ""
-    paths = _searched(search, problem, begins, [path])
+    paths = _searched(search, problem, spread(OTHERS)[1:], [path])
     best = min(paths, key=_cost)
     if _cost(path) <= 1.5 * _cost(best):
         return path, ""

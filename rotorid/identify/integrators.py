@@ -15,16 +15,20 @@ so that a matrix exponential leads from sample to sample. Other parameters act b
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.identify.ode import OdeModel
+from rotorid.identify.expression_functions import Compiled
+from rotorid.identify.ode import OdeModel, SimulationError
 
 SAME_STEP = 4e-15
 """Steps that differ by less than this share of the largest time are one step (rounded times)."""
+UNROLLED = 300
+"""Products in f_x S below which they are written out."""
 BATCH = 2**22
 """Numbers in one batch of matrix exponentials."""
 At = TypeVar("At", float, FloatArray)
@@ -55,25 +59,45 @@ class System:
         self.k = len(theta) if sensitivities else 0
         self.first = model.x0(theta)[:, : 1 + self.k]
         """z at the first time."""
-        self.steps = 0
-        """Of an integration with error control."""
+        self.calls, self.most, self.latest = 0, np.inf, self.first
+        """Rates asked for so far, and at most; for which states and sensitivities."""
 
     def __call__(self, time: float, z: FloatArray) -> FloatArray:
-        """Rates, of the shape of z; flat for a flat one."""
-        u = np.array([np.interp(time, self.t, column) for column in self.u.T] if self.u.size else ())
-        if z.ndim == 2:
-            return self.model.augmented(time, z, self.theta, u)
-        return self.model.augmented(time, z.reshape(self.first.shape), self.theta, u).ravel()
+        """Rates, of the shape of z; flat for a flat one. SimulationError for one too many."""
+        self.calls, self.latest = self.calls + 1, z
+        if self.calls > self.most:
+            raise SimulationError(
+                f"the integration needs too many steps: it has come to t = {time:.6g} only, of "
+                f"{self.t[-1]:.6g} s. Are the times in seconds, and not in ms? Choose other parameters or "
+                "bounds, or lsoda (stiff models)"
+            )
+        u = [float(np.interp(time, self.t, column)) for column in self.u.T]
+        if (rates := written_out(self.model, self.k)) is not None:
+            return rates.one([time, *z.ravel().tolist(), *self.theta.tolist(), *u]).reshape(z.shape)
+        x, n = z.reshape(self.first.shape), len(self.first)
+        table = self.model.f(time, x[:, 0], self.theta, u)
+        slopes = table[:, 1 : 1 + n] @ x[:, 1:] + table[:, 1 + n :][:, : self.k]
+        return np.hstack((table[:, :1], slopes)).reshape(z.shape)
+
+
+@lru_cache(maxsize=64)
+def written_out(model: OdeModel, k: int) -> Compiled | None:
+    """Rates of [x | S] with k sensitivities as one function, where the products of f_x S are few: quicker."""
+    import sympy
+
+    n, rates = len(model.states), sympy.Matrix(model.rates)
+    if n**2 * (1 + k) >= UNROLLED or model.inertia:
+        return None
+    t, x, p, u = np.split(np.array(model.symbols), np.cumsum([1, n, len(model.start)]))
+    S = sympy.Matrix(n, k, lambda *_: sympy.Dummy())
+    slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if k else S
+    z = sympy.Matrix([*x]).row_join(S)
+    return Compiled([*t, *z, *p, *u], [*rates.row_join(slopes)], (n, 1 + k))
 
 
 def exact(system: System) -> FloatArray:
     """States and sensitivities (n, n_x, 1 + k) of a linear model; not finite where they overflow."""
     model, t, k = system.model, system.t, system.k
-    if not model.linear_driven:
-        raise ValueError(
-            "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
-            "or auto"
-        )
     from scipy.linalg import expm
 
     n, nu, tables = len(model.states), system.u.shape[1], model.matrices(system.theta)[: 1 + k]
@@ -83,19 +107,17 @@ def exact(system: System) -> FloatArray:
     scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))
     m = n * (1 + len(moving))
     M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
-    for low in range(0, m, n):
-        M[low : low + n, low : low + n] = tables[0, :, :n]
+    M[:m, :m] = np.kron(np.eye(m // n), tables[0, :, :n])
     parts = np.concatenate([tables[:1], tables[moving] * scale[:, None, None]]).reshape(m, -1)
     M[n:m, :n], M[:m, m : m + 1 + nu] = parts[n:, :n], parts[:, n:]
     M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
-    steps = np.diff(t)
-    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
+    steps, z = np.diff(t), np.zeros((len(t), n, 1 + k))
     # of steps that differ by rounding the mean is taken: an error of one would add up over the record
     kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
     _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
     lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    z = np.zeros((len(t), n, 1 + k))
     z[0], size = system.first, max(1, BATCH // M.size)
+    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
     for low in range(0, len(steps), size):
         back = slice(low, min(low + size, len(steps)))
         rows, (used, place) = slice(low + 1, back.stop + 1), np.unique(which[back], return_inverse=True)
@@ -115,10 +137,9 @@ def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray
     P is (n, m, m), or one for all, which then multiplies all steps at once.
     """
     n, m, k = push.shape
-    y = push.copy()
+    y, span = push.copy(), 1
     y[0] += P[0] @ first
-    flat = np.moveaxis(y, 0, 1).reshape(m, -1)
-    span = 1
+    flat = y.swapaxes(0, 1).reshape(m, -1)
     while span < n:
         if len(P) > 1:
             y[span:] += P[span:] @ y[:-span]

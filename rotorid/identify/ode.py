@@ -24,11 +24,6 @@ from rotorid.base.choices import did_you_mean
 from rotorid.identify import expressions
 from rotorid.identify.expression_functions import Compiled, Expression, jacobian, real, signs
 
-BIG = 2.0**60
-"""So large a state or input that nothing of its slope is lost beside constants."""
-UNROLLED = 300
-"""Products in f_x S below which they are written out."""
-
 
 class SimulationError(ValueError):
     """A solution that does not exist, or cannot be computed, up to the last time."""
@@ -85,7 +80,7 @@ class OdeModel:
         """Rates of the states, then their derivatives by states and parameters, (*B, n_x, 1 + n_x + n_p)."""
         table = self._values("rates", t, x, theta, u)
         if self.inertia:
-            inverse, slopes = self._inverse(theta)
+            inverse, slopes = self.inverse(theta)
             table = inverse @ table
             moved = np.tensordot(inverse @ slopes, table[..., 0], (2, -1))
             table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-1, -2))
@@ -108,31 +103,31 @@ class OdeModel:
             The model is not linear with constant coefficients.
         """
         if not self.linear_driven:
-            raise ValueError("this model is not linear with constant coefficients; it has no matrices")
-        n, nu = len(self.states), len(self.inputs)
-        # where one state or input is BIG and the others 0, and where all are 0
-        points = BIG * np.insert(np.eye(n + nu), n, 0.0, axis=0)
-        table = self.f(np.zeros(len(points)), points[:, :n], theta, points[:, n:])
-        columns = np.delete(table, np.s_[1 : 1 + n], axis=-1)
-        others = np.arange(n + 1 + nu) != n
-        columns[others] = (columns[others] - columns[n]) / BIG
-        return np.moveaxis(columns, (0, 2), (2, 0))
+            raise ValueError(
+                "expm solves linear models with constant coefficients, without explicit time; use dop853, "
+                "lsoda, or auto"
+            )
+        table, n = self._alone("coefficients", theta), len(self.states)
+        tables = table.T.reshape(table.shape[1], n, -1)
+        if self.inertia:
+            inverse, slopes = self.inverse(theta)
+            tables = inverse @ tables
+            tables[1:] -= inverse @ slopes @ tables[0]
+        return tables
 
-    def augmented(self, t: float, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
-        """Rates of z = [x | S], (n_x, 1 + k): of the states, and where k = n_p of S = ∂x/∂θ."""
-        if z.size * len(z) < UNROLLED and not self.inertia:
-            made: Compiled | None = self.memory.get(z.shape)
-            made = made or self.memory.setdefault(z.shape, self._unrolled(z.shape))
-            return made.one([t, *z.ravel().tolist(), *theta.tolist(), *u.tolist()])
-        table, n = self.f(t, z[:, 0], theta, u), len(z)
-        return np.hstack((table[:, :1], table[:, 1 : 1 + n] @ z[:, 1:] + table[:, 1 + n : n + z.shape[1]]))
+    @cached_property
+    def coefficients(self) -> tuple[Expression, ...]:
+        """Of E dx/dt = A x + b + B u, where the rates are such: [A b B], row by row."""
+        n = len(self.states)
+        x, u = self.symbols[1 : 1 + n], self.symbols[1 + n + len(self.start) :]
+        rest = dict.fromkeys((*x, *u), 0)
+        return tuple(part for e in self.rates for part in (*map(e.diff, x), e.subs(rest), *map(e.diff, u)))
 
     @cached_property
     def linear_driven(self) -> bool:
         """Whether dx/dt = A x + b + B u with constant A, b and B: no explicit time."""
-        by = [s for s in self.symbols if s.name in {*self.states, *self.inputs}]
         # such as sign(v): its derivative is 0, but it is not constant
-        parts = [part for e in self.rates for part in (*map(e.diff, by), *signs(e))]
+        parts = [*self.coefficients, *(part for e in self.rates for part in signs(e))]
         varying = {"t", *self.states, *self.inputs}
         return bool(self.states) and not self.timed and not any(expressions.names(e) & varying for e in parts)
 
@@ -172,38 +167,36 @@ class OdeModel:
         """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
 
-    def _unrolled(self, shape: tuple[int, ...]) -> Compiled:
-        """Rates of x, and of S if wanted, with the products of f_x S written out: quicker if they are few."""
-        import sympy
-
-        n, rates = len(self.states), sympy.Matrix(self.rates)
-        first, x, p, u = np.split(np.array(self.symbols), np.cumsum([1, n, len(self.start)]))
-        S = sympy.Matrix(n, shape[1] - 1, lambda *_: sympy.Dummy())
-        slopes = rates.jacobian([*x]) * S + rates.jacobian([*p]) if len(S) else S
-        z = sympy.Matrix([*x]).row_join(S)
-        return Compiled([*first, *z, *p, *u], [*rates.row_join(slopes)], shape)
-
     def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
         """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
-        if what not in self.memory:
-            exprs, by = getattr(self, what), self.symbols[1 : 1 + len(self.states) + len(self.start)]
-            self.memory[what] = Compiled(self.symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
-        table: Compiled = self.memory[what]
+        table = self._compiled(what, self.symbols, 1)
         parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
         if np.ndim(t) == 0:
             return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
-        return table.many(
-            np.shape(t), [t, *(column for part in parts for column in np.moveaxis(part, -1, 0))]
-        )
+        return table.many(np.shape(t), [t, *(part[..., j] for part in parts for j in range(part.shape[-1]))])
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
-        """Expressions of the parameters alone, with the derivatives by these."""
-        n = len(self.states)
-        table = self._values(what, 0.0, np.zeros(n), theta, np.zeros(len(self.inputs)))
-        return np.delete(table, np.s_[1 : 1 + n], axis=1)
+        """Expressions of the parameters alone, with the derivatives by these, (m, 1 + n_p)."""
+        n = 1 + len(self.states)
+        table = self._compiled(what, self.symbols[n : n + len(self.start)], 0)
+        return table.one(np.asarray(theta, dtype=float).tolist())
 
-    def _inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
+    def _compiled(self, what: str, symbols: list[Any], first: int) -> Compiled:
+        """Expressions of these symbols, with the derivatives by those of states and parameters."""
+        if what not in self.memory:
+            exprs, by = getattr(self, what), symbols[first : len(symbols) - first * len(self.inputs)]
+            self.memory[what] = Compiled(symbols, jacobian(exprs, by), (len(exprs), 1 + len(by)))
+        made: Compiled = self.memory[what]
+        return made
+
+    def inverse(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """E⁻¹ (n_x, n_x) and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters.
+
+        Raises
+        ------
+        SimulationError
+            E is singular.
+        """
         values, n, memory = np.asarray(theta, dtype=float), len(self.states), self.memory
         if memory.get("inverse at") != values.tobytes():
             table = np.moveaxis(self._alone("inertia", values).reshape(n, n, -1), -1, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
@@ -122,11 +122,9 @@ class Problem:
             raise ValueError(
                 f"no sum of squares can be made of samples over σ of {most:.3g}: take other units"
             )
-        self._last: tuple[bytes, FloatArray, FloatArray] | None = None
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
-        self.quick = integrator
-        """That of the evaluations: for "auto" that which is quick for this model and these times."""
+        self._latest = lru_cache(maxsize=3)(self._evaluated)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
@@ -145,28 +143,27 @@ class Problem:
         SimulationError
             The states diverge.
         """
-        if self._last is None or self._last[0] != theta.tobytes():
-            if not np.isfinite(theta).all():
-                raise SimulationError("the parameters grow beyond all bounds")
-            if self._last is None and self.quick == "auto" and not self.model.linear_driven:
-                # a rough integration tells how long others take
-                rough = self._simulated(theta, rtol=1e-6, sensitivities=False)
-                steps = (1 if self.model.timed else 4) * sum(run.steps for run in rough)
-                quick = len({*self.models}) == 1 and worth_compiling(self.model, steps)
-                self.quick = "taylor" if quick else "auto"
-            runs = self._simulated(theta, rtol=self.rtol)
-            r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
-            J = self.vector([run.y_theta for run in runs])
-            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
-                raise SimulationError(
-                    "the outputs of the model, or their sensitivities, are beyond all bounds"
-                )
-            self._last, self.runs = (theta.tobytes(), r, J), tuple(runs)
-        return self._last[1:]
+        r, J, self.runs = self._latest(theta.tobytes())
+        return r, J
 
-    def _simulated(self, theta: FloatArray, **options: Any) -> list[Trajectory]:  # noqa: ANN401
-        pairs = zip(self.models, self.records, strict=True)
-        return [simulate(m, theta, record, integrator=self.quick, **options) for m, record in pairs]
+    def _evaluated(self, values: bytes) -> tuple[FloatArray, FloatArray, tuple[Trajectory, ...]]:
+        """What `evaluate` gives, and the solutions: a search comes back to parameters it has seen."""
+        theta = np.frombuffer(values)
+        if not np.isfinite(theta).all():
+            raise SimulationError("the parameters grow beyond all bounds")
+        runs = tuple(
+            simulate(model, theta, record, integrator=self.integrator, rtol=self.rtol)
+            for model, record in zip(self.models, self.records, strict=True)
+        )
+        first = not self.runs and self.integrator == "auto" and len({*self.models}) == 1
+        if first and worth_compiling(self.model, sum(run.calls for run in runs)):
+            self.integrator = "taylor"
+            return self._evaluated(values)
+        r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
+        J = self.vector([run.y_theta for run in runs])
+        if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+            raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
+        return r, J, runs
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""

@@ -24,7 +24,7 @@ from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_least_squares import Iterations, Problem
 from rotorid.identify.simulation import STEPWISE
-from rotorid.regression import gain, least_squares, solution
+from rotorid.regression import gain, least_squares
 from rotorid.regression.estimate import Combination, Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
 from rotorid.regression.prior import effect
@@ -135,10 +135,9 @@ def _correlated(problem: Problem, r: FloatArray, only: Sequence[slice] = ()) -> 
     from scipy.special import chdtrc
 
     parts = [r[rows] for rows in only or [rows for _, rows in problem.series]]
-    parts = [part / (float(np.sqrt(np.mean(part**2))) or 1.0) for part in parts]
-    size = sum(map(len, parts))
-    lags = range(1, 1 + min(LAGS, max(1, min(map(len, parts)) // 5)))
-    rho = np.array([sum(float(part[k:] @ part[:-k]) for part in parts) for k in lags]) / size
+    size, most = sum(map(len, parts)), min(LAGS, max(1, min(map(len, parts)) // 5))
+    sums = [np.correlate(np.append(part, np.zeros(most)), part) for part in parts]
+    rho = np.sum([len(x) / (c[0] or 1.0) * c[1:] for x, c in zip(parts, sums, strict=True)], axis=0) / size
     factor = np.sqrt((1 + rho[0]) / (1 - rho[0])) if 0 < rho[0] < 1 else 1.0
     return float(rho[0]), float(chdtrc(len(rho), size * float(rho @ rho))), float(factor)
 
@@ -153,21 +152,18 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     from scipy.special import fdtrc
 
     t, Q = problem.by_time([record.t for record in problem.records]), np.linalg.svd(J, full_matrices=False)[0]
-    best, frequency, span, series = (
-        20.0 * float(r @ r) / len(r),
-        0.0,
-        1.0,
-        slice(0),
-    )  # of noise it is χ² of two
+    parts, G = np.vstack((r, Q.T)) * problem.scale, gain(J, rcond=JACOBIAN_RCOND)
+    # of noise it is χ² of two
+    best, frequency, span, series = 20.0 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
     for _, rows in problem.series:
         times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
         even = np.linspace(times[0], times[-1], n)
-        parts = np.column_stack([r, Q])[rows] * size[:, None]
-        w, *A = np.fft.rfft([np.interp(even, times, part) for part in parts.T], 4 * n)[:, 4:]
+        w, *A = np.fft.rfft([np.interp(even, times, part) for part in parts[:, rows]], 4 * n)[:, 4:]
         half = float(size @ size) / 2
-        P, Z = half - np.sum(np.abs(A) ** 2, axis=0) / 2, np.sum(np.square(A), axis=0) / 2
+        Z = np.square(A)
+        P, Z = half - np.abs(Z).sum(axis=0) / 2, Z.sum(axis=0) / 2
         det = P**2 - np.abs(Z) ** 2
         power = (P * np.abs(w) ** 2 + (Z.conj() * w**2).real) / np.where(det > 1e-3 * half**2, det, np.inf)
         if power.max() > best:
@@ -176,17 +172,13 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
         frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
-    C, G, waves = (
-        np.zeros((len(r), 2)),
-        gain(J, rcond=JACOBIAN_RCOND),
-        np.exp(2j * np.pi * frequency * t[series]),
-    )
+    C, waves = np.zeros((len(r), 2)), np.exp(2j * np.pi * frequency * t[series])
     C[series] = problem.scale[series, None] * np.column_stack((waves.real, waves.imag))
     outside = C - J @ (G @ C)  # what the parameters take of y is J G y
     free = len(r) - round(float(np.sum(G.T * J))) - 2
-    if not frequency or free < 3 or np.linalg.matrix_rank(outside, tol=1e-6 * np.abs(C).max()) < 2:
+    amount, _, _, size = np.linalg.lstsq(outside, -r, rcond=None)
+    if not frequency or free < 3 or size[1] <= 1e-6 * np.abs(C).max():
         return "", False
-    amount = solution(outside, -r)
     rest = r + outside @ amount
     taken, left = float(r @ r - rest @ rest), max(float(rest @ rest) / free, 1e-300)
     _, white, factor = _correlated(problem, rest, [series])

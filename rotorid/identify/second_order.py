@@ -120,7 +120,7 @@ def second_order(  # noqa: PLR0913
             inertia[row, column] = read_expression(entries[i][j], where, estimate, plain.known)
     model = replace(plain, inertia=tuple(inertia))
     # refuses a singular mass matrix
-    model.augmented(0.0, np.zeros((len(states), 1)), model.start, np.zeros(len(inputs)))
+    model.inverse(model.start)
     return model
 
 

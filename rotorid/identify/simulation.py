@@ -18,7 +18,7 @@ from rotorid.identify.records import Record, inputs_of
 STEPWISE = (*HEUN, "rk4")
 """Integrators without error control, of one step from sample to sample."""
 INTEGRATORS: tuple[Method[None], ...] = (
-    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", None),
+    Method("auto", "expm if possible, else lsoda or dop853, whichever is quicker", None),
     Method("expm", "the exact solution of a linear model with constant coefficients", None),
     Method("dop853", "error control, for smooth models", None),
     Method("lsoda", "error control, for stiff models", None),
@@ -52,8 +52,8 @@ class Trajectory:
         Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
     integrator
         The one used: "none" without states.
-    steps
-        Of "dop853" or "lsoda".
+    calls
+        Rates that "dop853" or "lsoda" has asked for.
     """
 
     t: FloatArray
@@ -62,7 +62,7 @@ class Trajectory:
     y: FloatArray
     y_theta: FloatArray
     integrator: str
-    steps: int = 0
+    calls: int = 0
 
 
 @np.errstate(all="ignore")  # what is not finite is looked for
@@ -124,7 +124,7 @@ def simulate(
             f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
             "the output"
         )
-    return Trajectory(t, x, S, y, y_theta, used, system.steps)
+    return Trajectory(t, x, S, y, y_theta, used, system.calls)
 
 
 def simulated_record(
@@ -159,6 +159,8 @@ def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, s
 
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
     """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the first time."""
+    if np.abs(table).max() < LARGEST:
+        return
     largest = np.append(LARGEST, np.full(table.shape[2] - 1, np.inf))
     lost = np.logical_not(np.abs(table) < largest)
     for i, k, j in np.argwhere(lost.swapaxes(1, 2))[:1].tolist():

@@ -23,7 +23,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.choices import one_of
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.linear import JACOBIAN_RCOND, least_squares
+from rotorid.regression.linear import JACOBIAN_RCOND, least_squares, solution
 from rotorid.regression.prior import Function, Prior
 
 LOSSES = ("linear", "huber")
@@ -241,11 +241,11 @@ class _Search:
     def polish(self, x: FloatArray) -> tuple[FloatArray, Estimate, bool]:
         """Gauss–Newton to the last digits; the kernel's judgement; whether the last step is negligible."""
         r = self.residual(x)
-        cost, (step, size) = self._pass(x, r), self._step(x, r)
+        cost, (step, size, rows) = self._pass(x, r), self._step(x, r)
         for _ in range(POLISH):
             if size < 1e-9:
                 break
-            new = np.clip(x + step.solution, self.lower, self.upper)
+            new = np.clip(x + step, self.lower, self.upper)
             with np.errstate(all="ignore"):  # a step too far is refused
                 new_r = self.residual(new)
                 better = np.isfinite(new_r).all() and self._cost(new_r) <= cost * (1 + 1e-9)
@@ -254,11 +254,12 @@ class _Search:
             further = self._step(new, new_r)
             if further[1] > 0.9 * size:  # it does not contract here, or rounding is all that is left
                 break
-            x, r, cost, (step, size) = new, new_r, self._pass(new, new_r), further
-        moved = float(np.sum((self.slopes(x) @ step.solution) ** 2))
-        left = 1.0 if step.errors_stated else float(step.residuals @ step.residuals) / max(step.dof, 1)
+            x, r, cost, (step, size, rows) = new, new_r, self._pass(new, new_r), further
+        sigma = 1.0 if self.stated and np.isinf(self.limit) else None
+        best = least_squares(*rows, names=self.names, sigma=sigma, rcond=JACOBIAN_RCOND)
+        left = 1.0 if sigma else best.residuals @ best.residuals / max(best.dof, 1)
         # over their errors the step moves the data by more than any parameter over its own
-        return x, step.at(x, r), size < 1e-6 or moved < 1e-6 * left
+        return x, best.at(x, r), size < 1e-6 or bool(np.sum((rows[0] @ step) ** 2) < 1e-6 * left)
 
     def _cost(self, r: FloatArray) -> float:
         """Half the sum of the loss of residuals (m,)."""
@@ -277,27 +278,21 @@ class _Search:
         self._pass(x, self.residual(x))
         return np.array(self.slopes(x))
 
-    def _step(self, x: FloatArray, r: FloatArray) -> tuple[Estimate, float]:
-        """The Gauss–Newton step as the kernel estimates it, and its largest relative change of a parameter.
+    def _step(self, x: FloatArray, r: FloatArray) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray]]:
+        """The Gauss–Newton step, its largest relative change of a parameter, and the rows it solves.
 
         A parameter at a bound is held by a row of its own.
         """
         J, free = self.slopes(x), (x > self.lower) & (x < self.upper)
         held = np.eye(len(x))[~free]
         pseudo = np.clip(r, -self.limit, self.limit) / max(float(np.mean(np.abs(r) <= self.limit)), 0.05)
-        step = least_squares(
-            np.vstack((J * free, held)),
-            np.append(-pseudo, np.zeros(len(held))),
-            names=self.names,
-            sigma=1.0 if self.stated and np.isinf(self.limit) else None,
-            rcond=JACOBIAN_RCOND,
-        )
-        step = replace(step, solution=step.solution * free)
+        rows = np.vstack((J * free, held)), np.append(-pseudo, np.zeros(len(held)))
+        step = solution(*rows, rcond=JACOBIAN_RCOND) * free
         # one that moves the residuals by less than a millionth of what others do counts as so large: one that
         # is 0 has no size
         slopes, size = np.linalg.norm(J, axis=0), np.abs(x)
         size = np.maximum(size, NEGLIGIBLE * (slopes * size).max() / np.maximum(slopes, TINY))
-        return step, float((np.abs(step.solution) / np.maximum(size, TINY)).max())
+        return step, float((np.abs(step) / np.maximum(size, TINY)).max()), rows
 
 
 def search_from(

@@ -5,6 +5,7 @@ import pytest
 from cases import each_of
 
 from rotorid.identify.expressions import FUNCTIONS
+from rotorid.identify.integrators import written_out
 from rotorid.identify.ode import SimulationError, ode_model
 from rotorid.identify.records import Record
 from rotorid.identify.second_order import second_order
@@ -29,7 +30,7 @@ def test_names_of_sympy_python_and_numpy_are_free():
     rate, estimate = " + ".join(f"{name}*Q" for name in names), dict.fromkeys(names, 1.0)
     model = ode_model({"Q": rate}, initial={"Q": 1}, estimate=estimate)
     assert model.f(0.0, [2.0], model.start)[0, 0] == 2 * len(names)
-    assert model.augmented(0.0, np.array([[2.0]]), model.start, np.zeros(0)) == 2 * len(names)
+    assert written_out(model, 0).one([0.0, 2.0, *model.start]) == 2 * len(names)
     assert model.linear_driven
 
 

@@ -174,7 +174,7 @@ def test_stiff_models_change_to_lsoda_by_themselves(stiffness):
     """On the slow branch of van der Pol, to first order in 1/k²: log x − x²/2 = t/k + const."""
     rates = {"x": "v", "v": "k*(1 - x**2)*v - x"}
     t = np.linspace(0, 50, 51)
-    run = simulate(ode_model(rates, initial={"x": 2, "v": 0}, estimate={"k": 1.0}), [stiffness], t)
+    run = simulate(ode_model(rates, initial={"x": 2, "v": 0}, estimate={"k": 1}), [stiffness], t, rtol=1e-11)
     assert run.integrator == "lsoda"
     drift = np.log(run.x[1:, 0] / 2) - (run.x[1:, 0] ** 2 - 4) / 2
     np.testing.assert_allclose(drift, t[1:] / stiffness, atol=3 / stiffness**2)
@@ -287,17 +287,17 @@ def test_fits_are_the_same_with_and_without(heyoka, monkeypatch):
     t, rng = np.linspace(0.0, 30.0, 301), np.random.default_rng(0)
     truth = simulate(model_of(RATES), [1.0, 0.5, 0.2], t, sensitivities=False).x
     noisy = truth + 1e-3 * rng.standard_normal(truth.shape)
-    record = Record(t, {"x": noisy[:, 0], "v": noisy[:, 1]})
+    record = Record(t, dict(zip("xv", noisy.T, strict=True)))
     slow, quick = (fit(model_of(RATES), record, integrator=name) for name in ("dop853", "taylor"))
-    assert (slow.integrator, quick.integrator) == ("dop853", "taylor")
-    again = [fit(model_of(RATES), record) for _ in range(2)]
-    assert {(one.integrator, one.values.tobytes()) for one in again} == {("taylor", quick.values.tobytes())}
+    monkeypatch.setattr("rotorid.identify.record_least_squares.worth_compiling", lambda *_: True)
+    again = fit(model_of(RATES), record)
+    monkeypatch.undo()
+    assert (again.integrator, again.values.tobytes()) == ("taylor", quick.values.tobytes())
     np.testing.assert_allclose(quick.values, slow.values, rtol=1e-8)
     np.testing.assert_allclose(quick.std, slow.std, rtol=1e-6)
     assert quick.warnings == slow.warnings
     monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
-    monkeypatch.setattr("rotorid.identify.adaptive_steps.find_spec", lambda name: None)
-    np.testing.assert_array_equal(fit(model_of(RATES), record).values, slow.values)
+    np.testing.assert_allclose(fit(model_of(RATES), record).values, slow.values, rtol=1e-8)
     with pytest.raises(ValueError, match="needs heyoka: pip install heyoka"):
         fit(model_of(RATES), record, integrator="taylor")
 
@@ -316,9 +316,9 @@ def test_what_it_cannot_compile_and_what_diverges_is_said(heyoka):
 def test_a_pulse_is_not_stepped_over(heyoka):
     model = one_state("a*exp(-((t - 5)/0.05)**2) - x", 0.0, estimate={"a": 1.0})
     t = np.linspace(0.0, 10.0, 101)
-    slow, quick = (simulate(model, [1.0], t, integrator=name) for name in ("auto", "taylor"))
-    assert (slow.integrator, quick.integrator) == ("dop853", "taylor")
-    np.testing.assert_allclose(quick.x, slow.x, atol=1e-9)
+    runs = [simulate(model, [1.0], t, integrator=name) for name in ("dop853", "auto", "taylor")]
+    assert [run.integrator for run in runs] == ["dop853", "lsoda", "taylor"]
+    assert np.ptp([run.x for run in runs], axis=0).max() < 1e-9
 
 
 @pytest.mark.parametrize("integrator", ["auto", "taylor"])

@@ -14,6 +14,7 @@ from rotorid.commands.identify import identify
 from rotorid.commands.reduce import ReduceOptions, reduce
 from rotorid.files import read_harmonic_model
 from rotorid.identify.expressions import parse
+from rotorid.identify.integrators import written_out
 from rotorid.identify.ode import ode_model
 from rotorid.identify.records import Record
 from rotorid.identify.second_order import second_order
@@ -247,7 +248,7 @@ def test_symbols_are_what_is_integrated():
         return float(total.replace(lambda f: f.is_Function, known_functions))
 
     rates = [value(row) for row in shown.symbolic if row.name == "rate"]
-    augmented = model.augmented(t, np.column_stack((x, S)), theta, np.zeros(0))[:, 1:]
+    augmented = written_out(model, 3).one([t, *np.column_stack((x, S)).ravel(), *theta])[:, 1:]
     np.testing.assert_allclose(np.reshape(rates, (3, 2)).T, augmented, rtol=1e-9)
     starts = [value(row) for row in shown.symbolic if row.name == "start"]
     np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0(theta)[:, 1:], rtol=1e-9)
