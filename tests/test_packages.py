@@ -28,7 +28,7 @@ def test_any_package_can_be_imported_first(first):
     run_python(f"import {first}, fem, balancing, rotorid; [getattr(rotorid, n) for n in rotorid.__all__]")
 
 
-@pytest.mark.parametrize("package", ["fem", "balancing", "rotorid", "rotorid.cli"])
+@pytest.mark.parametrize("package", ["fem", "balancing", "rotorid", "rotorid.cli", "rotorid.base.tables"])
 def test_an_import_does_not_load_what_only_some_commands_need(package):
     loaded = set(json.loads(run_python(f"import json, sys, {package}; print(json.dumps(list(sys.modules)))")))
     assert not loaded & set(HEAVY)

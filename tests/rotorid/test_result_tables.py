@@ -2,8 +2,6 @@
 
 import io
 import json
-import subprocess
-import sys
 
 import numpy as np
 import openpyxl
@@ -95,11 +93,3 @@ def test_plain_reaches_into_everything():
     values = plain({"a": {"b": (np.float64(1.0), np.int64(2), np.bool_(True), None, "x", [np.nan])}})
     assert values == {"a": {"b": [1.0, 2, True, None, "x", [None]]}}
     assert [type(value) for value in values["a"]["b"][:3]] == [float, int, bool]
-
-
-def test_pandas_and_openpyxl_are_not_imported_with_it():
-    program = (
-        "import sys, rotorid.base.tables; print({'pandas', 'openpyxl', 'markupsafe'} & set(sys.modules))"
-    )
-    shown = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-    assert shown.stdout == "set()\n"
