@@ -23,7 +23,6 @@ from balancing.printed_readings import (
     weight_columns,
     weight_rows,
 )
-from balancing.regions import NORMAL_RADIUS
 from balancing.weights_and_prediction import HELD, Prediction
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray
@@ -51,11 +50,6 @@ class Choice:
     def expected(self) -> float:
         """Root mean square with the errors."""
         return float(np.hypot(self.rms, self.error))
-
-    @property
-    def most(self) -> float:
-        """Largest rms that a check run with these weights shows, with 95 %."""
-        return float(self.rms + NORMAL_RADIUS / np.sqrt(2) * self.error)
 
 
 @dataclass(frozen=True, eq=False)

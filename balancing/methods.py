@@ -367,12 +367,12 @@ class _Errors(NamedTuple):
 
     def inverse(self, at: _State) -> FloatArray:
         """A⁻¹ (2P, 2P)."""
-        from scipy.linalg import eigh
-
         K = self.C - at.A @ np.swapaxes(at.A, 1, 2)
         root = covariance_root(K, np.einsum("nii->ni", K))
         noise = self.rows(at.white, unstretch(np.swapaxes(root, 1, 2))[..., 1:])
-        share, V = eigh(noise.T @ noise, at.rows.T @ at.rows)
+        whiten = np.linalg.inv(np.linalg.cholesky(at.rows.T @ at.rows))
+        share, V = np.linalg.eigh(whiten @ noise.T @ noise @ whiten.T)
+        V = whiten.T @ V
         return np.asarray((V / np.maximum(1 - share, LEAST_INFORMATION)) @ V.T)
 
     def descend(self, bounds: Bounds, D: ComplexArray) -> tuple[float, ComplexArray]:

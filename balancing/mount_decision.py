@@ -43,11 +43,9 @@ EATEN = 0.5
 FIGHTING, HARDLY = 3.0, 0.1
 """Weights so many times larger than those of fewer planes, which leave hardly more (of the rms before)."""
 HARDLY_BELOW = 0.9
-"""Of the rms before: what 95 of 100 check runs must stay below."""
+"""Of the rms before: what 95 of 100 check runs must stay below, and what else is proposed is to leave."""
 GOOD = 1 / 3
 """Of the rms before: what a run reads that may stay as it is."""
-WORTH = 1.25
-"""Of the rms before: what something else may leave at most (95 %) to be proposed."""
 WEAK = 3.0
 """Effect of a trial weight in units of its errors: too small below."""
 COARSE = 0.1
@@ -231,9 +229,9 @@ def remedies(case: Case) -> tuple[str, ...]:
         What weights would be made of.
     """
     weak, words = case.weak, []
-    good = [c for c in case.fewer if case.sound(c) and c.most < WORTH * case.before]
+    good = [c for c in case.fewer if case.sound(c) and c.expected < HARDLY_BELOW * case.before]
     if good:
-        best = min(good, key=lambda c: c.most)
+        best = good[0]
         planes = listing(map(repr, best.planes), "and")
         left, before = map(case.shown, (best.rms, case.before))
         words.append(
