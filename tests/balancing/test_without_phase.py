@@ -117,18 +117,13 @@ def drawn_job(rng):
     return T, a / a.max()
 
 
-def fitted(T, a, s):
-    first = T[1] / abs(T[1])
-    return Fit(T[:, None] / first / np.abs(T).max(), a, s)
-
-
 @pytest.mark.parametrize("jobs", [60])
 def test_no_place_of_a_grid_fits_better(jobs):
     rng = np.random.default_rng(51)
     for _ in range(jobs):
         T, a = drawn_job(rng)
         s = 0.1 * np.maximum(a, 0.02)
-        assert fitted(T, a, s).chi_square[0] <= brute(T, a, s) + 1e-5
+        assert Fit(T[:, None] / np.abs(T).max(), a, s).chi_square[0] <= brute(T, a, s) + 1e-5
 
 
 def test_several_sensors_and_speeds_are_one_fit():

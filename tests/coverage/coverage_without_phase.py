@@ -2,8 +2,7 @@
 
 Run `python tests/coverage/coverage_without_phase.py [jobs]`, jobs of each line (1000). One plane whose
 correction is 1 at any angle; a baseline and equal trial weights at equal angles, 0.3–1.5 of the correction,
-from any angle on; amplitudes scatter from run to run, each for itself. Two planes (a fifth of the jobs):
-coefficients normal.
+from any angle on; amplitudes scatter from run to run, each for itself. Two planes: coefficients normal.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing import ReadingErrors, Trials, balance_without_phase
+from balancing import ReadingErrors, Trials, balance_without_phase, real_parts
 
 LINES = (
     ("two trial weights, 10 %", 3, 1, 1, 0.1, True),
@@ -29,9 +28,9 @@ LINES = (
 
 
 class Outcome(NamedTuple):
-    """Whether printed intervals hold the truth; whether to mount, and the share of the vibration left.
+    """Whether a region, and intervals, hold the truth; whether to mount, and the share of vibration left.
 
-    `inside`: all of one solution together; `sizes`, `angles`: shares of the planes, each for itself.
+    `sizes`, `angles`: shares of the planes; `width`: ± of the angle by the least possible.
     """
 
     inside: bool
@@ -39,6 +38,7 @@ class Outcome(NamedTuple):
     angles: float
     mount: bool
     left: float
+    width: float
 
 
 def draw(rng, runs, planes, sensors, scatter, stated):
@@ -53,13 +53,9 @@ def draw(rng, runs, planes, sensors, scatter, stated):
     W = W / np.abs(W) if planes == 1 else W
     truth = np.abs((T - D) @ W.T)
     read = np.abs(truth * (1 + scatter * rng.standard_normal(truth.shape)))
-    names = [
-        tuple(f"{letter}{k + 1}" for k in range(n))
-        for letter, n in zip("rsp", (runs, sensors, planes), strict=True)
-    ]
+    names = [tuple(map(str, range(n))) for n in (runs, sensors, planes)]
     errors = ReadingErrors(scatter) if stated else None
-    speeds = np.array([100.0])
-    return Trials(names[0], speeds, names[1], names[2], read[:, None], T, errors, amplitudes_only=True), D, W
+    return Trials(names[0], [100.0], *names[1:], read[:, None], T, errors, amplitudes_only=True), D, W
 
 
 def held(solution, D):
@@ -69,14 +65,35 @@ def held(solution, D):
     return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
 
 
+def within(answer, solution, D):
+    """Whether the region of a solution holds the truth: it misses no more, or is no further away than draws."""
+    if len(D) > 1:
+        off = real_parts(np.vstack((D, solution.region)) - solution.weights)
+        far = (off @ np.linalg.inv(np.cov(off[1:].T)) * off).sum(axis=1)
+        return far[0] <= far[1:].max()
+    places = np.array([D, solution.weights])[:, None]
+    a, g = (np.abs(of) / answer.errors for of in (answer.trials.mean[:, 0], answer.trials.weights - places))
+    more, less = ((g * a).sum(axis=1) ** 2 / (g * g).sum(axis=1)).sum(axis=1)
+    return less - more <= answer.scatter.limit(2, 0.95)
+
+
+def least_width(T, D, sensors, scatter):
+    """Least 95 % of the angle: ln of readings is that of distances from one weight, and one constant."""
+    q = (D / (T - D))[:, 0]
+    J = np.column_stack((q.real, q.imag))
+    J -= J.mean(axis=0)
+    return 1.96 * scatter * np.sqrt(np.linalg.inv(J.T @ J * sensors)[1, 1])
+
+
 def outcome(rng, *line):
     """Balance a job and see."""
     trials, D, W = draw(rng, *line)
     answer = balance_without_phase(trials)
     left = np.linalg.norm(W @ (answer.weights - D)) / np.linalg.norm(W @ D)
-    each = np.array([held(one, D) for one in answer.solutions])
-    sizes, angles = each.any(axis=0).mean(axis=1)
-    return Outcome(bool(each.all(axis=(1, 2)).any()), sizes, angles, answer.sound, float(left))
+    sizes, angles = np.any([held(one, D) for one in answer.solutions], axis=0).mean(axis=1)
+    inside = any(within(answer, one, D) for one in answer.solutions)
+    width = answer.solutions[0].intervals[2][0] / least_width(trials.weights, D, *line[2:4])
+    return Outcome(inside, sizes, angles, answer.sound, float(left), width)
 
 
 def simulate(jobs, *line, seed=1):
@@ -86,18 +103,19 @@ def simulate(jobs, *line, seed=1):
 
 
 def shares(found):
-    """Of jobs: what holds, together and each, mounted; of those mounted, worse than before."""
+    """Of jobs: what holds, together and each, mounted; of those mounted, worse than before; median width."""
     mounted = [one.left for one in found if one.mount]
     worse = np.mean(np.array(mounted) > 1.0) if mounted else 0.0
-    return *np.mean([one[:4] for one in found], axis=0), worse
+    return *np.mean([one[:4] for one in found], axis=0), worse, np.median([one.width for one in found])
 
 
 def main(jobs=1000):
     """Print the table."""
-    print(" " * 43 + "holds   sizes  angles   mount   worse")
+    print(" " * 43 + "holds   sizes  angles   mount   worse   ±/C–R")
     for name, *line in LINES:
-        found = simulate(jobs if line[1] == 1 else max(jobs // 5, 1), *line)
-        print(f"{name:<40}" + "".join(f"{100 * share:>8.1f}" for share in shares(found)), flush=True)
+        *each, width = shares(simulate(jobs, *line))
+        words = "".join(f"{100 * share:>8.1f}" for share in each)
+        print(f"{name:<40}{words}{width if line[1] == 1 else np.nan:>8.2f}".replace("nan", "  –"), flush=True)
 
 
 if __name__ == "__main__":
