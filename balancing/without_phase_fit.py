@@ -125,7 +125,7 @@ def refined(missed: Residuals, x: FloatArray, steps: int) -> tuple[FloatArray, F
         if np.abs(step).max() < 1e-9:
             break
     chi_square = (missed(x) ** 2).sum(axis=1)
-    order = np.argsort(chi_square.round(9), kind="stable")
+    order = np.lexsort((*-x.T, chi_square.round(9)))  # rounding decides nothing
     close = np.abs(x[order, None] - x[order]).max(axis=-1) <= _ALIKE
     kept = order[close.argmax(axis=1) == np.arange(len(x))]
     return x[kept], chi_square[kept]

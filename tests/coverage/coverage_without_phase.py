@@ -8,7 +8,6 @@ from any angle on; amplitudes scatter from run to run, each for itself. Two plan
 from __future__ import annotations
 
 import sys
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,30 +26,16 @@ LINES = (
 """Runs, planes, sensors, scatter, and whether it is stated."""
 
 
-class Outcome(NamedTuple):
-    """Whether a region, and intervals, hold the truth; whether to mount, and the share of vibration left.
-
-    `sizes`, `angles`: shares of the planes; `width`: ± of the angle by the least possible.
-    """
-
-    inside: bool
-    sizes: float
-    angles: float
-    mount: bool
-    left: float
-    width: float
-
-
 def draw(rng, runs, planes, sensors, scatter, stated):
     """A job, and its correction."""
     D = np.exp(2j * np.pi * rng.random(planes))
     T, each = np.zeros((runs, planes), dtype=complex), (runs - 1) // planes
     for p in range(planes):
-        size = np.exp(rng.uniform(np.log(0.3), np.log(1.5)))
-        first, step = 2j * np.pi * rng.random(), 1 / max(each, 3)
-        T[1 + p * each : 1 + (p + 1) * each, p] = size * np.exp(first + 2j * np.pi * step * np.arange(each))
-    W = rng.standard_normal((sensors, planes)) + 1j * rng.standard_normal((sensors, planes))
-    W = W / np.abs(W) if planes == 1 else W
+        size, first = 0.3 * 5 ** rng.random(), rng.random()
+        turns = first + np.arange(each) / max(each, 3)
+        T[1 + p * each : 1 + (p + 1) * each, p] = size * np.exp(2j * np.pi * turns)
+    real, imaginary = rng.standard_normal((2, sensors, planes))
+    W = real + 1j * imaginary
     truth = np.abs((T - D) @ W.T)
     read = np.abs(truth * (1 + scatter * rng.standard_normal(truth.shape)))
     names = [tuple(map(str, range(n))) for n in (runs, sensors, planes)]
@@ -58,62 +43,55 @@ def draw(rng, runs, planes, sensors, scatter, stated):
     return Trials(names[0], [100.0], *names[1:], read[:, None], T, errors, amplitudes_only=True), D, W
 
 
-def held(solution, D):
-    """Whether the intervals of a solution hold size and angle of each plane's weight, (2, P)."""
-    low, high, angle = solution.intervals
-    off = np.abs(np.angle(D * solution.weights.conj()))
-    return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
-
-
-def within(answer, solution, D):
-    """Whether the region of a solution holds the truth: it misses no more, or is no further away than draws."""
+def held(answer, solution, D):
+    """Whether the region of a solution holds the truth; shares of the planes whose intervals do."""
+    w, (low, high, angle) = solution.weights, solution.intervals
+    sizes, angles = (low <= np.abs(D)) & (np.abs(D) <= high), np.abs(np.angle(D * w.conj())) <= angle
     if len(D) > 1:
-        off = real_parts(np.vstack((D, solution.region)) - solution.weights)
+        off = real_parts(np.vstack((D, solution.region)) - w)
         far = (off @ np.linalg.inv(np.cov(off[1:].T)) * off).sum(axis=1)
-        return far[0] <= far[1:].max()
-    places = np.array([D, solution.weights])[:, None]
-    a, g = (np.abs(of) / answer.errors for of in (answer.trials.mean[:, 0], answer.trials.weights - places))
-    more, less = ((g * a).sum(axis=1) ** 2 / (g * g).sum(axis=1)).sum(axis=1)
-    return less - more <= answer.scatter.limit(2, 0.95)
+        inside = far[0] <= far[1:].max()
+    else:
+        away = answer.trials.weights - np.array([D, w])[:, None]
+        a, g = (np.abs(of) / answer.errors for of in (answer.trials.mean[:, 0], away))
+        more, less = ((g * a).sum(axis=1) ** 2 / (g * g).sum(axis=1)).sum(axis=1)
+        inside = less - more <= answer.scatter.limit(2, 0.95)
+    return inside, sizes.mean(), angles.mean()
 
 
 def least_width(T, D, sensors, scatter):
     """Least 95 % of the angle: ln of readings is that of distances from one weight, and one constant."""
     q = (D / (T - D))[:, 0]
-    J = np.column_stack((q.real, q.imag))
-    J -= J.mean(axis=0)
-    return 1.96 * scatter * np.sqrt(np.linalg.inv(J.T @ J * sensors)[1, 1])
+    return 1.96 * scatter / np.sqrt(sensors * len(q[1:])) * np.linalg.inv(np.cov(q.real, q.imag))[1, 1] ** 0.5
 
 
 def outcome(rng, *line):
-    """Balance a job and see."""
+    """Balance a job and see.
+
+    Whether the region of a solution holds the truth; shares of the planes whose intervals of size, and of
+    angle, do; whether to mount, and the share of the vibration left; ± of the angle by the least possible.
+    """
     trials, D, W = draw(rng, *line)
     answer = balance_without_phase(trials)
     left = np.linalg.norm(W @ (answer.weights - D)) / np.linalg.norm(W @ D)
-    sizes, angles = np.any([held(one, D) for one in answer.solutions], axis=0).mean(axis=1)
-    inside = any(within(answer, one, D) for one in answer.solutions)
+    holds = np.max([held(answer, one, D) for one in answer.solutions], axis=0)
     width = answer.solutions[0].intervals[2][0] / least_width(trials.weights, D, *line[2:4])
-    return Outcome(inside, sizes, angles, answer.sound, float(left), width)
+    return *holds, answer.sound, left, width
 
 
-def simulate(jobs, *line, seed=1):
-    """So many jobs."""
-    rng = np.random.default_rng(seed)
-    return [outcome(rng, *line) for _ in range(jobs)]
-
-
-def shares(found):
-    """Of jobs: what holds, together and each, mounted; of those mounted, worse than before; median width."""
-    mounted = [one.left for one in found if one.mount]
-    worse = np.mean(np.array(mounted) > 1.0) if mounted else 0.0
-    return *np.mean([one[:4] for one in found], axis=0), worse, np.median([one.width for one in found])
+def shares(jobs, *line):
+    """Of so many jobs: what holds, together and each, mounted; of those mounted, worse than before; width."""
+    rng = np.random.default_rng(1)
+    *holds, mount, left, width = np.array([outcome(rng, *line) for _ in range(jobs)]).T
+    worse = (mount * (left > 1)).sum() / max(mount.sum(), 1)
+    return *np.mean([*holds, mount], axis=1), worse, np.median(width)
 
 
 def main(jobs=1000):
     """Print the table."""
     print(" " * 43 + "holds   sizes  angles   mount   worse   ±/C–R")
     for name, *line in LINES:
-        *each, width = shares(simulate(jobs, *line))
+        *each, width = shares(jobs, *line)
         words = "".join(f"{100 * share:>8.1f}" for share in each)
         print(f"{name:<40}{words}{width if line[1] == 1 else np.nan:>8.2f}".replace("nan", "  –"), flush=True)
 
