@@ -356,9 +356,7 @@ def _check(trials: Trials, holes: Mapping[str, Holes]) -> None:
         raise ValueError("without phases one or two planes can be balanced, each with trial weights")
     silent = ~np.abs(trials.mean).any(axis=(0, 1))
     if silent.any():
-        raise ValueError(
-            f"sensor {trials.sensors[int(np.argmax(silent))]!r} reads 0 in every run: leave it out"
-        )
+        raise ValueError(f"sensor {trials.sensors[np.argmax(silent)]!r} reads 0 in every run: leave it out")
     different = len(np.unique(np.round(T / np.abs(T).max(), 9), axis=0))
     if different >= (3 if P == 1 else 7):
         return
@@ -386,7 +384,7 @@ def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[complex, st
     """
     angles = np.unique(np.round(np.angle(weights[weights != 0]), 6))
     gaps = np.diff([*angles, angles[0] + 2 * np.pi])
-    k = int(np.argmax(gaps))
+    k = np.argmax(gaps)
     direction, hole = np.exp(1j * (angles[k] + gaps[k] / (3 if len(angles) == 1 else 2))), ""
     if holes is not None:
         places = np.exp(1j * holes.angles)
@@ -394,7 +392,7 @@ def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[complex, st
         if new.any():
             at = int(np.where(new, np.abs(places - direction), np.inf).argmin())
             direction, hole = places[at], holes.names[at]
-    return complex(np.abs(weights).max() * direction), hole, float(gaps[k])
+    return complex(np.abs(weights).max() * direction), hole, gaps[k]
 
 
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
@@ -419,9 +417,9 @@ def _contradiction(trials: Trials, scatter: Scatter) -> str:
     loaded = T.any(axis=1)
     if T.shape[1] == 1 and loaded.sum() == 3 and not loaded.all() and abs(T.sum()) < 1e-3 * np.abs(T).sum():
         mean, bare = (np.sqrt((a[of] ** 2).mean(axis=0)) for of in (loaded, ~loaded))
-        i = int(np.argmin(mean / bare))
+        i = np.argmin(mean / bare)
         if mean[i] < bare[i]:
-            words = [trials.labels.amplitude_words(float(of[i])) for of in (mean, bare)]
+            words = [trials.labels.amplitude_words(of[i]) for of in (mean, bare)]
             return (
                 "the amplitudes are impossible: the root mean square of three equal trials at 120°, "
                 f"{words[0]}, cannot be below the baseline's {words[1]}"

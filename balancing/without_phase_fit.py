@@ -33,7 +33,7 @@ _DRAWS, _MOST = 1000, 32
 _OPEN, _TINY = 3.0, 1e-300
 """Deviation of what is open, of the largest amplitude."""
 _ALIKE = 0.01
-"""Minima are one where no parameter, around 1, differs by more."""
+"""Minima are one where no parameter differs by more, relative to the largest."""
 _FAR, _FURTHER = 4.0, 2.0
 """How far from a weight its region is looked for: in errors, for so many times its limit; at most, in ln size
 and angle."""
@@ -87,12 +87,12 @@ class Fit:
 
     def minima(self, rng: np.random.Generator, within: float) -> list[Minimum]:
         """Those so much above the best at most, with draws of each by the curvature of χ² there."""
-        n, out = self.parameters.shape[1], list[Minimum]()
+        out = list[Minimum]()
         for x, chi_square in zip(self.parameters, self.chi_square, strict=True):
             if chi_square > self.chi_square[0] + within:
                 break
             J = _slopes(self._missed, x)
-            covariance = np.linalg.inv(J @ J.T + np.eye(n) / _OPEN**2)
+            covariance = np.linalg.inv(J @ J.T + np.eye(len(x)) / _OPEN**2)
             draws = rng.multivariate_normal(x, covariance, _DRAWS, method="cholesky")
             out.append(Minimum(chi_square, x, draws))
         return out
@@ -126,7 +126,7 @@ def refined(missed: Residuals, x: FloatArray, steps: int) -> tuple[FloatArray, F
             break
     chi_square = (missed(x) ** 2).sum(axis=1)
     order = np.lexsort((*-x.T, chi_square.round(9)))  # rounding decides nothing
-    close = np.abs(x[order, None] - x[order]).max(axis=-1) <= _ALIKE
+    close = np.abs(x[order, None] - x[order]).max(axis=2) <= _ALIKE * np.abs(x[order]).max(axis=1)
     kept = order[close.argmax(axis=1) == np.arange(len(x))]
     return x[kept], chi_square[kept]
 
