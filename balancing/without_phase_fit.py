@@ -119,7 +119,7 @@ def refined(missed: Residuals, x: FloatArray, steps: int) -> tuple[FloatArray, F
         normal = J @ J.swapaxes(1, 2)
         scale = damping * normal.trace(axis1=1, axis2=2)
         step = np.linalg.solve(normal + scale[:, None, None] * eye, J @ r[..., None])[..., 0]
-        better = (missed(x - step) ** 2).sum(axis=1) < (r**2).sum(axis=1)
+        better = (missed(x - step) ** 2).sum(axis=1) < (1 - 1e-12) * (r**2).sum(axis=1)
         x = np.where(better[:, None], x - step, x)
         damping = (damping * np.where(better, 0.2, 5.0)).clip(1e-10, 1e6)
         if np.abs(step).max() < 1e-9:
@@ -169,13 +169,13 @@ def common_weight(
     if chance(chi_square[0], a.size - a.shape[1] - 2) < UNLIKE:
         return []
     out = []
-    for k in range(len(best)):
-        least = np.linalg.norm(_slopes(missed, x[k]), -2) * np.abs(best[k])
+    for k, one in enumerate(best):
+        least = np.linalg.norm(_slopes(missed, x[k]), -2) * np.abs(one)
         reach = np.array([min(_FAR * np.sqrt(max(levels)) / max(least, _TINY), _FURTHER)])
         for n in (61, 101):  # a wide look, then a close one
             axes = np.linspace(-reach, reach, n)
             away = axes[:, :1] + 1j * axes[:, -1]
-            places = best[k] * np.exp(away)[..., None]
+            places = one * np.exp(away)[..., None]
             above = (missed(real_parts(places)) ** 2).sum(axis=-1) - chi_square[k]
             above[np.abs(np.log(places / best)).argmin(axis=-1) != k] = np.inf
             reach = np.abs(real_parts(away[above <= max(levels), None])).max(axis=0) + axes[1] - axes[0]
@@ -190,7 +190,7 @@ def _together(minima: Sequence[Minimum], weights: FloatArray) -> tuple[float, fl
     left = real_parts((x[:, 0] + effects(x) @ D)[:, None])
     off = real_parts((draws[..., 0] + effects(draws) @ D)[..., None])
     unlike = left**2 / off.var(axis=1).clip(_TINY)
-    return sum(one.chi_square for one in minima), float(unlike.sum())
+    return sum(one.chi_square for one in minima), unlike.sum()
 
 
 def choices(readings: Sequence[Sequence[Minimum]], weights: FloatArray, limit: float) -> list[Choice]:
