@@ -85,8 +85,8 @@ class AmplitudeSolution:
     region
         Weights in its joint 95 % region, (n, P).
     intervals
-        95 % intervals of the size and of the angle of each weight, each by itself: from and to, and ±; (P,)
-        each; kg or kg·m, rad.
+        From and to of the sizes, and ± of the angles: all of these together hold with 95 %; (P,) each; kg or
+        kg·m, rad.
     left
         Share of the present vibration (rms) that the weights of the first solution leave if this one is
         true: the upper end of its 95 % interval.
@@ -311,9 +311,13 @@ def balance_without_phase(
     kept = choices([fit.minima(rng, limit) for fit in fits], weights, limit)
     every = np.array([[one.parameters for one in choice] for choice in kept])
     starts = best_weights(every, weights)
-    levels = [scatter.limit(n, LEVEL) for n in (2, 1)]
-    alike = common_weight(starts, T, a, errors, limit, levels) if P == 1 else []
-    solutions, tail = list[AmplitudeSolution](), 0.0 if alike else (1 - LEVEL) / 2
+    alone = LEVEL ** (0.5 / P)  # of 2 P numbers that hold together
+    alike = (
+        common_weight(starts, T, a, errors, limit, scatter.limit(2, LEVEL), scatter.limit(1, alone))
+        if P == 1
+        else []
+    )
+    solutions, tail = list[AmplitudeSolution](), 0.0 if alike else (1 - alone) / 2
 
     for k, best in enumerate([one[0] for one in alike] or starts):
         nearest = np.linalg.norm(starts - best, axis=1).argmin()
@@ -408,7 +412,7 @@ def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
         square = square + np.nanmean(trials.steps[0], axis=0) ** 2 / 12
     errors = np.maximum(np.sqrt(square), _LEAST * a.max(axis=0)).reshape(len(a), -1)
     dof = (len(a) - 1 - 2 * len(trials.planes)) * errors.shape[1]
-    return errors, Scatter(float(np.hypot(size, between)), "stated" if stated else "assumed", 0.0, dof)
+    return errors, Scatter(np.hypot(size, between), "stated" if stated else "assumed", 0.0, dof)
 
 
 def _contradiction(trials: Trials, scatter: Scatter) -> str:

@@ -148,7 +148,7 @@ def common_weight(
     a: FloatArray,
     s: FloatArray,
     limit: float,
-    levels: Sequence[float],
+    *levels: float,
 ) -> list[list[ComplexArray]]:
     """One weight that leaves nothing anywhere; nothing where there is none.
 

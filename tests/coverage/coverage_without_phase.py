@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 
-from balancing import ReadingErrors, Trials, balance_without_phase, real_parts
+from balancing import ReadingErrors, Trials, balance_without_phase
 
 LINES = (
     ("two trial weights, 10 %", 3, 1, 1, 0.1, True),
@@ -43,38 +43,34 @@ def draw(rng, runs, planes, sensors, scatter, stated):
     return Trials(names[0], [100.0], *names[1:], read[:, None], T, errors, amplitudes_only=True), D, W
 
 
-def held(answer, solution, D):
-    """Whether the region of a solution holds the truth; shares of the planes whose intervals do."""
-    w, (low, high, angle) = solution.weights, solution.intervals
-    sizes, angles = (low <= np.abs(D)) & (np.abs(D) <= high), np.abs(np.angle(D * w.conj())) <= angle
-    if len(D) > 1:
-        off = real_parts(np.vstack((D, solution.region)) - w)
-        far = (off @ np.linalg.inv(np.cov(off[1:].T)) * off).sum(axis=1)
-        inside = far[0] <= far[1:].max()
-    else:
-        away = answer.trials.weights - np.array([D, w])[:, None]
-        a, g = (np.abs(of) / answer.errors for of in (answer.trials.mean[:, 0], away))
-        more, less = ((g * a).sum(axis=1) ** 2 / (g * g).sum(axis=1)).sum(axis=1)
-        inside = less - more <= answer.scatter.limit(2, 0.95)
-    return inside, sizes.mean(), angles.mean()
+def held(solution, D):
+    """Whether the intervals of a solution hold size and angle of each plane's weight, (2, P)."""
+    low, high, angle = solution.intervals
+    off = np.abs(np.angle(D * solution.weights.conj()))
+    return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
 
 
 def least_width(T, D, sensors, scatter):
-    """Least 95 % of the angle: ln of readings is that of distances from one weight, and one constant."""
+    """Least ± of the angle, by Cramér and Rao, for size and angle to hold together with 95 %.
+
+    ln of readings is that of distances from one weight, and one constant.
+    """
     q = (D / (T - D))[:, 0]
-    return 1.96 * scatter / np.sqrt(sensors * len(q[1:])) * np.linalg.inv(np.cov(q.real, q.imag))[1, 1] ** 0.5
+    covariance = scatter**2 * np.linalg.inv(np.cov(q.real, q.imag)) / (sensors * len(q[1:]))
+    return 2.236 * covariance[1, 1] ** 0.5
 
 
 def outcome(rng, *line):
     """Balance a job and see.
 
-    Whether the region of a solution holds the truth; shares of the planes whose intervals of size, and of
-    angle, do; whether to mount, and the share of the vibration left; ± of the angle by the least possible.
+    Whether all intervals of one solution hold the truth; shares of the planes whose size, and angle, one
+    holds; whether to mount, and the share of the vibration left; ± of the angle by the least possible.
     """
     trials, D, W = draw(rng, *line)
     answer = balance_without_phase(trials)
     left = np.linalg.norm(W @ (answer.weights - D)) / np.linalg.norm(W @ D)
-    holds = np.max([held(answer, one, D) for one in answer.solutions], axis=0)
+    each = np.array([held(one, D) for one in answer.solutions])
+    holds = each.all(axis=(1, 2)).any(), *each.any(axis=0).mean(axis=1)
     width = answer.solutions[0].intervals[2][0] / least_width(trials.weights, D, *line[2:4])
     return *holds, answer.sound, left, width
 
