@@ -428,8 +428,10 @@ def _contradiction(trials: Trials, scatter: Scatter) -> str:
                 "the amplitudes are impossible: the root mean square of three equal trials at 120°, "
                 f"{words[0]}, cannot be below the baseline's {words[1]}"
             )
-    ratio = np.sqrt(scatter.chi_square / scatter.dof)
-    return f"the amplitudes miss every linear rotor by {ratio:.2g} times their errors"
+    return (
+        f"the amplitudes miss every linear rotor by {np.sqrt(scatter.chi_square / scatter.dof):.2g} "
+        "times their errors"
+    )
 
 
 def _decide(

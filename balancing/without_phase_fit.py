@@ -171,7 +171,7 @@ def common_weight(
     out = []
     for k, one in enumerate(best):
         least = np.linalg.norm(_slopes(missed, x[k]), -2) * np.abs(one)
-        reach = np.array([min(_FAR * np.sqrt(max(levels)) / max(least, _TINY), _FURTHER)])
+        reach = np.array([min(_FAR * max(levels) ** 0.5 / max(least, _TINY), _FURTHER)])
         for n in (61, 101):  # a wide look, then a close one
             axes = np.linspace(-reach, reach, n)
             away = axes[:, :1] + 1j * axes[:, -1]
@@ -185,12 +185,12 @@ def common_weight(
 
 def _together(minima: Sequence[Minimum], weights: FloatArray) -> tuple[float, float]:
     """Misfit of minima of the first readings, and how far in errors one weight is from leaving nothing."""
-    x, draws = (np.array([getattr(one, name) for one in minima]) for name in ("parameters", "draws"))
+    chi_square, x, draws = (np.array(of) for of in zip(*minima, strict=True))
     D = best_weights(x[None], weights[: len(x)])[0]
     left = real_parts((x[:, 0] + effects(x) @ D)[:, None])
     off = real_parts((draws[..., 0] + effects(draws) @ D)[..., None])
     unlike = left**2 / off.var(axis=1).clip(_TINY)
-    return sum(one.chi_square for one in minima), unlike.sum()
+    return chi_square.sum(), unlike.sum()
 
 
 def choices(readings: Sequence[Sequence[Minimum]], weights: FloatArray, limit: float) -> list[Choice]:
