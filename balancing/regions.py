@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 LEVEL = 0.95
 NORMAL_RADIUS = float(np.sqrt(-2 * np.log(1 - LEVEL)))
@@ -49,19 +49,19 @@ class Region:
         square = square / np.maximum(1 - square / len(draws), 0.1)  # as if a draw had no part in V
         return replace(region, radius=float(np.sqrt(np.quantile(square, LEVEL))))
 
-    def holds(self, value: ComplexArray) -> bool:
-        """Whether k numbers lie in it."""
-        return bool(self._distance(real_parts(np.asarray(value) - self.centre)[None])[0] <= self.radius)
+    def holds(self, values: ComplexArray) -> BoolArray:
+        """Whether k numbers lie in it, (…), of values (…, k)."""
+        return self._distance(real_parts(np.asarray(values) - self.centre)) <= self.radius
 
     def edge(self, points: int) -> ComplexArray:
         """Points on the edge of the region of one number, (points,)."""
         return region_edge(self.centre[0], self.covariance, points, self.radius)
 
     def _distance(self, off: FloatArray) -> FloatArray:
-        """Distance of real vectors (n, 2k), in standard deviations; far along what is held."""
+        """Distance of real vectors (…, 2k), in standard deviations; far along what is held."""
         values, axes = np.linalg.eigh(self.covariance)
         along = off @ axes / np.sqrt(np.maximum(values, max(_HELD * values[-1], 1e-300)))
-        return np.asarray(np.linalg.norm(along, axis=1))
+        return np.asarray(np.linalg.norm(along, axis=-1))
 
 
 def region_edge(

@@ -22,7 +22,7 @@ from balancing.mount_decision import HARDLY_BELOW
 from balancing.printed_readings import reading_columns, rms, three_figures, weight_columns
 from balancing.regions import LEVEL, Region
 from balancing.trials import Limits, Trials
-from balancing.without_phase_fit import UNLIKE, Fit, best_weights, choices, common_weight, effects
+from balancing.without_phase_fit import Fit, best_weights, choices, common_weight, effects
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -83,7 +83,10 @@ class AmplitudeSolution:
     before, effect
         Readings y ≥ 0 of the bare rotor (N,), and w of the planes by them (N, P); speed by speed.
     region
-        Weights at random in its 95 % region, (n, P).
+        Weights in its joint 95 % region, (n, P).
+    intervals
+        From and to of the sizes, and ± of the angles: all of these together hold with 95 %; (P,) each; kg or
+        kg·m, rad.
     left
         Share of the present vibration (rms) that the weights of the first solution leave if this one is
         true: the upper end of its 95 % interval.
@@ -94,13 +97,8 @@ class AmplitudeSolution:
     before: FloatArray
     effect: ComplexArray
     region: ComplexArray
+    intervals: tuple[FloatArray, FloatArray, FloatArray]
     left: float
-
-    @property
-    def intervals(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """From, to and ± of the sizes and angles in the region, (P,) each; kg or kg·m, rad."""
-        size, angle = np.abs(self.region), np.angle(self.region * self.weights.conj())
-        return size.min(axis=0), size.max(axis=0), np.abs(angle).max(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,34 +298,39 @@ def balance_without_phase(
     a, (errors, scatter) = np.abs(trials.mean).reshape(len(trials.runs), -1), _errors(trials)
     N, P = a.shape[1], len(trials.planes)
     limits = limits or Limits.none(1, N, P)
-    first = trials.weights[np.argmax(trials.weights != 0, axis=0), np.arange(P)]
-    size, top = np.abs(trials.weights).max(axis=0) * first / np.abs(first), a.max(axis=0)
-    T, a, errors = trials.weights / size, a / top, errors / top  # around 1, the first weight at 0°
+    size, top = np.abs(trials.weights).max(axis=0), a.max(axis=0)
+    T, a, errors = trials.weights / size, a / top, errors / top  # around 1
     fits = [Fit(T, *one) for one in zip(a.T, errors.T, strict=True)]
-    scatter = scatter._replace(chi_square=sum(float(fit.chi_square[0]) for fit in fits))
+    scatter = scatter._replace(chi_square=sum(fit.chi_square[0] for fit in fits))
     if scatter.origin == "assumed" and scatter.dof >= SPARE * N and scatter.chi_square > 1e-6:
-        factor = float(np.sqrt(scatter.chi_square / scatter.dof))
+        factor = (scatter.chi_square / scatter.dof) ** 0.5
         scatter, errors = Scatter(ASSUMED * factor, "estimated", scatter.dof, scatter.dof), factor * errors
         fits = [Fit(T, *one) for one in zip(a.T, errors.T, strict=True)]
     limit, rng = scatter.limit(2 * P, POSSIBLE), np.random.default_rng(0)
-    minima = [fit.minima(rng, limit) for fit in fits]
-    weights = (np.ones(N) if row_weights is None else np.ravel(row_weights)) * top
-    largest = limits.max_weight / np.abs(size)
-    solutions = list[AmplitudeSolution]()
+    weights = (1.0 if row_weights is None else np.ravel(row_weights)) * top
+    kept = choices([fit.minima(rng, limit) for fit in fits], weights, limit)
+    every = np.array([[one.parameters for one in choice] for choice in kept])
+    starts = best_weights(every, weights)
+    alone = LEVEL ** (0.5 / P)  # of 2 P numbers that hold together
+    alike = (
+        common_weight(starts, T, a, errors, limit, scatter.limit(2, LEVEL), scatter.limit(1, alone))
+        if P == 1
+        else []
+    )
+    solutions, tail = list[AmplitudeSolution](), 0.0 if alike else (1 - alone) / 2
 
-    for choice in choices(minima, weights, limit):
-        x = np.array([one.parameters for one in choice])
-        draws = np.array([one.draws for one in choice]).swapaxes(0, 1)
-        best, inside = best_weights(x[None], weights)[0], best_weights(draws, weights)
-        if P == 1:
-            places, above = common_weight(best, T, a, errors)
-        alike = P == 1 and chance(above[0], (len(a) - 1) * N - 2) >= UNLIKE
+    for k, best in enumerate([one[0] for one in alike] or starts):
+        nearest = np.linalg.norm(starts - best, axis=1).argmin()
+        choice, x = kept[nearest], every[nearest]
+        draws = np.stack([one.draws for one in choice], axis=1)
         if alike:
-            best, inside = places[0], places[above <= above[0] + scatter.limit(2, LEVEL)]
+            _, inside, near = alike[k]
         else:
-            around = Region.of(inside, best)
-            inside = inside[[around.holds(one) for one in inside]]
-        D = best * np.minimum(1.0, largest / np.maximum(np.abs(best), _TINY))
+            near = best_weights(draws, weights)
+            inside = near[Region.of(near, best).holds(near)]
+        low, high = np.quantile(np.abs(near * size), (tail, 1 - tail), axis=0)
+        angle = np.quantile(np.abs(np.angle(near * best.conj())), 1 - 2 * tail, axis=0)
+        D = best * np.minimum(1.0, limits.max_weight / np.maximum(np.abs(best * size), _TINY))
         mounted = solutions[0].weights / size if solutions else D
         after, before = (draws[..., 0] + effects(draws) @ mounted) * weights, draws[..., 0] * weights
         share = np.linalg.norm(after, axis=1) / np.linalg.norm(before, axis=1).clip(_TINY)
@@ -339,12 +342,13 @@ def balance_without_phase(
                 x[:, 0] * top,
                 effects(x) * top[:, None] / size,
                 inside * size,
-                float(left),
+                (low, high, angle),
+                left,
             )
         )
     each = zip(trials.planes, trials.weights.T, strict=True)
     run = max(((plane, *_widest_gap(of, holes.get(plane))) for plane, of in each), key=lambda one: one[3])[:3]
-    weak = chance(float((((a - a.mean(axis=0)) / errors) ** 2).sum()), a.size - N) > 1 - LEVEL
+    weak = chance((((a - a.mean(axis=0)) / errors) ** 2).sum(), a.size - N) > 1 - LEVEL
     decision = _decide(trials, solutions, scatter, limits, run, weak=weak)
     return WithoutPhase(trials, tuple(solutions), scatter, errors * top, decision, run, tuple(remove))
 
@@ -356,9 +360,7 @@ def _check(trials: Trials, holes: Mapping[str, Holes]) -> None:
         raise ValueError("without phases one or two planes can be balanced, each with trial weights")
     silent = ~np.abs(trials.mean).any(axis=(0, 1))
     if silent.any():
-        raise ValueError(
-            f"sensor {trials.sensors[int(np.argmax(silent))]!r} reads 0 in every run: leave it out"
-        )
+        raise ValueError(f"sensor {trials.sensors[np.argmax(silent)]!r} reads 0 in every run: leave it out")
     different = len(np.unique(np.round(T / np.abs(T).max(), 9), axis=0))
     if different >= (3 if P == 1 else 7):
         return
@@ -386,7 +388,7 @@ def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[complex, st
     """
     angles = np.unique(np.round(np.angle(weights[weights != 0]), 6))
     gaps = np.diff([*angles, angles[0] + 2 * np.pi])
-    k = int(np.argmax(gaps))
+    k = np.argmax(gaps)
     direction, hole = np.exp(1j * (angles[k] + gaps[k] / (3 if len(angles) == 1 else 2))), ""
     if holes is not None:
         places = np.exp(1j * holes.angles)
@@ -394,7 +396,7 @@ def _widest_gap(weights: ComplexArray, holes: Holes | None) -> tuple[complex, st
         if new.any():
             at = int(np.where(new, np.abs(places - direction), np.inf).argmin())
             direction, hole = places[at], holes.names[at]
-    return complex(np.abs(weights).max() * direction), hole, float(gaps[k])
+    return complex(np.abs(weights).max() * direction), hole, gaps[k]
 
 
 def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
@@ -410,7 +412,7 @@ def _errors(trials: Trials) -> tuple[FloatArray, Scatter]:
         square = square + np.nanmean(trials.steps[0], axis=0) ** 2 / 12
     errors = np.maximum(np.sqrt(square), _LEAST * a.max(axis=0)).reshape(len(a), -1)
     dof = (len(a) - 1 - 2 * len(trials.planes)) * errors.shape[1]
-    return errors, Scatter(float(np.hypot(size, between)), "stated" if stated else "assumed", 0.0, dof)
+    return errors, Scatter(np.hypot(size, between), "stated" if stated else "assumed", 0.0, dof)
 
 
 def _contradiction(trials: Trials, scatter: Scatter) -> str:
@@ -419,15 +421,17 @@ def _contradiction(trials: Trials, scatter: Scatter) -> str:
     loaded = T.any(axis=1)
     if T.shape[1] == 1 and loaded.sum() == 3 and not loaded.all() and abs(T.sum()) < 1e-3 * np.abs(T).sum():
         mean, bare = (np.sqrt((a[of] ** 2).mean(axis=0)) for of in (loaded, ~loaded))
-        i = int(np.argmin(mean / bare))
+        i = np.argmin(mean / bare)
         if mean[i] < bare[i]:
-            words = [trials.labels.amplitude_words(float(of[i])) for of in (mean, bare)]
+            words = [trials.labels.amplitude_words(of[i]) for of in (mean, bare)]
             return (
                 "the amplitudes are impossible: the root mean square of three equal trials at 120°, "
                 f"{words[0]}, cannot be below the baseline's {words[1]}"
             )
-    ratio = np.sqrt(scatter.chi_square / scatter.dof)
-    return f"the amplitudes miss every linear rotor by {ratio:.2g} times their errors"
+    return (
+        f"the amplitudes miss every linear rotor by {np.sqrt(scatter.chi_square / scatter.dof):.2g} "
+        "times their errors"
+    )
 
 
 def _decide(

@@ -1,7 +1,9 @@
 """Amplitudes alone: printed examples, brute force over a grid, what is refused, named and told."""
 
+import balancing_data
 import numpy as np
 import pytest
+from balancing_data import complex_normal
 from scipy.optimize import minimize
 
 from balancing import (
@@ -9,7 +11,6 @@ from balancing import (
     Limits,
     ReadingErrors,
     RunScatter,
-    Trials,
     UndeterminedError,
     balance_without_phase,
 )
@@ -27,12 +28,7 @@ def job(read, angles=AT[120], mass=1.0, **more):
 
 def trials(read, weights, **more):
     """Runs with amplitudes (R, C) and weights (R, P)."""
-    names = [
-        tuple(f"{letter}{k}" for k in range(n))
-        for letter, n in zip("rsp", (*read.shape, weights.shape[1]), strict=True)
-    ]
-    more = {"labels": GRAMS, "amplitudes_only": True} | more
-    return Trials(names[0], [155.0], names[1], names[2], read[:, None], weights, **more)
+    return balancing_data.job(read, weights, labels=GRAMS, amplitudes_only=True, **more)
 
 
 def turned(degrees):
@@ -42,8 +38,7 @@ def turned(degrees):
 def misfit(T, a, s, places):
     """χ² where a weight at a place leaves nothing, in the best scale."""
     g, a = np.abs(T - np.asarray(places)[..., None]) / s, a / s
-    scale = (g @ a) / (g * g).sum(axis=-1)
-    return ((a - scale[..., None] * g) ** 2).sum(axis=-1)
+    return a @ a - (g @ a) ** 2 / (g * g).sum(axis=-1)
 
 
 def holds(answer, weights):
@@ -117,41 +112,25 @@ def drawn_job(rng):
     return T, a / a.max()
 
 
-def fitted(T, a, s):
-    first = T[1] / abs(T[1])
-    return Fit(T[:, None] / first / np.abs(T).max(), a, s)
-
-
 @pytest.mark.parametrize("jobs", [60])
 def test_no_place_of_a_grid_fits_better(jobs):
     rng = np.random.default_rng(51)
     for _ in range(jobs):
         T, a = drawn_job(rng)
         s = 0.1 * np.maximum(a, 0.02)
-        assert fitted(T, a, s).chi_square[0] <= brute(T, a, s) + 1e-5
+        assert Fit(T[:, None] / np.abs(T).max(), a, s).chi_square[0] <= brute(T, a, s) + 1e-5
 
 
 def test_several_sensors_and_speeds_are_one_fit():
     rng, T, D = np.random.default_rng(3), np.array([0, 1, *turned([120, 240])])[:, None], 0.7 * np.exp(1j)
-    W = rng.standard_normal((2, 3)) + 1j * rng.standard_normal((2, 3))
-    Y = -W * D + 0.05 * (rng.standard_normal((2, 3)) + 1j * rng.standard_normal((2, 3)))
-    runs = Trials(
-        tuple("abcd"),
-        [100.0, 200.0],
-        tuple("ABC"),
-        ("P",),
-        np.abs(Y + W * T[..., None]),
-        T,
-        errors=ReadingErrors(0.01),
-        amplitudes_only=True,
-    )
+    W = complex_normal(rng, (2, 3))
+    Y = -W * D + 0.05 * complex_normal(rng, (2, 3))
+    runs = trials(np.abs(Y + W * T[..., None]), T, speeds=(100, 200), errors=ReadingErrors(0.01))
     best = np.linalg.lstsq(W.reshape(-1, 1), -Y.ravel())[0]
     answer = balance_without_phase(runs)
     assert answer.weights == pytest.approx(best, abs=1e-5)
     assert answer.sound
-    assert answer.to_dict()["rms_after"] == pytest.approx(
-        np.sqrt(np.mean(np.abs(Y + W * best) ** 2)), rel=1e-4
-    )
+    assert answer.to_dict()["rms_after"] == pytest.approx(balancing_data.rms(Y + W * best), rel=1e-4)
 
 
 def two_planes(runs=7):
@@ -162,7 +141,7 @@ def two_planes(runs=7):
 
 def test_two_planes_take_seven_runs():
     rng, D = np.random.default_rng(8), np.array([0.6 * np.exp(1j), 0.9 * np.exp(-2j)])
-    W = rng.standard_normal((3, 2)) + 1j * rng.standard_normal((3, 2))
+    W = complex_normal(rng, (3, 2))
     read = np.abs((two_planes() - D) @ W.T)
     answer = balance_without_phase(trials(read, two_planes(), errors=ReadingErrors(0.01)))
     assert answer.weights == pytest.approx(D, abs=1e-5)
@@ -170,14 +149,12 @@ def test_two_planes_take_seven_runs():
     limits = Limits(np.array([0.5, 2.0]), np.full((1, 3), np.inf), ((), ()))
     limited = balance_without_phase(trials(read, two_planes(), errors=ReadingErrors(0.01)), limits=limits)
     assert np.abs(limited.weights) == pytest.approx([0.5, 0.9], abs=1e-5)
-    with pytest.raises(UndeterminedError, match=r"seven.* 6 with .*in plane 'p1'"):
+    with pytest.raises(UndeterminedError, match=r"seven.* 6 with .*in plane 'B'"):
         balance_without_phase(trials(read[:6], two_planes(6)))
 
 
 def test_too_few_runs_name_those_that_are_missing():
-    with pytest.raises(
-        UndeterminedError, match=r"four runs.*1 g at 120\.0° in plane 'p0' and 1 g at 240\.0°"
-    ):
+    with pytest.raises(UndeterminedError, match=r"four runs.*1 g at 120\.0° in plane 'A' and 1 g at 240\.0°"):
         balance_without_phase(job([3, 4], [0]))
     with pytest.raises(UndeterminedError, match="without weights"):
         balance_without_phase(trials(np.array([[3.0], [4.0]]), np.array([[1], [1j]])))

@@ -2,14 +2,12 @@
 
 Run `python tests/coverage/coverage_without_phase.py [jobs]`, jobs of each line (1000). One plane whose
 correction is 1 at any angle; a baseline and equal trial weights at equal angles, 0.3–1.5 of the correction,
-from any angle on; amplitudes scatter from run to run, each for itself. Two planes (a fifth of the jobs):
-coefficients normal.
+from any angle on; amplitudes scatter from run to run, each for itself. Two planes: coefficients normal.
 """
 
 from __future__ import annotations
 
 import sys
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,38 +26,21 @@ LINES = (
 """Runs, planes, sensors, scatter, and whether it is stated."""
 
 
-class Outcome(NamedTuple):
-    """Whether printed intervals hold the truth; whether to mount, and the share of the vibration left.
-
-    `inside`: all of one solution together; `sizes`, `angles`: shares of the planes, each for itself.
-    """
-
-    inside: bool
-    sizes: float
-    angles: float
-    mount: bool
-    left: float
-
-
 def draw(rng, runs, planes, sensors, scatter, stated):
     """A job, and its correction."""
     D = np.exp(2j * np.pi * rng.random(planes))
     T, each = np.zeros((runs, planes), dtype=complex), (runs - 1) // planes
     for p in range(planes):
-        size = np.exp(rng.uniform(np.log(0.3), np.log(1.5)))
-        first, step = 2j * np.pi * rng.random(), 1 / max(each, 3)
-        T[1 + p * each : 1 + (p + 1) * each, p] = size * np.exp(first + 2j * np.pi * step * np.arange(each))
-    W = rng.standard_normal((sensors, planes)) + 1j * rng.standard_normal((sensors, planes))
-    W = W / np.abs(W) if planes == 1 else W
+        size, first = 0.3 * 5 ** rng.random(), rng.random()
+        turns = first + np.arange(each) / max(each, 3)
+        T[1 + p * each : 1 + (p + 1) * each, p] = size * np.exp(2j * np.pi * turns)
+    real, imaginary = rng.standard_normal((2, sensors, planes))
+    W = real + 1j * imaginary
     truth = np.abs((T - D) @ W.T)
     read = np.abs(truth * (1 + scatter * rng.standard_normal(truth.shape)))
-    names = [
-        tuple(f"{letter}{k + 1}" for k in range(n))
-        for letter, n in zip("rsp", (runs, sensors, planes), strict=True)
-    ]
+    names = [tuple(map(str, range(n))) for n in (runs, sensors, planes)]
     errors = ReadingErrors(scatter) if stated else None
-    speeds = np.array([100.0])
-    return Trials(names[0], speeds, names[1], names[2], read[:, None], T, errors, amplitudes_only=True), D, W
+    return Trials(names[0], [100.0], *names[1:], read[:, None], T, errors, amplitudes_only=True), D, W
 
 
 def held(solution, D):
@@ -69,35 +50,46 @@ def held(solution, D):
     return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
 
 
+def least_width(T, D, sensors, scatter):
+    """Least ± of the angle, by Cramér and Rao, for size and angle to hold together with 95 %.
+
+    ln of readings is that of distances from one weight, and one constant.
+    """
+    q = (D / (T - D))[:, 0]
+    covariance = scatter**2 * np.linalg.inv(np.cov(q.real, q.imag)) / (sensors * len(q[1:]))
+    return 2.236 * covariance[1, 1] ** 0.5
+
+
 def outcome(rng, *line):
-    """Balance a job and see."""
+    """Balance a job and see.
+
+    Whether all intervals of one solution hold the truth; shares of the planes whose size, and angle, one
+    holds; whether to mount, and the share of the vibration left; ± of the angle by the least possible.
+    """
     trials, D, W = draw(rng, *line)
     answer = balance_without_phase(trials)
     left = np.linalg.norm(W @ (answer.weights - D)) / np.linalg.norm(W @ D)
     each = np.array([held(one, D) for one in answer.solutions])
-    sizes, angles = each.any(axis=0).mean(axis=1)
-    return Outcome(bool(each.all(axis=(1, 2)).any()), sizes, angles, answer.sound, float(left))
+    holds = each.all(axis=(1, 2)).any(), *each.any(axis=0).mean(axis=1)
+    width = answer.solutions[0].intervals[2][0] / least_width(trials.weights, D, *line[2:4])
+    return *holds, answer.sound, left, width
 
 
-def simulate(jobs, *line, seed=1):
-    """So many jobs."""
-    rng = np.random.default_rng(seed)
-    return [outcome(rng, *line) for _ in range(jobs)]
-
-
-def shares(found):
-    """Of jobs: what holds, together and each, mounted; of those mounted, worse than before."""
-    mounted = [one.left for one in found if one.mount]
-    worse = np.mean(np.array(mounted) > 1.0) if mounted else 0.0
-    return *np.mean([one[:4] for one in found], axis=0), worse
+def shares(jobs, *line):
+    """Of so many jobs: what holds, together and each, mounted; of those mounted, worse than before; width."""
+    rng = np.random.default_rng(1)
+    *holds, mount, left, width = np.array([outcome(rng, *line) for _ in range(jobs)]).T
+    worse = (mount * (left > 1)).sum() / max(mount.sum(), 1)
+    return *np.mean([*holds, mount], axis=1), worse, np.median(width)
 
 
 def main(jobs=1000):
     """Print the table."""
-    print(" " * 43 + "holds   sizes  angles   mount   worse")
+    print(" " * 43 + "holds   sizes  angles   mount   worse   ±/C–R")
     for name, *line in LINES:
-        found = simulate(jobs if line[1] == 1 else max(jobs // 5, 1), *line)
-        print(f"{name:<40}" + "".join(f"{100 * share:>8.1f}" for share in shares(found)), flush=True)
+        *each, width = shares(jobs, *line)
+        words = "".join(f"{100 * share:>8.1f}" for share in each)
+        print(f"{name:<40}{words}{width if line[1] == 1 else np.nan:>8.2f}".replace("nan", "  –"), flush=True)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,7 @@ def polar(amplitude, degrees):
     return amplitude * np.exp(1j * np.deg2rad(degrees))
 
 
-def job(
-    readings, weights, *, errors=None, labels=None, speeds=(100.0,), sensors=None, planes=None, runs=None
-):
+def job(readings, weights, *, labels=None, speeds=(100.0,), sensors=None, planes=None, runs=None, **more):
     """Trials from readings (…, R, S, C) or (R, C) at one speed, and weights (R, P)."""
     readings, weights = np.asarray(readings, dtype=complex), np.asarray(weights, dtype=complex)
     if readings.ndim == 2:
@@ -26,8 +24,8 @@ def job(
         planes=planes or tuple("ABCDEFGHIJKLMN"[:P]),
         readings=readings,
         weights=weights,
-        errors=errors,
         labels=labels or Labels(vibration_unit="", weight_unit="g", weight_scale=1 / GRAM),
+        **more,
     )
 
 
