@@ -36,6 +36,8 @@ ROUNDING = 1e-9
 """Share of an amplitude below which its imaginary part is rounding."""
 TRUSTED = 3.0
 """A predicted amplitude farther than this factor from the measured one does not set the weight."""
+BLOCK = 4096
+"""Rows whose equations are solved together."""
 
 
 @dataclass(frozen=True)
@@ -306,13 +308,14 @@ class Comparison:
 
     def _answers(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Amplitudes and natural frequencies, behind each its derivatives by θ, (n, e, 1 + n), (n, 1 + n)."""
-        data, varying, forced = self.experiments, self.experiments.varying, self.forced
+        data, n, varying = self.experiments, len(self.forced), self.experiments.varying
         amplitudes = np.full((*self.measured.shape, 1 + len(theta)), np.nan, dtype=complex)
         frequencies = np.full(amplitudes[:, 0].shape, np.nan)
-        if len(forced):
-            inputs, rows = data.table(self.model.inputs)[forced], {n: v[forced] for n, v in varying.items()}
-            Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs, varying=rows)
-            amplitudes[forced] = np.concatenate((Z[..., None], dZ), axis=-1)
+        inputs = data.table(self.model.inputs)
+        for forced in np.array_split(self.forced, range(BLOCK, n, BLOCK)) if n else ():
+            rows = {name: value[forced] for name, value in varying.items()}
+            Z, dZ = self.model.forced(theta, data.frequencies[forced], inputs[forced], varying=rows)
+            amplitudes[forced] = np.append(Z[..., None], dZ, axis=-1)
         for k, i in enumerate(self.free):
             if not k or varying:
                 A, dA = self.model.dynamic_stiffness(theta, {n: v[[i]] for n, v in varying.items()})

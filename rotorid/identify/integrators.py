@@ -29,7 +29,7 @@ SAME_STEP = 4e-15
 """Steps that differ by less than this share of the largest time are one step (rounded times)."""
 UNROLLED = 300
 """Products in f_x S below which they are written out."""
-BATCH = 2**22
+BATCH = 2**18
 """Numbers in one batch of matrix exponentials."""
 At = TypeVar("At", float, FloatArray)
 HEUN: dict[str, Callable[[int], list[list[int]]]] = {
