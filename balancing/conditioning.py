@@ -122,7 +122,7 @@ def chance(chi_square: float, n: int, dof: int | None = None) -> float:
     if dof is None and n % 2 == 0:  # Poisson's sum: scipy takes long to load
         half = np.clip(chi_square / 2, 1e-300, 1e300)
         k = np.append(half, np.arange(1, n // 2))
-        return float(np.exp(np.cumsum(np.log(half / k)) - half).sum())
+        return float(np.exp(np.log(half / k).cumsum() - half).sum())
     from scipy.special import chdtrc, fdtrc
 
     return float(chdtrc(n, chi_square) if dof is None else fdtrc(n, dof, chi_square / n))
@@ -286,7 +286,7 @@ def check_effects(
     """
     variances = mean_variances(covariance).reshape(-1, 1 + len(trials.planes))
     for p, plane in enumerate(trials.planes):
-        run = int(np.argmax(np.abs(trials.weights[:, p])))
+        run = np.argmax(np.abs(trials.weights[:, p]))
         words = f"the trial weight in plane {plane!r} (run {trials.runs[run]!r})"
         w, size = W[..., p].ravel(), abs(trials.weights[run, p])
         if (np.abs(w) * size <= ROUNDING * np.abs(trials.mean).max(axis=0).ravel()).all():

@@ -369,9 +369,9 @@ class _Errors(NamedTuple):
         """A⁻¹ (2P, 2P)."""
         K = self.C - at.A @ np.swapaxes(at.A, 1, 2)
         root = covariance_root(K, np.einsum("nii->ni", K))
-        noise = self.rows(at.white, unstretch(np.swapaxes(root, 1, 2))[..., 1:])
         whiten = np.linalg.inv(np.linalg.cholesky(at.rows.T @ at.rows))
-        share, V = np.linalg.eigh(whiten @ noise.T @ noise @ whiten.T)
+        noise = self.rows(at.white, unstretch(np.swapaxes(root, 1, 2))[..., 1:]) @ whiten.T
+        share, V = np.linalg.eigh(noise.T @ noise)
         V = whiten.T @ V
         return np.asarray((V / np.maximum(1 - share, LEAST_INFORMATION)) @ V.T)
 

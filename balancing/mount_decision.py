@@ -213,10 +213,11 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
             cause="; ".join((*contradictions, outlook)),
             instead=("Instead: mend the table, or measure these runs again until they agree.",),
         )
-    certain = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
-    causes = certain if sound else _causes(result, case)
-    determined = [f"{capital(result.combination)}."] if result.combination else []
-    instead = (*determined, *remedies(case))
+    promise = f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"
+    causes = [promise] if sound else _causes(result, case)
+    instead = remedies(case)
+    if result.combination:
+        instead = (f"{capital(result.combination)}.", *instead)
     return replace(made, word="do not mount", cause="; ".join((*causes, outlook)), instead=instead)
 
 
@@ -329,7 +330,7 @@ def _over_limit(
     new = np.abs(today.baseline + today.W @ weights)
     left_out = ~np.isin(today.speeds, used)[:, None]
     over = (left_out * (new > limits.residual * _MORE) * new).ravel()
-    worst, names = int(np.argmax(over)), reading_names(today.labels, today.sensors, today.speeds)
+    worst, names = np.argmax(over), reading_names(today.labels, today.sensors, today.speeds)
     size = today.labels.amplitude_words(over[worst])
     words = f"the vibration of {names[worst]} is predicted to pass its limit: {size}"
     return (words,) if over.any() else ()

@@ -457,7 +457,7 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
     if trials.run_errors is None and size < NOTICEABLE:
         return ()
     stated = "" if trials.run_errors is None else ", more than stated"
-    worst = int(np.argmax(left))
+    worst = np.argmax(left)
     typed = worst == R - 1 and levels[worst] < levels[0] / 2 and not trials.weights[worst].any()
     hint = '; a check run goes into a table of its own, check = "check.csv"' if typed else ""
     return (

@@ -300,8 +300,8 @@ class Limits:
     @property
     def any(self) -> bool:
         """Whether anything is limited."""
-        largest = np.append(self.max_weight, self.residual)
-        return bool(np.isfinite(largest).any() or any(self.forbidden))
+        limited = np.isfinite(np.append(self.max_weight, self.residual)).any()
+        return bool(limited or any(self.forbidden))
 
     def pick(self, speeds: Sequence[int], planes: Sequence[int]) -> Limits:
         """Limits of some speeds and planes, by index."""

@@ -215,7 +215,7 @@ def check_run_spread(
     off = check_readings(influence, weights, *look)
     off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
     read, size = influence.baseline + influence.W @ weights + off, np.abs(off)
-    near = np.minimum(1.0, np.quantile(size, LEVEL, axis=0) / np.maximum(size, 1e-300))
+    near = np.minimum(1.0, np.quantile(size, LEVEL, axis=0) / (size + 1e-300))
     parts = real_parts((near * off)[..., None])
     # what a normal complex number loses by this
     covariance = np.einsum("nsci,nscj->scij", parts, parts) / (LEVEL * len(off))
