@@ -16,7 +16,6 @@ from balancing import (
 )
 from balancing.without_phase_fit import Fit
 
-GRAMS = Labels("mm_s_rms", 1.0, "g", 1.0)
 AT = {120: (0, 120, 240), 180: (0, 180)}
 
 
@@ -28,11 +27,13 @@ def job(read, angles=AT[120], mass=1.0, **more):
 
 def trials(read, weights, **more):
     """Runs with amplitudes (R, C) and weights (R, P)."""
-    return balancing_data.job(read, weights, labels=GRAMS, amplitudes_only=True, **more)
+    return balancing_data.job(
+        read, weights, labels=Labels("mm_s_rms", 1.0, "g", 1.0), amplitudes_only=True, **more
+    )
 
 
 def turned(degrees):
-    return np.exp(1j * np.radians(degrees))
+    return balancing_data.polar(1, degrees)
 
 
 def misfit(T, a, s, places):
@@ -112,13 +113,23 @@ def drawn_job(rng):
     return T, a / a.max()
 
 
-@pytest.mark.parametrize("jobs", [60])
-def test_no_place_of_a_grid_fits_better(jobs):
+def test_no_place_of_a_grid_fits_better():
     rng = np.random.default_rng(51)
-    for _ in range(jobs):
+    for _ in range(60):
         T, a = drawn_job(rng)
         s = 0.1 * np.maximum(a, 0.02)
         assert Fit(T[:, None] / np.abs(T).max(), a, s).chi_square[0] <= brute(T, a, s) + 1e-5
+
+
+def test_two_solutions_differ_and_their_intervals_are_those_of_a_grid():
+    """Places 1/D̄ of D have nearly the same distances from weights on a circle around the origin."""
+    T = np.array([0, *turned(np.arange(0, 360, 60))])
+    a = np.abs(T - 0.8j) * (1 + 0.1 * np.random.default_rng(4).standard_normal(7))
+    first, second = balance_without_phase(job(a, range(0, 360, 60), errors=ReadingErrors(0.1))).solutions
+    grid = np.geomspace(0.2, 5, 601)[:, None] * turned(np.arange(0, 360, 0.5))
+    own = np.abs(np.log(grid / first.weights)) < np.abs(np.log(grid / second.weights))
+    size = np.abs(grid[own & (misfit(T, a, 0.1 * a, grid) <= first.chi_square + 5.0)])
+    assert np.ravel(first.intervals[:2]) == pytest.approx((size.min(), size.max()), abs=0.02)
 
 
 def test_several_sensors_and_speeds_are_one_fit():

@@ -93,4 +93,4 @@ def main(jobs=1000):
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:]))
+    main(*map(int, sys.argv[1:]))
