@@ -43,7 +43,7 @@ EATEN = 0.5
 FIGHTING, HARDLY = 3.0, 0.1
 """Weights so many times larger than those of fewer planes, which leave hardly more (of the rms before)."""
 HARDLY_BELOW = 0.9
-"""Of the rms before: what 95 of 100 check runs must stay below, and what else is proposed is to leave."""
+"""Of the rms before: what 95 of 100 check runs must stay below."""
 GOOD = 1 / 3
 """Of the rms before: what a run reads that may stay as it is."""
 WEAK = 3.0
@@ -230,7 +230,7 @@ def remedies(case: Case) -> tuple[str, ...]:
         What weights would be made of.
     """
     weak, words = case.weak, []
-    good = [c for c in case.fewer if case.sound(c) and c.expected < HARDLY_BELOW * case.before]
+    good = [c for c in case.fewer if case.sound(c) and c.expected < case.before]
     if good:
         best = good[0]
         planes = listing(map(repr, best.planes), "and")
