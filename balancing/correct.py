@@ -131,13 +131,13 @@ def correct(  # noqa: PLR0913
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
     kept = None if limits is None else limits.pick(used, chosen)
-    if kept is not None and not kept.any:
+    if kept and not kept.any:
         kept = None
     case = Case(part, today, rows, kept)
     unclear = "" if strength is not None else _unclear(case, counts, refuse=refuse)
     fitted, method = fit_part(part, method, rows, kept, strength)
     D = fitted.weights
-    if kept is not None:
+    if kept:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     drawn = [np.zeros((0, len(D)), dtype=complex)]
     after_covariance, sizes = check_run_spread(

@@ -213,8 +213,9 @@ def decide(result: Correction, case: Case, unclear: str, limits: Limits | None) 
             cause="; ".join((*contradictions, outlook)),
             instead=("Instead: mend the table, or measure these runs again until they agree.",),
         )
-    promise = f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"
-    causes = [promise] if sound else _causes(result, case)
+    causes = _causes(result, case)
+    if sound:
+        causes = [f"a check run may still show rms {case.shown(result.check_rms)} (95 %)"]
     instead = remedies(case)
     if result.combination:
         instead = (f"{capital(result.combination)}.", *instead)

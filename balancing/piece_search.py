@@ -124,6 +124,8 @@ class PlaneVectors:
                     np.inf if holes.stock is None else float(holes.stock.sum()),
                 )
             )
+            if not self.most:
+                raise ValueError("no piece is left in stock")
             steps = min(holes.per_hole, self.most)
             # holes 60°, 120° and 180° apart add up or cancel: the list of a half with both is shorter
             turned = np.round(np.mod(holes.angles[where] + 1e-7, np.pi / 3), 5)

@@ -37,10 +37,7 @@ def as_proposed(job: Job, correction: Correction, influence: Influence, runs: Tr
         if mounting is not None:
             old = holes[plane]
             stock = None if old.stock is None else old.stock - mounting.counts.sum(axis=0)
-            try:
-                holes[plane] = replace(old, taken=old.taken + mounting.amounts, stock=stock)
-            except ValueError:  # no hole or no piece is left: more only elsewhere
-                del holes[plane]
+            holes[plane] = replace(old, taken=old.taken + mounting.amounts, stock=stock)
     return replace(job, check=check, check_pieces=pieces, holes=holes)
 
 

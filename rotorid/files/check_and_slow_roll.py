@@ -166,7 +166,7 @@ def check_runs(
     `sources` are tables of runs and weights, these of planes or groups.
     """
     check = make_trials(*sources, replace(conventions, run="check"), errors, problems)
-    if check is None:
+    if not check:
         return None
     check = in_planes(check, groups)
     before, band, runs = len(problems), conventions.speed_tolerance_percent, source_name(sources[0])

@@ -131,7 +131,7 @@ class Job:
     @property
     def held(self) -> Unknowns | None:
         """The groups of stored coefficients or of trial weights, where these do not tell planes apart."""
-        return held(self.groups, (self.trials if self.influence is None else self.influence).planes)
+        return held(self.groups, (self.influence or self.trials).planes)
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -294,7 +294,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         check = check_runs(
             sources, trials, [*planes], groups, conventions, settings.errors, slow_roll, problems
         )
-        if check is not None and mounted is not None:
+        if check and mounted is not None:
             holes = with_taken(holes, mounted, check, conventions)
     problems.stop()
     files = (written.path, *map(tables.get, TABLES), *model_files, *records)
@@ -302,18 +302,18 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
     key_phasor = trials.labels.with_rotation(settings.key_phasor.angle if settings.key_phasor else 0.0)
     # phases always matter, the direction of angles as soon as one is written other than 0° and 180°
     degrees = [angle for plane in planes.values() for angle in plane.angles]
-    if rotor is not None:
+    if rotor:
         degrees += [key_phasor, *(one.angle or 0.0 for one in sensors.values())]
     shares = np.array([share for group in groups.values() for share in group.values()], dtype=complex)
     vectors = [trials.weights, shares, polar(1.0, np.radians(degrees))]
-    vectors += [] if check is None else [check.weights]
+    vectors += [check.weights] if check else []
     machine = units.vibration(trials.labels.vibration_unit).kind == "unbalance"  # phases are angles then
     matters = {"phase": not machine, "angles": machine or any(np.imag(each).any() for each in vectors)}
     matters = {} if trials.amplitudes_only else matters  # they tell no direction of turning, and need none
     labels = replace(trials.labels, assumed=tuple(name for name in conventions.unstated if matters.get(name)))
     return Job(
         trials=replace(trials, labels=labels),
-        influence=None if influence is None else replace(influence, labels=labels),
+        influence=influence and replace(influence, labels=labels),
         conventions=conventions,
         files=tuple(file for file in files if isinstance(file, Path)),
         planes=planes,
@@ -322,7 +322,7 @@ def job_of(written: WrittenJob, problems: Problems, **stated: Any) -> Job:  # no
         limits=limits,
         zones=zones,
         row_weights=weights,
-        check=None if check is None else replace(check, labels=labels),
+        check=check and replace(check, labels=labels),
         check_mounted=mounted is not None,
         rotor=rotor,
         holes=holes,
@@ -390,17 +390,17 @@ def _readings(
             "whose coefficients come with balance --type"
         )
         settings.complain(problems, "weights", expected)
-    elif machine and trials is not None and not trials.planes:
+    elif machine and trials and not trials.planes:
         influence = machine_influence(trials)
-    if source is not None and influence is not None and trials is not None:
+    if source is not None and influence and trials:
         groups = settings.shares(conventions.labels)
         trials = in_planes(trials, groups)
         tolerance = conventions.speed_tolerance_percent
         planes = unknowns(groups, influence.planes).planes
         influence = fit_to_readings(influence, trials, planes, tolerance, source_name(source), problems)
-    if trials is None or len(problems) > before:
+    if not trials or len(problems) > before:
         return None
-    labels, its = conventions.labels, trials.labels if influence is None else influence.labels
+    labels, its = conventions.labels, (influence or trials).labels
     labels = replace(its, rotation=labels.rotation, view=labels.view, clock=labels.clock)
     notes = [] if source is None else _on_conventions(conventions, stated, labels, source_name(source))
     trials = replace(trials, labels=labels, warnings=(*notes, *trials.warnings))
@@ -439,7 +439,7 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, Any]) -> Conventi
         clock=settings.angles in ROTATIONS,
     )
     limits = [one.limit or one.zones for one in settings.sensors.values()]
-    limits += [] if settings.zones is None else [settings.zones.boundaries]
+    limits += [settings.zones.boundaries] if settings.zones else []
     return Conventions(
         labels,
         settings.speed_tolerance_percent,

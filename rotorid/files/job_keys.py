@@ -197,7 +197,7 @@ class Plane(_Placed):
         example='{ "3" = 10 }',
     )
     stock: listed(Annotated[Whole, Field(ge=0)]) | None = optional(  # type: ignore[valid-type]
-        "how many there are of each available weight",
+        "how many there are of each available weight, those of `check_weights` included",
         example="stock = [4, 4, 2]",
     )
 

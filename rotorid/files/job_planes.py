@@ -8,6 +8,7 @@ the correction. Against the rotation an angle a of the job is −a here, and an 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -45,6 +46,7 @@ from rotorid.files.weights import read_weights
 if TYPE_CHECKING:
     from fem import Rotor
 
+_PIECES = re.compile(r"(?:(\d+) *[×x*] *)?(\d+(?:\.\d+)?)")
 IN_HOLE = 1e-3
 """Relative distance of a weight from the hole that it is in."""
 
@@ -100,7 +102,7 @@ def planes_of(
     """
     stated, groups = settings.planes, settings.shares(trials.labels)
     trials, of = in_planes(trials, groups), held(groups, trials.planes)
-    measured = trials.planes if influence is None else unknowns(groups, influence.planes).planes
+    measured = unknowns(groups, influence.planes).planes if influence else trials.planes
     every = rotor is None and not measured  # or what a type knows
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane.model_construct()) for name in (*measured, *more)}
@@ -125,7 +127,7 @@ def planes_of(
     if not trials.labels.unbalances:
         trials = replace(trials, weights=trials.weights * [planes[name].lever for name in trials.planes])
     try:
-        trials = trials if of is None else of.of_runs(trials, 0.0)
+        trials = of.of_runs(trials, 0.0) if of else trials
     except ValueError as error:
         settings.complain(problems, "groups", f"planes with the same trial_radius_mm / radius_mm: {error}")
     return trials, planes
@@ -156,7 +158,7 @@ def make_zones(settings: JobSettings, trials: Trials, problems: Problems) -> dic
     for name in trials.sensors:
         each = (settings.sensors.get(name), "zones"), (settings.zones, "boundaries")
         for part, field in each:
-            if name not in boundaries and part is not None and (stated := getattr(part, field)):
+            if name not in boundaries and part and (stated := getattr(part, field)):
                 unit = _of_readings(part, field, stated, trials.labels, problems)
                 boundaries[name] = tuple(map(unit.to_si, stated.value))
     return boundaries
@@ -263,16 +265,23 @@ def with_taken(
 ) -> dict[str, Holes]:
     """The holes with what stands in them since the last check run, beside what the job says is taken.
 
+    Pieces that the table names, "2 × 150 + 50", are no longer in stock.
+
     A plane whose weights are not all in its holes, or fill all of them, stays as it is.
     """
     read, out = read_weights(weights, check.runs, conventions, Problems()), dict(holes)
-    rows = () if read is None else read.rows
+    rows = read.rows if read else ()
     for plane, free in holes.items():
-        mounted = np.array([w for run, name, w in rows if (run, name) == (check.runs[-1], plane)])
+        here = [row for row in rows if row[:2] == (check.runs[-1], plane)]
+        mounted = np.array([row[2] for row in here])
         size, holes_at = np.abs(mounted), np.exp(1j * free.angles)
         off = np.abs(mounted[:, None] - size[:, None] * holes_at)
         taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
         in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
         if in_holes and taken.any() and not taken.all():
-            out[plane] = replace(free, taken=np.maximum(taken, free.taken))
+            sizes = free.pieces * check.labels.weight_scale
+            named = _PIECES.findall(" + ".join(row[3] for row in here))
+            used = sum(int(n or 1) * np.isclose(sizes, float(piece)) for n, piece in named)
+            stock = None if free.stock is None else np.maximum(free.stock - used, 0)
+            out[plane] = replace(free, taken=np.maximum(taken, free.taken), stock=stock)
     return out

@@ -149,7 +149,7 @@ def make_trials(
     names, trials = read_runs(runs, conventions, problems)
     nameless = replace(conventions, run="")  # the only run need not be named
     mounted = None if weights is None else read_weights(weights, names, nameless, problems)
-    if trials is None or len(problems):
+    if not trials or problems:
         return None
     if isinstance(errors, ReadingErrors):
         trials = replace(trials, errors=errors)

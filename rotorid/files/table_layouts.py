@@ -320,7 +320,7 @@ def _columns(
 def vector_in(cell: Cell) -> tuple[str, str] | None:
     """Size and angle of a cell such as `6.93 um @ 98°`."""
     match = _VECTOR.fullmatch(cell) if isinstance(cell, str) and len(cell) <= LONGEST else None
-    return None if match is None else (match[1].strip(), match[2])
+    return match and (match[1].strip(), match[2])
 
 
 def _with_unit(grid: Grid, column: _Column, conventions: Conventions) -> _Column:

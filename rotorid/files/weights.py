@@ -47,12 +47,12 @@ _Unknown = set[tuple[int, str, str]]
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Complex weights of each run and plane, kg or kg·m, shape (R, P); each row: run, plane, weight."""
+    """Complex weights of each run and plane, kg or kg·m, shape (R, P); rows: run, plane, weight, pieces."""
 
     planes: tuple[str, ...]
     weights: ComplexArray
     unit: Unit
-    rows: tuple[tuple[str, str, complex], ...] = ()
+    rows: tuple[tuple[str, str, complex, str], ...] = ()
     relative: Relative | None = None
 
 
@@ -126,16 +126,16 @@ def _read_table(
     folded = {name.casefold(): name for name in run_names}
     run = [name if name in run_names else folded.get(name.casefold(), name) for name in names]
     values = conventions.labels.weight_from(size, _angles(table, conventions)).tolist()
-    rows: dict[tuple[str, str, complex], int] = {}
-    for i, row in enumerate(zip(run, plane, values, strict=True)):
+    rows: dict[tuple[str, str, complex, str], int] = {}
+    for i, row in enumerate(zip(run, plane, values, table.texts("pieces"), strict=True)):
         if runs is not None and run[i] and run[i] not in runs:
             hint = f"{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
             table.complain(i, "run", f"a run of the runs table{hint}")
-        elif rows.setdefault(row, i) != i and all(row):
+        elif rows.setdefault(row, i) != i and all(row[:3]):
             table.complain(i, stem, f"each weight once (row {table.rows[rows[row]]} says the same)")
     planes = tuple(dict.fromkeys(filter(None, plane)))
     total = np.zeros((len(run_names), len(planes)), dtype=complex)
-    for name, its, value in rows if runs and len(problems) == before else ():
+    for name, its, value, _ in rows if runs and len(problems) == before else ():
         total[run_names.index(name), planes.index(its)] += value
     made = Weights(planes, total, table.unit("mass"), tuple(rows))
     if not unknown or len(problems) > before:

@@ -120,12 +120,12 @@ P2,add,4,135.0,4.0,g,4.000
 P2,add,6,225.0,10.000000000000002,g,2.000 + 8.000
 """
 CHECKED = 'check = "check.csv"\ncheck_weights = "pieces.csv"\n'
-CHECKED += EIGHT_HOLES.replace("holes = 8", "holes = 8\navailable_g = [1, 2]")
+CHECKED += EIGHT_HOLES.replace("holes = 8", "holes = 8\navailable_g = [1, 2]\nstock = [3, 2]")
 CHECK = "run,speed_rpm,sensor,amplitude_mm_s,phase_deg\ncheck,1485,DE,{},{}\ncheck,1485,NDE,{},{}\n"
 
 
 def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
-    """Their holes are taken; what the job says is taken, too; weights between holes take none.
+    """Their holes are taken, and they are out of stock; what the job says is taken, too; weights between holes take none.
 
     The table names no run: it is the only one, whatever its name.
     """
@@ -133,7 +133,7 @@ def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
     job = job_of(tmp_path, CHECKED, check=check, pieces=PIECES)
     turn = np.exp(1j * np.radians([0, 135, 225]))
     np.testing.assert_allclose(job.check.weights[0], [0.003, 0.004 * turn[1] + 0.01 * turn[2]], rtol=1e-12)
-    np.testing.assert_allclose(job.holes["P1"].taken, [0.003, 0, 0, 0, 0, 0, 0, 0])
+    assert job.holes["P1"].stock.tolist() == [2, 1]
     np.testing.assert_allclose(job.holes["P2"].taken, [0, 0, 0, 0.004, 0, 0.01, 0, 0])
     stated = CHECKED.replace("[planes.P2]", 'taken = { "2" = 7 }\n[planes.P2]')
     between = PIECES.replace("135.0", "140.0").replace(",4,", ",,")
