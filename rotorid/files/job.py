@@ -448,5 +448,5 @@ def conventions_of(settings: JobSettings, stored: Mapping[str, Any]) -> Conventi
         settings.speed,
         {name: holes for name, plane in planes if (holes := plane.hole_angles())},
         frozenset(name for name, plane in planes if plane.remove),
-        any(limit is not None and limit.unit.name.endswith("_rms") for limit in limits),
+        any(limit and limit.unit.name.endswith("_rms") for limit in limits),
     )

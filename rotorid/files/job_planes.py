@@ -107,7 +107,7 @@ def planes_of(
     more = [name for name, plane in stated.items() if every or plane.node is not None]
     planes = {name: stated.get(name, Plane.model_construct()) for name in (*measured, *more)}
     if not measured:
-        masses = rotor is None or all(plane.radius is not None for plane in planes.values())
+        masses = not rotor or all(plane.radius for plane in planes.values())
         unit = units.MASS["g"] if masses else units.UNBALANCE["g_mm"]
         labels = replace(trials.labels, weight_unit=unit.name, weight_scale=unit.scale)
         trials = replace(trials, labels=labels)
@@ -143,7 +143,7 @@ def make_limits(
     residual = np.full((len(trials.speeds), len(trials.sensors)), np.inf)
     for k, name in enumerate(trials.sensors):
         sensor = settings.sensors.get(name)
-        if sensor is None or sensor.limit is None:
+        if not (sensor and sensor.limit):
             continue
         unit = _of_readings(sensor, "limit", sensor.limit, labels, problems)
         rows = _at_speeds(sensor, "limit", sensor.limit.value, trials, settings, math.inf, problems)
@@ -182,10 +182,10 @@ def _of_readings(
 def _sizes(plane: Plane, field: str, labels: Labels, problems: Problems) -> tuple[float, ...]:
     """Weights that a plane states, as those of the job are (kg or kg·m); empty where it states none."""
     stated: Quantity | None = getattr(plane, field)
-    if stated is not None and labels.weight_unit == TRIAL_WEIGHTS:
+    if stated and labels.weight_unit == TRIAL_WEIGHTS:
         plane.complain(problems, field, "trial weights without ?, since this is no multiple of them")
         return ()
-    sizes = () if stated is None else in_job_units(stated, labels.weight_unit, plane.radius)
+    sizes = in_job_units(stated, labels.weight_unit, plane.radius) if stated else ()
     if sizes is None:
         kind = "unbalances (mass × radius)" if labels.unbalances else "masses"
         expected = f"{kind}, as the weights of the job are, or radius_mm too, to convert"

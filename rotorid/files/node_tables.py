@@ -134,7 +134,7 @@ def _nodes(table: Table, stem: str, rotor: Rotor | SmallModel | None) -> list[No
     nodes: list[Node] = []
     for row, name in enumerate(table.texts(stem)):
         try:
-            if rotor is None or not name:
+            if not (rotor and name):
                 nodes.append(int(name) if name.isascii() and name.isdecimal() else name)
             else:
                 nodes.append(rotor.node(name))

@@ -434,6 +434,8 @@ def by_name(inner: Any) -> Any:  # noqa: ANN401
 
 def settings_schema(model: type[Settings], title: str) -> dict[str, Any]:
     """Settings of a whole file as a JSON schema (draft 2020-12), for editors."""
+    for each in Settings.__subclasses__():  # defaults of models that are not built yet fail in pydantic 2.13
+        each.model_rebuild()
     text = json.dumps(model.model_json_schema())
     for name, bound in _BOUNDS.items():  # of numbers that may be texts pydantic writes its own names
         text = text.replace(f'"{name}": ', f'"{bound}": ')

@@ -193,7 +193,7 @@ def equations_of(
     moves = np.any([M, M.T, C, C.T], axis=(0, 1)) | np.isin(names, [*dampers])
     on, off = np.flatnonzero(moves), np.flatnonzero(~moves)
     loose = K[np.ix_(off, off)]
-    if np.linalg.matrix_rank(loose) < off.size:
+    if loose.size and np.linalg.matrix_rank(loose) < off.size:
         raise ValueError("coordinates with neither mass nor damping need stiffness: they move without force")
     K = K - K[:, off] @ np.linalg.solve(loose, K[off])
     M, C, K = (matrix[np.ix_(on, on)] for matrix in (M, C, K))

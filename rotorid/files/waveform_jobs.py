@@ -228,7 +228,7 @@ def _record(
         in_name = parts[column][1]
         unit = keys.unit or in_name or file.unit or Unit("", "label ''")
         amplitude = amplitude or unit
-        if in_name is not None and in_name.name != unit.name:
+        if in_name and in_name.name != unit.name:
             raise refusal(path, f"the unit {in_name.name} of its name, not {unit.name}", column=column)
         if unit.name.endswith(("_pp", "_rms")) and unit.kind in DERIVATIVE:
             expected = f"the unit of a sample, {unit.name.rpartition('_')[0]}, not {unit.name}"

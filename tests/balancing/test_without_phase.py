@@ -137,7 +137,7 @@ def test_several_sensors_and_speeds_are_one_fit():
     W = complex_normal(rng, (2, 3))
     Y = -W * D + 0.05 * complex_normal(rng, (2, 3))
     runs = trials(np.abs(Y + W * T[..., None]), T, speeds=(100, 200), errors=ReadingErrors(0.01))
-    best = np.linalg.lstsq(W.reshape(-1, 1), -Y.ravel())[0]
+    best = np.linalg.lstsq(W.reshape(-1, 1), -Y.ravel(), None)[0]
     answer = balance_without_phase(runs)
     assert answer.weights == pytest.approx(best, abs=1e-5)
     assert answer.sound

@@ -51,7 +51,7 @@ def test_a_fit_with_a_prior_is_bayesian_linear_regression(method):
     assert found.estimate.errors_stated
     assert found.reliable
     # chi-square and degrees of freedom are those of the data, whatever the prior says
-    assert found.estimate.chi_square == pytest.approx(np.linalg.lstsq(K, y)[1][0] / SIGMA**2, rel=1e-8)
+    assert found.estimate.chi_square == pytest.approx(np.linalg.lstsq(K, y, None)[1][0] / SIGMA**2, rel=1e-8)
     assert found.estimate.dof == 22
     shares = 1 - np.diag(C)[1:] / np.array([0.3, 0.2]) ** 2
     assert found.prior.share == pytest.approx(shares, rel=1e-8)
@@ -76,7 +76,7 @@ def test_a_ridge_multiplies_the_diagonal_of_the_normal_matrix(method, sigma):
     assert found.estimate.covariance is None
     assert sum("biases the estimate" in words for words in found.warnings) == 1
     residual = found.to_dict()["ridge"]["residual_rms"]
-    rms = [np.sqrt(np.mean((y - K @ x) ** 2)) / (sigma or 1.0) for x in (np.linalg.lstsq(K, y)[0], expected)]
+    rms = [np.sqrt(np.mean((y - K @ x) ** 2)) / (sigma or 1.0) for x in (np.linalg.lstsq(K, y, None)[0], expected)]
     assert [*residual.values()] == pytest.approx(rms, rel=1e-8)
 
 
