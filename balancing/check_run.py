@@ -202,7 +202,7 @@ class CheckComparison(Answered):
         predicted = small(rms(self.predicted[-1]) * scale, rms(self.before) * scale)
         heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
         left = rms_change(self.labels, self.before, self.achieved[-1])
-        return f"{heads[self.explained]}: with the weights {left} ({predicted} predicted)."
+        return f"{heads[self.explained]}: with the weights {left} ({predicted} predicted without check runs)."
 
     @property
     def answer(self) -> Answer:

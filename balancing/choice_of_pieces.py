@@ -271,7 +271,7 @@ def _enough(
 
     Limits that not even any weights are sure to keep ask for no more pieces.
     """
-    limits = np.full(Y.shape, np.inf) if c.limits is None else c.limits.residual
+    limits = c.limits.residual if c.limits else np.full(Y.shape, np.inf)
     limited = np.isfinite(limits)
     covariance = np.nan_to_num(c.after_covariance)[limited]
     most = max(FEW * bound(c.after), LITTLE * rms(Y))

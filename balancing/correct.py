@@ -95,7 +95,7 @@ def correct(  # noqa: PLR0913
     """
     today = todays(influence, baseline)
     grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
-    chosen = plane_indices(today, planes if grouped is None else grouped.planes)
+    chosen = plane_indices(today, grouped.planes if grouped else planes)
     used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
     if grouped is not None and grouped.constrained:
         every = range(len(today.speeds))
@@ -104,12 +104,12 @@ def correct(  # noqa: PLR0913
             speeds=speeds,
             refuse=refuse,
             method=method,
-            limits=None if limits is None else grouped.limits(limits.pick(every, chosen)),
+            limits=limits and grouped.limits(limits.pick(every, chosen)),
             row_weights=row_weights,
             strength=strength,
         )
-        kept = None if limits is None else limits.pick(used, chosen)
-        D, most = grouped.shares @ result.weights, np.inf if kept is None else kept.max_weight
+        kept = limits and limits.pick(used, chosen)
+        D, most = grouped.shares @ result.weights, kept.max_weight if kept else np.inf
         heavy = np.abs(D) >= (1 - AT_LIMIT) * most
         return replace(
             result,
@@ -117,7 +117,7 @@ def correct(  # noqa: PLR0913
             weights=D,
             draws=result.draws @ grouped.shares.T,
             fitted=replace(result.fitted, weights=D, active_weights=heavy),
-            limits=None if result.limits is None else kept,
+            limits=result.limits and kept,
             mounted=today.mounted,
             remove=tuple(p for p in grouped.planes if p in remove),
             unknowns=grouped,
@@ -130,7 +130,7 @@ def correct(  # noqa: PLR0913
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
-    kept = None if limits is None else limits.pick(used, chosen)
+    kept = limits and limits.pick(used, chosen)
     if kept and not kept.any:
         kept = None
     case = Case(part, today, rows, kept)

@@ -226,7 +226,7 @@ class Correction(Prediction, Answered):
                 "limits": self.limits_document(),
                 "limits_that_bind": self.active,
                 "errors": error_document(self.influence.reading, self.influence.run_errors, self.labels),
-                "convention_test": None if self.convention_test is None else asdict(self.convention_test),
+                "convention_test": self.convention_test and asdict(self.convention_test),
                 "other_readings": [row for words, other in self.others for row in other._rows_if(words)],
                 "assumptions": self.assumptions,
                 "warnings": self.warnings,
@@ -396,8 +396,15 @@ class Correction(Prediction, Answered):
 
     @property
     def error_sentence(self) -> str:
-        """Errors of readings and between runs in one or two sentences."""
-        return error_words(self.influence.reading, self.influence.run_errors, self.labels)
+        """Errors of readings, between runs, and of mounted weights and drift, in one or two sentences."""
+        words = error_words(self.influence.reading, self.influence.run_errors, self.labels)
+        trials = self.influence.trials
+        if not (trials and any((*trials.placement, trials.drift))):
+            return words
+        return (
+            f"{words[:-1]}; mounted weights: {100 * trials.placement.mass:.3g} % and "
+            f"{np.degrees(trials.placement.angle):.3g}°, drift: {100 * trials.drift:.3g} % (stated)."
+        )
 
     def _quality_text(self) -> str:
         """What the method makes small, what is determined, and with what errors."""

@@ -181,7 +181,7 @@ class Influence:
     def _run(self, readings: ArrayLike, weights: ComplexArray) -> Trials:
         """One run with readings (S, C) and weights (P,), mounted as those of the trial runs."""
         names = ("baseline",), self.speeds, self.sensors, self.planes
-        placement = Placement() if self.trials is None else self.trials.placement
+        placement = self.trials.placement if self.trials else Placement()
         return Trials(*names, np.array([readings]), weights[None], labels=self.labels, placement=placement)
 
     def difference_noise(self, check: Trials) -> Noise:

@@ -116,7 +116,7 @@ class Case:
     @property
     def max_weight(self) -> FloatArray:
         """Largest weight of each plane, (P,)."""
-        return np.full(len(self.names), np.inf) if self.limits is None else self.limits.max_weight
+        return self.limits.max_weight if self.limits else np.full(len(self.names), np.inf)
 
     def choice(self, planes: Sequence[int], weights: ComplexArray | None = None) -> Choice:
         """Some of the planes, by least squares or with given weights."""

@@ -154,9 +154,9 @@ def error_document(reading: Reading, run: RunErrors, labels: Labels) -> dict[str
     whole = float(np.linalg.norm(run.typical))
     return {
         "source": reading.source,
-        "amplitude_percent": None if e is None else 100 * e.amplitude,
-        "phase_deg": None if e is None else np.degrees(e.phase),
-        "floor": None if e is None else e.floor * scale,
+        "amplitude_percent": e and 100 * e.amplitude,
+        "phase_deg": e and np.degrees(e.phase),
+        "floor": e and e.floor * scale,
         "degrees_of_freedom": reading.dof,
         "between_runs": {
             "source": run.origin,

@@ -125,7 +125,8 @@ CHECK = "run,speed_rpm,sensor,amplitude_mm_s,phase_deg\ncheck,1485,DE,{},{}\nche
 
 
 def test_the_pieces_that_a_split_wrote_are_those_of_the_check_run(tmp_path):
-    """Their holes are taken, and they are out of stock; what the job says is taken, too; weights between holes take none.
+    """Their holes are taken, they are out of stock; also what the job says is taken; weights between holes
+    take none.
 
     The table names no run: it is the only one, whatever its name.
     """

@@ -76,7 +76,10 @@ def test_a_ridge_multiplies_the_diagonal_of_the_normal_matrix(method, sigma):
     assert found.estimate.covariance is None
     assert sum("biases the estimate" in words for words in found.warnings) == 1
     residual = found.to_dict()["ridge"]["residual_rms"]
-    rms = [np.sqrt(np.mean((y - K @ x) ** 2)) / (sigma or 1.0) for x in (np.linalg.lstsq(K, y, None)[0], expected)]
+    rms = [
+        np.sqrt(np.mean((y - K @ x) ** 2)) / (sigma or 1.0)
+        for x in (np.linalg.lstsq(K, y, None)[0], expected)
+    ]
     assert [*residual.values()] == pytest.approx(rms, rel=1e-8)
 
 
