@@ -116,7 +116,7 @@ def inverse_roots(
         raise ValueError(
             "an error of zero is stated for a measured amplitude: repeat the reading or state one"
         )
-    thin = THIN**2 * (np.sqrt(low.clip(0) / high) < THIN) * (low + high)
+    thin = (THIN**2 * high - low).clip(0)  # without a step: digits often differ by a hundredth
     turned = turned + thin[..., None, None] * np.eye(2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(turned)) @ turn)
 
