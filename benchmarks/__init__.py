@@ -6,5 +6,5 @@ timed on either side), and the shortest of several calls counts. Nothing is writ
 folder. hsbalance, whose packages do not go with the others', runs in an environment and a process of its own
 on the same arrays.
 
-A benchmark is a module with a function `run() -> list[Row]`, listed in `benchmarks.__main__`.
+A benchmark is a module with `task() -> Row` or `run() -> list[Row]`, listed in `benchmarks.__main__`.
 """

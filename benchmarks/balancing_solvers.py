@@ -94,7 +94,6 @@ def run() -> list:
             )
             row = Row(
                 task=f"Weights, {method}, {N} readings, {P} planes",
-                ours="rotorid",
                 our_seconds=best_of(lambda: None, lambda _: solve(W, Y, method=method), 5 * REPEAT[N]),  # noqa: B023
                 peer="hsbalance",
                 peer_seconds=float(theirs[f"seconds {method}{N}"]),

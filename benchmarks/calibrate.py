@@ -78,7 +78,7 @@ def ours(rotor: fem.Rotor, data: RunReadings) -> np.ndarray:
     return calibrate(rotor, unknown, [data], side_starts=False).values
 
 
-def run() -> list[Row]:
+def task() -> Row:
     make = lambda: rotorid_rotor(table(), BEARING, gyroscopic=True)  # noqa: E731
     assert np.allclose([parameter_value(make(), path) for path in PATHS], TRUE)
     theirs = lambda: ross_rotor(table(), BEARING, gyroscopic=True)  # noqa: E731
@@ -87,16 +87,13 @@ def run() -> list[Row]:
     values = ours(make(), data)
     peer, other = once(theirs, lambda rotor: by_ross(rotor, read))
     pairs = ((values, TRUE), (other, TRUE), (values, other))
-    return [
-        Row(
-            task="calibration, 8 numbers of bearings, 2 × 4 × 5 effects",
-            ours="rotorid calibrate",
-            our_seconds=best_of(make, lambda rotor: ours(rotor, data), 5),
-            peer=f"{ROSS} in scipy least_squares",
-            peer_seconds=peer,
-            difference=max(relative_difference(a, b) for a, b in pairs),
-            allowed=1e-4,
-            required_ratio=1.0,
-            note="exact data; ROSS keeps its rotor",
-        )
-    ]
+    return Row(
+        task="calibration, 8 numbers of bearings, 2 × 4 × 5 effects",
+        our_seconds=best_of(make, lambda rotor: ours(rotor, data), 5),
+        peer=f"{ROSS} in scipy least_squares",
+        peer_seconds=peer,
+        difference=max(relative_difference(a, b) for a, b in pairs),
+        allowed=1e-4,
+        required_ratio=1.0,
+        note="exact data; ROSS keeps its rotor",
+    )

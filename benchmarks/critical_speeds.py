@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import fem
-from benchmarks.rotors import ROSS, Bearing, by_size, ross_rotor, rotorid_rotor, table
+from benchmarks.rotors import ROSS, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, relative_difference
 
 N = 5
@@ -45,22 +45,23 @@ def difference(modes: fem.Modes, modal: Any) -> float:
     return max(relative_difference(modes.frequencies, frequencies), float(np.abs(ours - shapes).max()))
 
 
+def make(times: int = 1) -> fem.Rotor:
+    return rotorid_rotor(table(times), Bearing())
+
+
+def ours(rotor: fem.Rotor) -> fem.Modes:
+    return fem.critical_speeds(rotor, n=N)
+
+
 def task() -> Row:
-    make, theirs = lambda: rotorid_rotor(table(), Bearing()), lambda: ross_rotor(table(), Bearing())
+    theirs = lambda: ross_rotor(table(), Bearing())  # noqa: E731
     return Row(
         task=f"{N} critical speeds and shapes, 23 elements",
-        ours="rotorid",
-        our_seconds=best_of(make, lambda rotor: fem.critical_speeds(rotor, n=N), 50),
+        our_seconds=best_of(make, ours, 50),
         peer=f"{ROSS} run_modal",
         peer_seconds=best_of(theirs, with_ross, 5),
-        difference=difference(fem.critical_speeds(make(), n=N), with_ross(theirs())),
+        difference=difference(ours(make()), with_ross(theirs())),
         allowed=1e-6,
         required_ratio=50.0,
         goal=120.0,
     )
-
-
-def run() -> list[Row]:
-    make = lambda times: rotorid_rotor(table(times), Bearing())  # noqa: E731
-    ours = lambda rotor: fem.critical_speeds(rotor, n=N)  # noqa: E731
-    return [task(), by_size(f"{N} critical speeds and shapes", make, ours)]

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import fem
-from benchmarks.timing import Row, best_of
 
 SIZES = {23: 1, 92: 4, 460: 20}  # elements, and how many each row of the table is cut into
 TABLE = Path(__file__).resolve().parents[1] / "sample_data" / "rotor23.csv"
@@ -106,9 +103,3 @@ def ross_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bool 
             damping = {"cxx": bearing.damping, "cyy": bearing.vertical_damping}
             bearings.append(ross.BearingElement(n=n, **stiffness, **damping))
     return ross.Rotor(shaft, discs, bearings)
-
-
-def by_size(task: str, make: Callable[[int], fem.Rotor], call: Callable[[fem.Rotor], object]) -> Row:
-    """Cost at 460 elements beside 5 times that at 92: at most linear, so the ratio is at least 1."""
-    few, many = (best_of(partial(make, SIZES[n]), call, 10) for n in (92, 460))
-    return Row(task, "460 elements", many, "5 × 92 elements", 5 * few, 0.0, 0.0, 1.0)

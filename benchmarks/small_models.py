@@ -73,7 +73,6 @@ def reduction() -> Row:
     ours, theirs = lambda: rotorid_rotor(rows, Bearing()), lambda: ross_rotor(rows, Bearing())
     return Row(
         task=f"Guyan reduction to {len(kept)} nodes",
-        ours="rotorid",
         our_seconds=best_of(ours, lambda rotor: our_guyan(rotor, kept), 30),
         peer=f"{ROSS} Guyan",
         peer_seconds=best_of(theirs, guyan_of_ross, 5),
@@ -93,7 +92,6 @@ def motion() -> Row:
     answer, largest = moved(make()), np.abs(finer).max()
     return Row(
         task="motion in time, 23 elements, 2001 instants",
-        ours="rotorid motion",
         our_seconds=best_of(make, moved, 5),
         peer=f"{ROSS} run_time_response",
         peer_seconds=peer,

@@ -16,4 +16,4 @@ def seconds(words: tuple[str, ...]) -> float:
 
 def run() -> list[Row]:
     peer = seconds(PEER)
-    return [Row(" ".join(w), "rotorid", seconds(w), PEER[1], peer, 0.0, 0.0, r) for w, r in TASKS.items()]
+    return [Row(" ".join(w), seconds(w), PEER[1], peer, 0.0, 0.0, r) for w, r in TASKS.items()]

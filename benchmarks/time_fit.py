@@ -103,23 +103,21 @@ def casadi_fit(model: OdeModel, record: Record, tolerance: float) -> Fit:
     return solve
 
 
-def loosest(peer: str, fit_with: Callable[[float], np.ndarray], optimum: np.ndarray) -> float:
-    """The loosest tolerance with which a peer comes close enough to the optimum."""
+def loosest(peer: str, fit_with: Callable[[float], Fit], optimum: np.ndarray) -> tuple[str, Fit]:
+    """A peer's fit with the loosest tolerance that comes close enough to the optimum, and its name."""
     for tolerance in 10.0 ** -np.arange(6, 13):
-        if relative_difference(fit_with(tolerance), optimum) <= ALLOWED:
-            return tolerance
+        if relative_difference((solve := fit_with(tolerance))(), optimum) <= ALLOWED:
+            return f"{peer} {tolerance:.0e}", solve
     raise RuntimeError(f"{peer} does not come within {ALLOWED:.0e} of the optimum")
 
 
-def beside(
-    task: str, ours: Fit, peer: str, theirs: Fit, optimum: np.ndarray, ratios: tuple[float, float]
-) -> Row:
+def beside(task: str, ours: Fit, peer: tuple[str, Fit], optimum: np.ndarray, *ratios: float) -> Row:
     """Two fits at equal accuracy, with the ratio required and the ratio aimed at."""
+    name, theirs = peer
     return Row(
         task=task,
-        ours="rotorid",
         our_seconds=best_of(lambda: None, lambda _: ours(), 20),
-        peer=peer,
+        peer=name,
         peer_seconds=best_of(lambda: None, lambda _: theirs(), 2),
         difference=relative_difference(ours(), optimum),
         allowed=ALLOWED,
@@ -135,35 +133,25 @@ def with_chain(casadi: bool = False) -> Row:
     record = read_record(folder / "record.csv", model)
     ours = lambda: fit(model, record).values  # noqa: E731
     if casadi:
-        tolerance = loosest("casadi", lambda rtol: casadi_fit(model, record, rtol)(), F_OPTIMUM)
-        theirs, peer, ratios = (
-            casadi_fit(model, record, tolerance),
-            f"casadi, cvodes {tolerance:.0e}",
-            (1.0, 4.0),
-        )
+        peer, ratios = loosest("casadi, cvodes", partial(casadi_fit, model, record), F_OPTIMUM), (1.0, 4.0)
     else:
-        lmfit = partial(with_lmfit, model, record, chain_rates)
-        tolerance = loosest("lmfit", lmfit, F_OPTIMUM)
-        theirs, peer, ratios = (
-            partial(lmfit, tolerance),
-            f"lmfit, solve_ivp rtol {tolerance:.0e}",
-            (10.0, 40.0),
-        )
-    return beside("Fit of [F], linear, 3 parameters", ours, peer, theirs, F_OPTIMUM, ratios)
+        lmfit = partial(partial, with_lmfit, model, record, chain_rates)
+        peer, ratios = loosest("lmfit, solve_ivp rtol", lmfit, F_OPTIMUM), (10.0, 40.0)
+    return beside("Fit of [F], linear, 3 parameters", ours, peer, F_OPTIMUM, *ratios)
 
 
 def with_duffing() -> list[Row]:
     with patch.dict("sys.modules", heyoka=None):  # as if not installed
         plain, record = duffing()
         optimum = fit(plain, record, integrator="dop853", rtol=1e-12).values
-        lmfit = partial(with_lmfit, plain, record, duffing_rates)
-        tolerance = loosest("lmfit", lmfit, optimum)
-        theirs, peer = partial(lmfit, tolerance), f"lmfit, solve_ivp rtol {tolerance:.0e}"
+        peer = loosest(
+            "lmfit, solve_ivp rtol", partial(partial, with_lmfit, plain, record, duffing_rates), optimum
+        )
         task, ours = "Fit of a Duffing oscillator", lambda: fit(plain, record).values
-        without = beside(f"{task}, without the extra", ours, peer, theirs, optimum, (0.9, 3.0))
+        without = beside(f"{task}, without the extra", ours, peer, optimum, 0.9, 3.0)
     model, record = duffing()
     compiled = lambda: fit(model, record, integrator="taylor").values  # noqa: E731
-    return [without, beside(task, compiled, peer, theirs, optimum, (10.0, 10.0))]
+    return [without, beside(task, compiled, peer, optimum, 10.0, 10.0)]
 
 
 task = with_chain

@@ -20,7 +20,6 @@ class Row:
     """One line of the table."""
 
     task: str
-    ours: str
     our_seconds: float
     peer: str
     peer_seconds: float

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import fem
-from benchmarks.rotors import ROSS, SIZES, Bearing, by_size, ross_rotor, rotorid_rotor, table
+from benchmarks.rotors import ROSS, SIZES, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, relative_difference
 
 BEARING = Bearing(damping=2e4)
@@ -41,7 +41,6 @@ def task() -> Row:
     theirs = lambda: ross_rotor(table(), BEARING)  # noqa: E731
     return Row(
         task="unbalance response, 4 × 6 × 1000, 23 elements",
-        ours="rotorid",
         our_seconds=best_of(make, ours, 50),
         peer=f"{ROSS} transfer_matrix",
         peer_seconds=best_of(theirs, with_ross, 2),
@@ -50,7 +49,3 @@ def task() -> Row:
         required_ratio=1000.0,
         goal=1500.0,
     )
-
-
-def run() -> list[Row]:
-    return [task(), by_size("unbalance response", make, ours)]
