@@ -9,6 +9,7 @@ import argparse
 import importlib
 import os
 import platform
+from importlib.metadata import version
 from pathlib import Path
 
 TASKS = ("critical_speeds", "unbalance_response", "campbell", "balancing_solvers", "time_fit")
@@ -35,11 +36,8 @@ def main() -> int:
     options = parser.parse_args()
     if unknown := set(options.names) - set(EVERYTHING):
         parser.error(f"no benchmark is called {min(unknown)!r}; there are: {', '.join(EVERYTHING)}")
-    import numpy
-    import scipy
-
     print(__import__("benchmarks").__doc__)
-    versions = f"NumPy {numpy.__version__}, SciPy {scipy.__version__}"
+    versions = f"NumPy {version('numpy')}, SciPy {version('scipy')}"
     machine = f"Python {platform.python_version()}, {versions}, {os.cpu_count()} processors"
     print(f"{machine}\n")
     print(f"{'task':58}{'ms':>9}  {'peer':29}{'ms':>10}{'ratio':>9}{'needed':>8}{'difference':>12}")

@@ -1,14 +1,10 @@
 """Correction weights against hsbalance: least squares and min–max, arrays in, weights out.
 
-hsbalance (with CVXPY) lives in an environment that `make .venv-hsbalance/.peer` makes;
-ROTORID_HSBALANCE_PYTHON names another Python that has it. This module is started there as a script with a
-file of the problems, solves each with hsbalance's public classes (`LeastSquares(A, alpha).solve()`,
-`Min_max(A, alpha).solve()`; making `Alpha` is not timed), and writes its weights and the shortest time of
-several calls. Both programs run alone, one after the other, with one BLAS thread. The objectives of both
-programs' weights are compared.
-
-CVXPY takes the solver XPRESS for these problems wherever it is installed, whose free licence refuses problems
-of these sizes: the environment is made without it, and CVXPY then takes its default solver.
+hsbalance (with CVXPY) lives in an environment that `make .venv-hsbalance/.peer` makes, without the solver
+XPRESS, whose free licence refuses these sizes; ROTORID_HSBALANCE_PYTHON names another Python that has it.
+This module runs there as a script that solves each problem with hsbalance's public classes (making `Alpha`
+is not timed) and writes its weights and the shortest time of several calls. Both programs run alone, one
+after the other, with one BLAS thread. The objectives of both programs' weights are compared.
 """
 
 from __future__ import annotations
@@ -66,9 +62,7 @@ def peer(file: str) -> None:
 def of_peer() -> dict[str, np.ndarray]:
     python = Path(os.environ.get("ROTORID_HSBALANCE_PYTHON", ".venv-hsbalance/bin/python"))
     if not python.exists():
-        raise FileNotFoundError(
-            f"there is no Python with hsbalance at {python}: `make {python.parents[1]}/.peer`"
-        )
+        raise FileNotFoundError(f"no Python with hsbalance at {python}: `make {python.parents[1]}/.peer`")
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with tempfile.TemporaryDirectory() as folder:
         command = [str(python), str(Path(__file__).resolve()), f"{folder}/answers.npz"]

@@ -61,7 +61,6 @@ def task() -> Row:
         peer=f"{ROSS} run_modal",
         peer_seconds=best_of(theirs, with_ross, 5),
         difference=difference(ours(make()), with_ross(theirs())),
-        allowed=1e-6,
         required_ratio=50.0,
         goal=120.0,
     )

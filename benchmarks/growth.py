@@ -60,7 +60,7 @@ def grown(task: str, of: str, sizes: tuple[int, int], work: int, seconds: Callab
     (few, many), times = map(seconds, sizes), sizes[1] // sizes[0]
     task = f"{task}, {sizes[1]:,} {of}: exponent {np.log(many / few) / np.log(times):.2f}"
     smaller = f"{times**work} × {sizes[0]:,} {of}"
-    return Row(task, many, smaller, times**work * few, 0.0, 0.0, 0.8)
+    return Row(task, many, smaller, times**work * few, 0.0, required_ratio=0.8)
 
 
 def run() -> list[Row]:

@@ -14,9 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import fem
 
 SIZES = {23: 1, 92: 4, 460: 20}  # elements, and how many each row of the table is cut into
+INERTIA = np.array((0.2**2 / 2, 0.2**2 / 4))
+"""Polar and diametral, of a thin disc of 1 kg, 0.4 m in diameter, kg·m²."""
 TABLE = Path(__file__).resolve().parents[1] / "sample_data" / "rotor23.csv"
 
 
@@ -71,18 +75,13 @@ def rotorid_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bo
         length=[row["length_m"] for row in rows],
         outer_diameter=[row["diameter_m"] for row in rows],
         discs=[
-            fem.Disc(n, row["mass_kg"], *(inertias(row["mass_kg"]) if gyroscopic else ()))
+            fem.Disc(n, row["mass_kg"], *(row["mass_kg"] * INERTIA if gyroscopic else ()))
             for n, row in enumerate(rows, 1)
             if row["mass_kg"]
         ],
         supports=supports,
         model=fem.Model(rotary_inertia=gyroscopic, gyroscopic=gyroscopic),
     )
-
-
-def inertias(mass: float) -> tuple[float, float]:
-    """Polar and diametral inertia of a thin disc of this mass, 0.4 m in diameter, kg·m²."""
-    return mass * 0.2**2 / 2, mass * 0.2**2 / 4
 
 
 def ross_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bool = False) -> Any:
@@ -95,7 +94,7 @@ def ross_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bool 
     discs, bearings = [], []
     for n, row in enumerate(rows):
         if row["mass_kg"]:
-            polar, diametral = inertias(row["mass_kg"]) if gyroscopic else (0.0, 0.0)
+            polar, diametral = row["mass_kg"] * gyroscopic * INERTIA
             discs.append(ross.DiskElement(n=n, m=row["mass_kg"], Id=diametral, Ip=polar))
         if k := row["support_stiffness_N_per_m"]:
             turn = bearing.cross * k

@@ -1,12 +1,12 @@
 """Fits to time records against lmfit with SciPy's `solve_ivp`, both started at the same values.
 
-The chain of three masses of [F] (251 samples of six states, three parameters) and a Duffing oscillator (201
-samples of two states). lmfit minimises with Levenberg–Marquardt and finite differences, its usual way; its
+The chain of three masses of [F] (251 samples of six states, three parameters), a Duffing oscillator and a
+pendulum (201 samples of two states). lmfit minimises with Levenberg–Marquardt and finite differences; its
 integration has the loosest of the tolerances 1e-6, 1e-7, … with which its parameters come within 2e-6 of the
-least-squares optimum: that of [F] is known to its eight printed digits, that of the oscillator from an
-integration with tolerance 1e-12. CasADi integrates [F] with CVODES and its forward sensitivities, and takes
-full Gauss–Newton steps; the same rule for its tolerance. The time to read and compile the model belongs to
-reading its file and is not counted. The oscillator is fitted with the extra `rotorid[fast]` and without it.
+optimum: that of [F] is known to its eight printed digits, that of the oscillators from an integration with
+tolerance 1e-12. CasADi integrates [F] with CVODES and its forward sensitivities, and takes full Gauss–Newton
+steps; the same rule for its tolerance. Reading and compiling the model is not counted. The oscillators are
+fitted with the extra `rotorid[fast]` and without it.
 """
 
 from __future__ import annotations
@@ -45,12 +45,26 @@ def duffing_rates(t: float, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     return np.array([x[1], -k * x[0] - b * x[0] ** 3 - d * x[1] + 0.3 * np.cos(1.2 * t)])
 
 
-def duffing() -> tuple[OdeModel, Record]:
+def pendulum_rates(t: float, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    k, d = theta
+    return np.array([x[1], -k * np.sin(x[0]) - d * x[1]])
+
+
+OSCILLATORS = {
+    "Duffing oscillator": (duffing_rates, "-k*x - b*x**3 - d*v + 0.3*cos(1.2*t)", (1.0, 0.5, 0.1)),
+    "pendulum": (pendulum_rates, "-k*sin(x) - d*v", (1.0, 0.1)),
+}
+"""Rates, the same as an expression, and the true parameters."""
+START = {"k": 0.9, "b": 0.6, "d": 0.15}
+
+
+def oscillator(name: str) -> tuple[OdeModel, Record]:
     """The model, and its exact record over 20 s with errors of 1e-3."""
-    equations = {"x": "v", "v": "-k*x - b*x**3 - d*v + 0.3*cos(1.2*t)"}
-    model = ode_model(equations, initial={"x": 1.0, "v": 0.0}, estimate={"k": 0.9, "b": 0.6, "d": 0.15})
+    rates, expression, true = OSCILLATORS[name]
+    estimate = {parameter: START[parameter] for parameter in START if f"{parameter}*" in expression}
+    model = ode_model({"x": "v", "v": expression}, initial={"x": 1.0, "v": 0.0}, estimate=estimate)
     t, start = np.linspace(0.0, 20.0, 201), model.x0(model.start)[:, 0]
-    exact = simulated(duffing_rates, start, t, [1.0, 0.5, 0.1], method="DOP853", rtol=1e-12, atol=1e-12)
+    exact = simulated(rates, start, t, true, method="DOP853", rtol=1e-12, atol=1e-12)
     noise = 1e-3 * np.random.default_rng(5).standard_normal(exact.shape)
     return model, Record(t, dict(zip(model.states, exact + noise, strict=True)))
 
@@ -140,22 +154,22 @@ def with_chain(casadi: bool = False) -> Row:
     return beside("Fit of [F], linear, 3 parameters", ours, peer, F_OPTIMUM, *ratios)
 
 
-def with_duffing() -> list[Row]:
+def with_oscillator(name: str) -> list[Row]:
     with patch.dict("sys.modules", heyoka=None):  # as if not installed
-        plain, record = duffing()
+        plain, record = oscillator(name)
         optimum = fit(plain, record, integrator="dop853", rtol=1e-12).values
-        peer = loosest(
-            "lmfit, solve_ivp rtol", partial(partial, with_lmfit, plain, record, duffing_rates), optimum
-        )
-        task, ours = "Fit of a Duffing oscillator", lambda: fit(plain, record).values
-        without = beside(f"{task}, without the extra", ours, peer, optimum, 0.9, 3.0)
-    model, record = duffing()
+        lmfit = partial(partial, with_lmfit, plain, record, OSCILLATORS[name][0])
+        peer = loosest("lmfit, solve_ivp rtol", lmfit, optimum)
+        ours = lambda: fit(plain, record).values  # noqa: E731
+        without = beside(f"Fit of a {name}, without the extra", ours, peer, optimum, 0.9, 3.0)
+    model, record = oscillator(name)
     compiled = lambda: fit(model, record, integrator="taylor").values  # noqa: E731
-    return [without, beside(task, compiled, peer, optimum, 10.0, 10.0)]
+    return [without, beside(f"Fit of a {name}", compiled, peer, optimum, 10.0, 10.0)]
 
 
 task = with_chain
 
 
 def run() -> list[Row]:
-    return [with_chain(), with_chain(casadi=True), *with_duffing()]
+    oscillators = [row for name in OSCILLATORS for row in with_oscillator(name)]
+    return [with_chain(), with_chain(casadi=True), *oscillators]

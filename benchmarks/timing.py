@@ -24,8 +24,8 @@ class Row:
     peer: str
     peer_seconds: float
     difference: float  # relative, between the two answers
-    allowed: float
-    required_ratio: float
+    allowed: float = 1e-6
+    required_ratio: float = 1.0
     note: str = ""
     goal: float = 0.0
     """A ratio that is aimed at: below it the row says so, and nothing fails."""
