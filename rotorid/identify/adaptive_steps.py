@@ -184,7 +184,7 @@ def taylor(model: OdeModel) -> Callable[[System], FloatArray | None]:
 
     def solve(system: System) -> FloatArray | None:
         t, u, values = system.t, system.u, system.theta
-        whole = system if system.k else System(model, values, t, u, True)
+        whole = system if system.k else System(model, values, system.record, True)
         x, p = first_sizes(whole)[:, None], np.where(values == 0, 1.0, np.abs(values))
         scale, options = x / [1.0, *p], {"max_steps": 20_000, "max_delta_t": _longest_step(system)}
 

@@ -75,7 +75,7 @@ class Compiled:
         """Values at many points: arguments of shape `batch` or numbers; the result is batch + shape."""
         out = np.zeros((*batch, self.size))
         with np.errstate(all="ignore"):
-            for place, value in zip(self.places, self._vector(*arguments), strict=True):
+            for place, value in zip(self.places, self.vector(*arguments), strict=True):
                 out[..., place] = value
         return out.reshape(*batch, *self.shape)
 
@@ -92,7 +92,8 @@ class Compiled:
         return out.reshape(self.shape)
 
     @cached_property
-    def _vector(self) -> Callable[..., Any]:
+    def vector(self) -> Callable[..., Any]:
+        """Values of those that are not zero, at `places`, each for numbers or arrays of one shape."""
         return self._lambdified("numpy", {"RealAbs": np.abs, "RealSign": np.sign})
 
     @cached_property

@@ -24,9 +24,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled
 from rotorid.identify.ode import OdeModel, SimulationError
+from rotorid.identify.records import Record, inputs_of
 
-SAME_STEP = 4e-15
-"""Steps that differ by less than this share of the largest time are one step (rounded times)."""
 UNROLLED = 300
 """Products in f_x S below which they are written out."""
 BATCH = 2**18
@@ -46,16 +45,17 @@ class System:
     ----------
     model, theta
         The model and its parameters (n_p,).
-    t, u
+    record
         Times (n,) and inputs (n, n_u), straight lines between samples.
     sensitivities
         Whether S is part of the system.
     """
 
     def __init__(
-        self, model: OdeModel, theta: FloatArray, t: FloatArray, u: FloatArray, sensitivities: bool
+        self, model: OdeModel, theta: FloatArray, record: Record, sensitivities: bool
     ) -> None:
-        self.model, self.theta, self.t, self.u = model, theta, t, u
+        self.model, self.theta, self.record = model, theta, record
+        self.t, self.u = record.t, inputs_of(model, record)
         self.k = len(theta) if sensitivities else 0
         self.first = model.x0(theta)[:, : 1 + self.k]
         """z at the first time."""
@@ -97,38 +97,40 @@ def written_out(model: OdeModel, k: int) -> Compiled | None:
 
 def exact(system: System) -> FloatArray:
     """States and sensitivities (n, n_x, 1 + k) of a linear model; not finite where they overflow."""
-    model, t, k = system.model, system.t, system.k
     from scipy.linalg import expm
 
-    n, nu, tables = len(model.states), system.u.shape[1], model.matrices(system.theta)[: 1 + k]
+    n, nu = len(system.first), system.u.shape[1]
+    tables = system.model.matrices(system.theta)[: 1 + system.k]
     sizes = np.abs(tables).max(axis=(1, 2))
-    moving = 1 + np.flatnonzero(sizes[1:])
+    moving, still = (1 + np.flatnonzero(each) for each in (sizes[1:] != 0, sizes[1:] == 0))
     # A_j as large as A: larger ones would cost digits
-    scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))
+    scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))[:, None, None]
     m = n * (1 + len(moving))
     M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
-    M[:m, :m] = np.kron(np.eye(m // n), tables[0, :, :n])
-    parts = np.concatenate([tables[:1], tables[moving] * scale[:, None, None]]).reshape(m, -1)
-    M[n:m, :n], M[:m, m : m + 1 + nu] = parts[n:, :n], parts[:, n:]
+    parts = np.concatenate([tables[:1], tables[moving] * scale]).reshape(m, -1)
+    M[:m, :n], M[:m, m : m + 1 + nu] = parts[:, :n], parts[:, n:]
+    for low in range(n, m, n):
+        M[low : low + n, low : low + n] = tables[0, :, :n]
     M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
-    steps, z = np.diff(t), np.zeros((len(t), n, 1 + k))
-    # of steps that differ by rounding the mean is taken: an error of one would add up over the record
-    kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(t).max()))
-    _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
-    lengths = steps[one] + np.bincount(which, steps - steps[one][which]) / count
-    z[0], size = system.first, max(1, BATCH // M.size)
-    w = np.column_stack([np.ones(len(steps)), system.u[:-1], np.diff(system.u, axis=0) / steps[:, None]])
-    for low in range(0, len(steps), size):
-        back = slice(low, min(low + size, len(steps)))
-        rows, (used, place) = slice(low + 1, back.stop + 1), np.unique(which[back], return_inverse=True)
-        P = expm(lengths[used][:, None, None] * M)
-        P = P[place] if len(P) > 1 else P
-        driven = P[:, :m, m:] @ w[back, :, None]
-        z[rows, :, :1] = recurrence(P[:, :n, :n], z[low, :, :1], driven[:, :n])
-        bent = (P[:, n:m, :n] @ z[back, :, :1] + driven[:, n:]).reshape(len(place), -1, n)
-        z[rows, :, moving] = (bent / scale[:, None]).swapaxes(1, 2)
-        z[rows, :, 1:] = recurrence(P[:, :n, :n], z[low, :, 1:], z[rows, :, 1:])
-    return z
+    lengths, which = system.record.steps
+    slopes = np.diff(system.u, axis=0) / lengths[which, None]
+    z = np.zeros((1 + system.k, n, len(system.t)))
+    z[..., 0], size = system.first.T, max(1, BATCH // (M.size if len(lengths) > 1 else len(M)))
+    for low in range(0, len(which), size):
+        back = slice(low, min(low + size, len(which)))
+        rows, (used, place) = slice(low + 1, back.stop + 1), (slice(1), slice(1))
+        if len(lengths) > 1:
+            used, place = np.unique(which[back], return_inverse=True)
+        P = expm(lengths[used, None, None] * M)[place]
+        push = P[:, : m + 1, m + 1 :] @ np.hstack((system.u[back], slopes[back]))[..., None]
+        first = [*z[0, :, low], *(z[moving, :, low, None] * scale).ravel(), 1.0]
+        solved = recurrence(P[:, : m + 1, : m + 1], np.array(first)[:, None], push)[..., 0].T
+        z[0, :, rows] = solved[:n]
+        z[moving, :, rows] = solved[n:m].reshape(len(moving), n, len(push)) / scale
+        if still.size:
+            push = np.zeros((len(push), n, len(still)))
+            z[still, :, rows] = recurrence(P[:, :n, :n], z[still, :, low].T, push).T
+    return z.T
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
@@ -137,18 +139,22 @@ def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray
     P is (n, m, m), or one for all, which then multiplies all steps at once.
     """
     n, m, k = push.shape
-    y, span = push.copy(), 1
-    y[0] += P[0] @ first
-    flat = y.swapaxes(0, 1).reshape(m, -1)
-    while span < n:
-        if len(P) > 1:
+    span = 1
+    if len(P) > 1:
+        y = push.copy()
+        y[0] += P[0] @ first
+        while span < n:
             y[span:] += P[span:] @ y[:-span]
             P = np.concatenate([P[:span], P[span:] @ P[:-span]])
-        else:
-            flat[:, span * k :] += P[0] @ flat[:, : -span * k]
-            P = P @ P
-        span *= 2
-    return y if len(P) > 1 else flat.reshape(m, n, k).swapaxes(0, 1)
+            span *= 2
+        return y
+    flat, driven = push.swapaxes(0, 1).copy().reshape(m, -1), push.any()
+    flat[:, :k] += P[0] @ first
+    while span < n:
+        new = flat[:, span * k :] if driven else flat[:, span * k : 2 * span * k]
+        new += P[0] @ flat[:, : new.shape[1]]
+        P, span = P @ P, 2 * span
+    return flat.reshape(m, n, k).swapaxes(0, 1)
 
 
 def heun_step(

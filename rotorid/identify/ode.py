@@ -90,6 +90,23 @@ class OdeModel:
         """Outputs, then their derivatives by states and parameters, (*B, n_y, 1 + n_x + n_p)."""
         return self._values("observed", t, x, theta, u)
 
+    def outputs_of(
+        self, t: FloatArray, x: FloatArray, S: FloatArray, theta: FloatArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Outputs (n, n_y) and their derivatives by the parameters (n, n_y, k), of states and theirs, S."""
+        n, k = x.shape[1], S.shape[2]
+        y, y_theta = np.zeros((len(self.outputs), len(t))), np.zeros((k, len(self.outputs), len(t)))
+        table = self._compiled("observed", self.symbols, 1)
+        for place, value in zip(table.places, table.vector(t, *x.T, *theta, *u.T), strict=True):
+            j, i = divmod(int(place), table.shape[1])
+            if i == 0:
+                y[j] = value
+            elif i <= n:
+                y_theta[:, j] += value * S[:, i - 1].T
+            elif k:
+                y_theta[i - 1 - n, j] += value
+        return y.T, y_theta.T
+
     def x0(self, theta: ArrayLike) -> FloatArray:
         """Initial states, then their derivatives by the parameters, (n_x, 1 + n_p)."""
         return self._alone("initial", theta)

@@ -95,12 +95,12 @@ class Problem:
         self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
         self.series: list[tuple[str, slice]] = []
         """Words for each output of a record, and its rows."""
-        n, low, high, places = len(outputs), 0, 0, list[IntArray]()
+        low, high, places = 0, 0, list[IntArray]()
         for record, table in zip(records, self.measured, strict=True):
             seen = ~np.isnan(table)
             seen[:1, self.model.fixed_at_first] = False
             for j, name in enumerate(outputs):
-                places.append(low + n * np.flatnonzero(seen[:, j]) + j)
+                places.append(low + j * len(record) + np.flatnonzero(seen[:, j]))
                 words, size = f"{name} in {record.name}" if len(records) > 1 else name, len(places[-1])
                 self.series += [(words, slice(high, high + size))] * (size > 0)
                 high += size
@@ -108,7 +108,7 @@ class Problem:
         if not high:
             raise ValueError("the records have no samples of an output beside those that known values fix")
         self.places = np.concatenate(places)
-        """Of the rows in the samples of all outputs at the first time of the first record, at the next, …"""
+        """Of the rows in the samples of the first output of the first record, of the next, …"""
         self.scale = np.ones(high)
         sigma = self.vector([_table(record.sigma or {}, outputs, len(record)) for record in records])
         self.stated = not np.isnan(sigma).all()
@@ -128,12 +128,14 @@ class Problem:
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
-        flat = np.concatenate([table.reshape(-1, *table.shape[2:]) for table in tables])
-        return (flat[self.places].T * self.scale).T
+        flat = [table.T.reshape(*table.shape[:1:-1], table.shape[0] * table.shape[1]) for table in tables]
+        rows = np.concatenate(flat, axis=-1).take(self.places, axis=-1)
+        rows *= self.scale
+        return rows.T
 
     def by_time(self, columns: Sequence[FloatArray]) -> FloatArray:
         """What belongs to the times of each record, (n,), as rows without weights."""
-        return np.repeat(np.concatenate(columns), len(self.model.outputs))[self.places]
+        return np.concatenate([np.tile(c, len(self.model.outputs)) for c in columns])[self.places]
 
     def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals (m,) and derivatives (m, n).
@@ -191,7 +193,7 @@ class Problem:
 
 def _table(columns: Mapping[str, float | FloatArray], outputs: Sequence[str], samples: int) -> FloatArray:
     """Columns of the outputs, (samples, n_y), NaN where there are none."""
-    return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs], axis=-1)
+    return np.stack([np.broadcast_to(columns.get(n, np.nan), samples) for n in outputs]).T
 
 
 def negligible(size: FloatArray, theta: FloatArray, step: Estimate, limits: tuple[float, float]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +16,8 @@ from rotorid.identify.ode import OdeModel
 
 T = TypeVar("T")
 SECONDS = Shown("time, s")
+SAME_STEP = 4e-15
+"""Steps that differ by less than this share of the largest time are one step (rounded times)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,15 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @cached_property
+    def steps(self) -> tuple[FloatArray, IntArray]:
+        """Lengths of the kinds of steps from sample to sample, s, and the kind of each step, (n − 1,)."""
+        steps = np.diff(self.t)
+        # of steps that differ by rounding the mean is taken: an error of one would add up over the record
+        kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(self.t).max()))
+        _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
+        return steps[one] + np.bincount(which, steps - steps[one][which]) / count, which
 
 
 def refined(record: Record, every: int) -> tuple[Record, IntArray]:

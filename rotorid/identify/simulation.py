@@ -106,20 +106,17 @@ def simulate(
         raise ValueError(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
-    t, u, n = given.t, inputs_of(model, given), len(model.states)
-    system, used = System(model, values, t, u, sensitivities), "none"
-    table = np.zeros((len(t), n, 1 + len(values)))
+    t, n = given.t, len(model.states)
+    system, used = System(model, values, given, sensitivities), "none"
+    table = np.zeros((len(t), n, 1 + system.k))
     if n:
-        solved, used = _solved(system, integrator, rtol)
-        _check(model, t, solved)
-        table[..., : 1 + system.k] = solved
+        table, used = _solved(system, integrator, rtol)
+        _check(model, t, table)
     x, S = table[..., 0], table[..., 1:]
-    outputs = model.h(t, x, values, u)
-    y, y_theta = outputs[..., 0], outputs[..., 1 : 1 + n] @ S + outputs[..., 1 + n :]
-    y_theta = y_theta if sensitivities else np.zeros_like(y_theta)
-    bad = ~(np.isfinite(y) & np.isfinite(y_theta).all(axis=-1))
-    if bad.any():
-        i, j = np.argwhere(bad)[0]
+    y, y_theta = model.outputs_of(t, x, S, values, system.u)
+    if not system.k:
+        S, y_theta = (np.zeros((len(t), each, len(values))) for each in (n, y.shape[1]))
+    for i, j in np.argwhere(~np.isfinite(y + y_theta.sum(axis=-1)))[:1]:
         raise SimulationError(
             f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
             "the output"
@@ -159,7 +156,7 @@ def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, s
 
 def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
     """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the first time."""
-    if np.abs(table).max() < LARGEST:
+    if -LARGEST < table.min(initial=0) <= table.max(initial=0) < LARGEST:
         return
     largest = np.append(LARGEST, np.full(table.shape[2] - 1, np.inf))
     lost = np.logical_not(np.abs(table) < largest)
