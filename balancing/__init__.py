@@ -31,6 +31,7 @@ from balancing.influence import (
     match_speeds,
 )
 from balancing.iso21940 import GRADES, Tolerance, tolerance
+from balancing.limits_and_minmax import InfeasibleError
 from balancing.methods import METHODS, Solution, solve
 from balancing.pass_or_fail import (
     Verdict,
@@ -70,6 +71,7 @@ __all__ = [
     "Gaussian",
     "Groups",
     "Holes",
+    "InfeasibleError",
     "Influence",
     "Labels",
     "Lag",

@@ -135,6 +135,11 @@ class Mounted(Answered):
             f"Pieces in {labels.weight_in}, {stays}:",
             *(f"  {line}" for line in self.in_planes()),
             f"{capital(labels.turning_in_words())}: {self._first_holes()}.",
+            *(
+                []
+                if self.discrete.enough
+                else [f"No set of pieces is enough: these are the fewest that leave {FEW} times the least."]
+            ),
             "",
             f"Largest left{largest_readings(labels, c.speeds, c.sensors, c.before, self.after)}",
             f"Weights at any angle: {c.in_words()}; rms {free} {unit}".rstrip() + ".",
@@ -142,10 +147,6 @@ class Mounted(Answered):
         fewer = map(self._left, self.discrete.fewer)
         less = [f"{one['pieces']} → {three_figures(one['rms_after'])}" for one in fewer]
         lines += [f"With fewer pieces, rms{unit and f' in {unit}'}: {', '.join(less)}."] if less else []
-        if not self.discrete.enough:
-            lines.append(
-                f"No set of pieces is enough: these are the fewest that leave {FEW} times the least."
-            )
         return Answer(
             f"{first} {left}.",
             "\n".join(lines),

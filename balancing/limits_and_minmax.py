@@ -219,9 +219,7 @@ def smallest_maximum(bounds: Bounds, shares: FloatArray, tolerance: float = TOLE
     def objective(weights: ComplexArray) -> float:
         return float((shares * np.abs(Y + W @ weights)).max())
 
-    start = _shortened(_levelled(rows, shares * Y), bounds.max_weight)
-    if objective(start) >= objective(none):
-        start = none
+    start = min(none, _shortened(_levelled(rows, shares * Y), bounds.max_weight), key=objective)
     unit = objective(start)
     if unit <= 1e-12 * objective(none):
         if within(bounds, start):  # nothing is left to minimise

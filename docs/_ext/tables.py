@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Sequence
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
@@ -12,6 +12,7 @@ from pieces import table
 from sphinx.util.docutils import SphinxDirective
 
 from rotorid.base.text import sentence
+from rotorid.files.settings import settings_schema
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -36,22 +37,20 @@ class Methods(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """One row per method."""
-        module, name = self.arguments
-        methods = getattr(import_module(module), name)
+        methods = resolve_name(":".join(self.arguments))
         rows = [(f"`{method.name}`", sentence(method.about)) for method in methods]
         return [table(("name", "what it does"), rows)]
 
 
 def settings_of(words: Sequence[str]) -> Any:  # noqa: ANN401  a model of pydantic
     """Typed settings by the name of their module and their own, or of a table of them and their kind."""
-    module, _, name = words[0].rpartition(".")
-    value = getattr(import_module(module), name)
+    value = resolve_name(words[0])
     return value[words[1]] if words[1:] else value
 
 
 def key_lines(settings: Any) -> list[tuple[str, str, str]]:  # noqa: ANN401  a model of pydantic
     """Names of each key as a file writes them, what it means, and how its values are written."""
-    schema = settings.model_json_schema()["properties"]
+    schema = settings_schema(settings, "")["properties"]
     lines = []
     for name, field in settings.model_fields.items():
         key = settings.known_keys()[field.alias or name]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import LINES, Answer, kinds, together
 from rotorid.base.tables import Table
-from rotorid.base.text import sentence
 from rotorid.commands.balance_after_check import as_proposed, left_to_do
 from rotorid.commands.balance_options import BalanceOptions as BalanceOptions
 from rotorid.commands.balance_options import (
@@ -20,6 +19,7 @@ from rotorid.commands.balance_options import (
     job_of,
     solve,
     special,
+    with_more_warnings,
     with_other_conventions,
 )
 from rotorid.commands.choice_of_coefficients import (
@@ -96,7 +96,7 @@ class Balance(Outcome):
         if left is not None:  # the weights of the bare rotor are tables
             first = [one.judgement for one in (left.answer, *limits)]
             if check is not None:
-                first += [check.headline] if check.explained else [check.headline, sentence(check.verdict)]
+                first.append(check.headline if check.explained else check.answer.judgement)
             if job.check_pieces is not None:
                 pieces = job.check_pieces.in_holes()
                 first.append(f"Taken to be mounted, by --split: {pieces}; else state check_weights.")
@@ -117,8 +117,14 @@ class Balance(Outcome):
 
     def to_dict(self) -> dict[str, Any]:
         """The keys of the correction, and those of what is beside it."""
-        parts: dict[str, Any] = {"mounting": self.mounted, "check": self.check, "left_to_do": self.left}
-        parts |= {"verdict": self.verdict, "of_type": self.of_type, "zones": self.zones}
+        parts: dict[str, Any] = {
+            "mounting": self.mounted,
+            "check": self.check,
+            "left_to_do": self.left,
+            "verdict": self.verdict,
+            "of_type": self.of_type,
+            "zones": self.zones,
+        }
         document: dict[str, Any] = self.result.to_dict()
         judgement, scale = document["judgement"], self.result.labels.vibration_scale
         if (left := self.left) is not None:  # what is mounted is not to be mounted again
@@ -267,9 +273,8 @@ def corrected(
         trim = mounted if options.refine else None
         left = left_to_do(solved._replace(result=result), read, options, check, verdict, trim)
         result = _also_warned(result, left.correction)
-    zones = None
-    if read.zones:
-        zones = zones_of(result, read.zones, None if mounted is None else mounted.after, read.check)
+    after = None if mounted is None else mounted.after
+    zones = zones_of(result, read.zones, after, read.check) if read.zones else None
     made = provenance(read.files if solved.of_type is None else solved.of_type.files, options)
 
     def workbook(_: Path) -> Written:
@@ -316,8 +321,7 @@ def _also_warned(result: Correction, counted: Correction) -> Correction:
         for words in counted.warnings[len(counted.contradictions) :]
         if len(kinds((*warned, words))) > len(kinds(warned))
     ]
-    decision = replace(result.decision, warnings=(*result.decision.warnings, *more))
-    return replace(result, decision=decision)
+    return with_more_warnings(result, *more)
 
 
 def _trim_tables(left: LeftToDo, labels: Labels) -> list[str]:
@@ -334,8 +338,8 @@ def _trim_tables(left: LeftToDo, labels: Labels) -> list[str]:
 
 
 def _behind(answer: Answer) -> Answer:
-    """An answer whose tables come after all others'."""
-    return replace(answer, numbers="", tables=(answer.numbers, *answer.tables))
+    """An answer whose tables come after all others', without the largest readings that its weights leave."""
+    return replace(answer, numbers="", tables=(answer.numbers.rpartition("\n\n")[0], *answer.tables))
 
 
 def _picture(made: Balance) -> Figure:
@@ -347,8 +351,8 @@ def _picture(made: Balance) -> Figure:
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance:
     """Tolerance of one or two planes."""
-    grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
-    if grade is None or weight is None or speed is None:
+    stated = [getattr(options, name) for name in _TOLERANCE]
+    if None in stated:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
     if len(planes) > 2:
         raise ValueError(
@@ -358,8 +362,11 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance:
 
     from rotorid.commands.tolerance import ToleranceOptions, permissible
 
-    stated = ToleranceOptions(weight, speed, grade, dict.fromkeys(planes))
-    return permissible(stated, names=("--rotor-mass", "--service-speed"))
+    grade, weight, speed = stated
+    return permissible(
+        ToleranceOptions(weight, speed, grade, dict.fromkeys(planes)),
+        names=("--rotor-mass", "--service-speed"),
+    )
 
 
 def _judge(
@@ -368,11 +375,10 @@ def _judge(
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
     from balancing import verdict_of_check, verdict_of_prediction
 
-    tolerance = None
-    if any(getattr(options, name) is not None for name in _TOLERANCE):
-        tolerance = _tolerance(result.planes, options)
-    limited = result.limits is not None and result.limits.residual.min() < math.inf
-    if tolerance is None and not limited:
+    stated = any(getattr(options, name) is not None for name in _TOLERANCE)
+    tolerance = _tolerance(result.planes, options) if stated else None
+    limits = result.limits if job.check is None else job.limits_of(influence.planes)
+    if tolerance is None and (limits is None or limits.residual.min() == math.inf):
         return None
     radii = None
     if tolerance is not None and not result.labels.unbalances:
@@ -383,12 +389,11 @@ def _judge(
                 f"plane, radius_mm in [planes.{lost[0]}] of the job"
             )
     if job.check is not None:
-        limits = job.limits_of(influence.planes)
         return verdict_of_check(influence, job.check, tolerance=tolerance, radii=radii, limits=limits)
     return verdict_of_prediction(
         result,
         tolerance=tolerance,
         radii=radii,
-        mounted=None if mounted is None or mounted.on_top_of is not None else mounted.weights,
+        mounted=None if mounted is None else mounted.weights,
         after=None if mounted is None else mounted.after,
     )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from warnings import catch_warnings
@@ -201,12 +202,14 @@ class Solved(NamedTuple):
 def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None) -> Solved:
     """By the options, in the planes that they say or in given ones.
 
+    Limits of readings that no weights keep are for the check run alone, where it is not to refine them.
+
     Raises
     ------
     UndeterminedError
         Whether the runs contradict their conventions first: these may be all that is wrong.
     """
-    from balancing import UndeterminedError
+    from balancing import InfeasibleError, UndeterminedError
 
     try:
         coefficients, of_type = coefficients_of(job, options)
@@ -216,6 +219,14 @@ def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None
     except UndeterminedError as error:
         words = _test(job).contradiction(job.trials.labels)
         raise UndeterminedError("\n".join((*words, str(error)))) from None
+    except InfeasibleError as error:
+        limits = job.limits
+        if job.check is None or options.refine or limits is None:
+            raise
+        free = replace(limits, residual=limits.residual + inf)
+        solved = solve(replace(job, limits=free), options, planes)
+        why = f"the weights are those without limits of readings: {error}"
+        return solved._replace(result=with_more_warnings(solved.result, why))
     if job.rotor is not None:
         from rotorid.commands.model_places import next_mode
 
@@ -223,6 +234,12 @@ def solve(job: Job, options: BalanceOptions, planes: Sequence[str] | None = None
         elsewhere = *decision.elsewhere, *next_mode(job, result)
         result = replace(result, decision=replace(decision, elsewhere=elsewhere))
     return Solved(result if of_type is None else of_type.judged(result), coefficients, planes, of_type)
+
+
+def with_more_warnings(result: Correction, *more: str) -> Correction:
+    """A correction with further warnings."""
+    decision = replace(result.decision, warnings=(*result.decision.warnings, *more))
+    return replace(result, decision=decision)
 
 
 def _test(job: Job) -> ConventionTest:

@@ -96,16 +96,18 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
             raise ValueError(f"{path}: no rotor file can be written, {lacking}")
         return rotor_file_bytes(path, calibrated.rotor)
 
-    numbers = parameter_columns(names, every)
-    parts = [parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()]
     return Outcome(
         result=calibrated,
         sentences=(f"The model {fits} the data ({chi}).",),
         tables=(_short(*_part(calibrated, wished)),),
-        more=(*parts,),
+        more=tuple(
+            parameter_text(*_part(calibrated, which), why) for which in (wished, ~wished) if which.any()
+        ),
         beyond="all numbers, with 95 %",
         short=True,
-        file=Table("numbers", (*numbers, Column("data_share", calibrated.data_share))),
+        file=Table(
+            "numbers", (*parameter_columns(names, every), Column("data_share", calibrated.data_share))
+        ),
         files={".toml": rotor_files},
         keys=plain(document),
         warnings=calibrated.warnings,
@@ -243,10 +245,6 @@ def run_readings(job: Job, rotor: Rotor) -> RunReadings:
     ValueError
         Where a plane or a sensor has no place in the model, or the runs say nothing of it.
     """
-    import numpy as np
-
-    from rotorid.calibration import RunReadings
-
     if job.trials.special:
         raise ValueError(job.trials.special)
     trials, places = job.trials, model_places(job)
@@ -260,11 +258,4 @@ def run_readings(job: Job, rotor: Rotor) -> RunReadings:
             "these runs say nothing of the rotor: no weights change between them; runs with a trial weight "
             "are needed"
         )
-    return RunReadings(
-        trials,
-        tuple(places.nodes[plane] for plane in trials.planes),
-        np.array([1.0 if places.radii is None else places.radii[plane] for plane in trials.planes]),
-        tuple(places.sensors[sensor] for sensor in trials.sensors),
-        places.derivatives,
-        job.key_phasor,
-    )
+    return places.of_runs(trials, job.key_phasor)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from balancing import Correction, Influence, WhatIf
+    from balancing import Correction, Influence, Trials, WhatIf
     from fem import Sensor
     from rotorid.base.arrays import FloatArray
     from rotorid.base.text import Quantity
+    from rotorid.calibration import RunReadings
     from rotorid.files import Job
 
 
@@ -31,10 +32,20 @@ class ModelPlaces:
     radii: Mapping[str, float] | None
     quantity: Quantity
 
-    @property
-    def derivatives(self) -> int:
-        """How often what the sensors read is differentiated: 0 for displacements."""
-        return {"displacement": 0, "velocity": 1, "acceleration": 2}[self.quantity]
+    def of_runs(self, trials: Trials, key_phasor: float) -> RunReadings:
+        """Runs at these places; the key phasor's direction in degrees from x, with the rotation."""
+        import numpy as np
+
+        from rotorid.calibration import RunReadings
+
+        return RunReadings(
+            trials,
+            tuple(self.nodes[plane] for plane in trials.planes),
+            np.array([1.0 if self.radii is None else self.radii[plane] for plane in trials.planes]),
+            tuple(self.sensors[sensor] for sensor in trials.sensors),
+            {"displacement": 0, "velocity": 1, "acceleration": 2}[self.quantity],
+            key_phasor,
+        )
 
 
 def model_places(job: Job, stations: Mapping[str, int] | None = None) -> ModelPlaces:

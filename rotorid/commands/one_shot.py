@@ -14,12 +14,13 @@ import numpy as np
 from balancing import Gaussian, Trials, with_parameters
 from fem import is_reading
 from fem.parameters import as_change, parameter_value
-from rotorid.calibration import RunReadings, run_errors
+from rotorid.calibration import run_errors
 
 if TYPE_CHECKING:
     from balancing import Influence
     from fem import Rotor
     from rotorid.base.arrays import ComplexArray
+    from rotorid.calibration import RunReadings
     from rotorid.commands.model_places import ModelPlaces
     from rotorid.files import Job
 
@@ -32,7 +33,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     assert job.rotor is not None
     calibration = job.rotor.calibration
     assert calibration is not None
-    W, dW = _derivatives(_runs(influence, places, job.key_phasor), job.rotor)
+    W, dW = _derivatives(places.of_runs(_bare_run(influence), job.key_phasor), job.rotor)
     L = calibration.columns()
     columns = np.einsum("nscp,nm->mscp", dW, L)
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
@@ -41,25 +42,16 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     return with_parameters(replace(influence, W=W, errors=errors), columns, lack)
 
 
-def _runs(influence: Influence, places: ModelPlaces, key_phasor: float) -> RunReadings:
-    """One bare run at these places, to ask for coefficients."""
+def _bare_run(influence: Influence) -> Trials:
+    """One run without weights, to ask for coefficients."""
     S, C, P = influence.W.shape
-    trials = Trials(
+    return Trials(
         ("bare",),
         influence.speeds,
         influence.sensors,
         influence.planes,
         np.ones((1, S, C), dtype=complex),
         np.zeros((1, P), dtype=complex),
-    )
-    radii = np.array([1.0 if places.radii is None else places.radii[plane] for plane in influence.planes])
-    return RunReadings(
-        trials,
-        tuple(places.nodes[plane] for plane in influence.planes),
-        radii,
-        tuple(places.sensors[sensor] for sensor in influence.sensors),
-        places.derivatives,
-        key_phasor,
     )
 
 

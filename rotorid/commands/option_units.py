@@ -97,11 +97,13 @@ def speed_with_unit(given: Amount, what: str) -> float:
 
 def positions(given: Positions) -> dict[str, float | None]:
     """Read "left=100mm,right=600mm" in m; None where there is no position."""
-
-    def read(name: str, text: str) -> float | None:
-        return length(text, f"--planes {name}")
-
-    return pairs(given, "--planes", read, "left=100mm,right=600mm", lambda name: {name: None})
+    return pairs(
+        given,
+        "--planes",
+        lambda name, text: length(text, f"--planes {name}"),
+        "left=100mm,right=600mm",
+        lambda name: {name: None},
+    )
 
 
 def two_positions(given: str | tuple[float, float]) -> tuple[float, float]:

@@ -38,8 +38,13 @@ if TYPE_CHECKING:
 View = Literal["bode", "polar", "orbits", "shape"]
 """What a picture shows."""
 _KEYS = (
-    *("speed_rpm", "speed_rad_s", "amplitude", "amplification_factor"),
-    *("separation_margin_percent", "required_margin_percent", ""),
+    "speed_rpm",
+    "speed_rad_s",
+    "amplitude",
+    "amplification_factor",
+    "separation_margin_percent",
+    "required_margin_percent",
+    "",
 )
 """Of the columns of peaks, in the document."""
 

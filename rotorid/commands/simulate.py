@@ -148,7 +148,6 @@ def simulate(
             "signals": table.headings,
             "values": [list(row) for row in table.rows],
         },
-        pictures={},
         notes=notes,
     )
 

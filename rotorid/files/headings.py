@@ -36,7 +36,8 @@ _OF_RUNS = {
 _OF_WEIGHTS = {
     "clock": "clock o",
     "angle": "angle angular location direction phase",
-    "hole": "hole blade vane position pos",
+    "hole": "hole position pos",
+    "blade": "blade vane",
     "plane": "plane",
     "action": "action",
     "unit": "unit",

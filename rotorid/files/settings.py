@@ -402,20 +402,20 @@ def _day(value: object) -> object:
         raise ValueError("a date, such as 2026-03-17") from None
 
 
-Number = Annotated[float, BeforeValidator(_plain, json_schema_input_type=float)]
+Number = Annotated[float, BeforeValidator(_plain)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Turn = Annotated[Number, Field(ge=-360, le=360)]
 """An angle in degrees."""
-Whole = Annotated[int, BeforeValidator(_plain, json_schema_input_type=int)]
+Whole = Annotated[int, BeforeValidator(_plain)]
 Count = Annotated[Whole, Field(ge=1)]
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Label = Annotated[
     Text,
-    BeforeValidator(lambda v: str(v) if type(v) is int else v, json_schema_input_type=str | int),
+    BeforeValidator(lambda v: str(v) if type(v) is int else v, json_schema_input_type=Text | int),
 ]
 """A name that may be a number, as serial numbers are."""
-Date = Annotated[datetime.date, BeforeValidator(_day, json_schema_input_type=datetime.date)]
+Date = Annotated[datetime.date, BeforeValidator(_day)]
 
 
 def listed(inner: Any, check: Callable[[Any], Any] = tuple) -> Any:  # noqa: ANN401  an annotation

@@ -34,7 +34,7 @@ COLUMNS = (
     Column("mass", units.weight, MASSES),
     Column("angle", one_of(units.ANGLE), ("angle_deg",), lenient=True),
 )
-_PLACES = ("angle", "hole", "clock")
+_PLACES = ("angle", "hole", "blade", "clock")
 """Columns that say where a weight is; the first that is filled in counts."""
 _BESIDE = (*_PLACES[1:], "action", "unit", "pieces")
 _ANGLE = re.compile(rf"({NUMBER})\s*(?:°|º|deg|degrees?)", re.IGNORECASE)
@@ -191,7 +191,7 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
         return (30.0 * int(clock[1]) + int(clock[2] or 0) / 2.0) % 360.0
     if stem == "clock" and written:
         raise NotANumber("a time of the clock face, such as 10:20")
-    if not written or (stem != "hole" and match is None):
+    if not written or (stem not in _PLACES[1:3] and match is None):
         raise NotANumber("an angle from -360 to 360 degrees, a hole or a clock, such as 10:20")
     hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})

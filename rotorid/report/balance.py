@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Verdict, Zones
+    from balancing import CheckComparison, Correction, Labels, LeftToDo, Mounted, Trials, Verdict, Zones
     from rotorid.base.answer import Answer
     from rotorid.files import Job
 
@@ -64,6 +64,7 @@ def balance_report(
     ValueError
         If the document holds a number that is not finite.
     """
+    from balancing import with_check_runs
     from balancing.plots import residual_figure
 
     result, mounted, check, left, verdict, zones = made
@@ -72,10 +73,16 @@ def balance_report(
     places = {s: angles[s] for s in result.sensors if s in angles}
     key = job.key_phasor if places or job.key_phasor else None
     name = job.settings.machine or Path(job.files[0]).resolve().parent.name
-    answers = [part.answer for part in (verdict, zones) if part]
-    judged = [words for one in answers for words in (one.numbers, *one.tables) if words]
-    head = job.settings.sheet
-    trim = left is not None and left.word == "trim"
+    judged = "\n\n".join(
+        words
+        for part in (verdict, zones)
+        if part
+        for words in (part.answer.numbers, *part.answer.tables)
+        if words
+    )
+    runs = job.trials  # and the check runs, where they refine the coefficients
+    if check is None and job.check is not None:
+        runs = with_check_runs(runs, job.check)
     return render_report(
         "balance.html",
         document,
@@ -84,7 +91,9 @@ def balance_report(
         notes=" ".join(map(sentence, answer.notes)),
         provenance=provenance,
         judgement=answer.judgement.splitlines(),
-        head={key: getattr(head, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD},
+        head={
+            key: getattr(job.settings.sheet, key, "") or getattr(job.settings, key, "") or "" for key in _HEAD
+        },
         labels=labels,
         job_files=", ".join(path.name for path in job.files),
         errors=result.error_sentence,
@@ -100,11 +109,11 @@ def balance_report(
         ],
         **to_do(document, result, job, boxes=True),
         readings=_readings(document, result, check),
-        next_run=html(_with_blanks(next_run(document, labels)), LONG) if trim else "",
-        verdict=block("\n\n".join(judged)) if judged else "",
+        next_run=html(_with_blanks(next_run(document, labels)), LONG) if left and left.word == "trim" else "",
+        verdict=judged and block(judged),
         radii="; ".join(f"{plane} {radius * 1e3:.6g} mm" for plane, radius in job.radii.items()),
-        runs=block(_runs(job), LONG),
-        there=_mounted_in_runs(job),
+        runs=block(_readings_of(runs), LONG),
+        there=_mounted_in(runs),
         trial_radii=any(plane.trial_radius for plane in job.planes.values()),
         slow_roll=job.slow_roll is not None,
     )
@@ -267,9 +276,9 @@ def _speed(document: Mapping[str, Any], path: str, labels: Labels) -> Column:
     return Column(labels.speed_in, values, "{:.6g}".format, f"{path}.*.speed_rpm", scale)
 
 
-def _runs(job: Job) -> Table:
+def _readings_of(trials: Trials) -> Table:
     """Means of the readings of the runs."""
-    trials, labels = job.trials, job.trials.labels
+    labels = trials.labels
     speeds = [labels.speed_number(speed) for speed in trials.speeds for _ in trials.sensors]
     columns = [Column(labels.speed_in, speeds), Column("sensor", trials.sensors * len(trials.speeds))]
     for run, readings in zip(trials.runs, trials.mean, strict=True):
@@ -278,9 +287,8 @@ def _runs(job: Job) -> Table:
     return Table("", tuple(columns))
 
 
-def _mounted_in_runs(job: Job) -> list[tuple[str, str]]:
+def _mounted_in(trials: Trials) -> list[tuple[str, str]]:
     """What was mounted in each run."""
-    trials = job.trials
     words = [
         [f"{trials.labels.weight_at(w)} in plane {p}" for p, w in zip(trials.planes, row, strict=True) if w]
         for row in trials.weights

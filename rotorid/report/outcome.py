@@ -207,17 +207,8 @@ def outcome_of(
 
 def table_of(data: pd.DataFrame, name: str = "result") -> Table:
     """A DataFrame as a table; what pandas has as missing is unknown."""
-    present = data.notna()
-    return Table(
-        name,
-        tuple(
-            Column(
-                str(each),
-                [value if there else None for value, there in zip(data[each], present[each], strict=True)],
-            )
-            for each in data
-        ),
-    )
+    known = data.astype(object).where(data.notna(), None)
+    return Table(name, tuple(Column(str(each), known[each].tolist()) for each in known))
 
 
 def options_of(function: Callable[..., Any]) -> type[DataclassInstance]:

@@ -1,30 +1,15 @@
 """Pass, fail, not decidable: regions against closed forms, residual unbalance against what is mounted."""
 
 from dataclasses import replace
-from math import pi
 
 import numpy as np
 import pytest
-from balancing_data import complex_normal, limits_by_name, synthetic
+from balancing_data import ERRORS, check_run, complex_normal, limits_by_name, rigid, synthetic
 
-from balancing import (
-    ReadingErrors,
-    correct,
-    estimate_influence,
-    verdict_of_check,
-    verdict_of_prediction,
-)
-from balancing.iso21940 import tolerance
+from balancing import correct, estimate_influence, tolerance, verdict_of_check, verdict_of_prediction
 from balancing.pass_or_fail import judge, judge_unbalance
 from balancing.regions import NORMAL_RADIUS as RADIUS
 from balancing.regions import Region
-
-ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
-
-
-def rigid(limit, **options):
-    """A tolerance of `limit` kg·m in each of the planes A and B."""
-    return tolerance(2 * limit * 100 * pi / 2.5e-3, 100 * pi, 2.5, planes={"A": None, "B": None}, **options)
 
 
 def one(value, limit, covariance):
@@ -74,13 +59,6 @@ def test_planes_bearings_and_radii():
 def job():
     made, W, Y0 = synthetic(np.random.default_rng(5), errors=ERRORS)
     return made, W, Y0, estimate_influence(made)
-
-
-def check_run(made, W, residual, errors=ERRORS):
-    readings = np.einsum("scp,p->sc", W, residual)[None]
-    return replace(
-        made, runs=("check",), readings=readings, weights=np.zeros((1, 0)), planes=(), errors=errors
-    )
 
 
 @pytest.mark.parametrize(

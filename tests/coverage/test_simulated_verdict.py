@@ -1,27 +1,12 @@
 """Regions of what a correction left: drawn jobs."""
 
 from dataclasses import replace
-from math import pi
 
 import numpy as np
-from balancing_data import complex_normal, synthetic
+from balancing_data import check_run, complex_normal, rigid, synthetic
 from repetitions import lowest_share, repetitions
 
-from balancing import ReadingErrors, estimate_influence, tolerance, verdict_of_check
-
-ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
-
-
-def rigid(limit, **options):
-    """A tolerance of `limit` kg·m in each of the planes A and B."""
-    return tolerance(2 * limit * 100 * pi / 2.5e-3, 100 * pi, 2.5, planes={"A": None, "B": None}, **options)
-
-
-def check_run(made, W, residual, errors=ERRORS):
-    readings = np.einsum("scp,p->sc", W, residual)[None]
-    return replace(
-        made, runs=("check",), readings=readings, weights=np.zeros((1, 0)), planes=(), errors=errors
-    )
+from balancing import ReadingErrors, estimate_influence, verdict_of_check
 
 
 def test_sizes_of_the_region_hold_the_true_one_in_95_of_100_jobs():

@@ -3,9 +3,9 @@
 import re
 from importlib import import_module
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
+from docs_blocks import check_formulas
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "theory"
@@ -18,15 +18,6 @@ FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 
 def text_of(page):
     return (FOLDER / f"{page}.md").read_text(encoding="utf-8")
-
-
-def formulas(text):
-    """Displayed and inline formulas of a page, without its code."""
-    text = re.sub(r"`[^`\n]*`", "", FENCED.sub("", text))
-    shown = re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL)
-    rest = re.sub(r"\$\$.*?\$\$", "", text, flags=re.DOTALL)
-    assert rest.count("$") % 2 == 0
-    return shown, re.findall(r"\$([^$]+)\$", rest)
 
 
 def test_the_index_lists_every_page():
@@ -60,14 +51,7 @@ def test_every_block_checks_something(page):
 @pytest.mark.parametrize("page", ["index", *PAGES])
 def test_every_formula_becomes_mathml(page):
     """As docs/_ext/mathml.py writes it: no command is left over as text, and the result is well-formed."""
-    from latex2mathml.converter import convert
-
-    shown, within = formulas(text_of(page))
-    assert within
-    for formula, display in [(f, "block") for f in shown] + [(f, "inline") for f in within]:
-        tree = ElementTree.fromstring(convert(formula.strip(), display=display))
-        assert "\\" not in "".join(tree.itertext()), formula
-        assert "$" not in formula
+    assert check_formulas(FOLDER / f"{page}.md")
 
 
 @pytest.mark.parametrize("page", ["index", *PAGES])

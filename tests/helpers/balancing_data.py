@@ -1,10 +1,14 @@
 """Jobs that several tests of balancing use."""
 
+from dataclasses import replace
+from math import pi
+
 import numpy as np
 
-from balancing import Gaussian, Influence, Labels, Limits, Trials
+from balancing import Gaussian, Influence, Labels, Limits, ReadingErrors, Trials, tolerance
 
 GRAM = 1e-3
+ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
 
 
 def polar(amplitude, degrees):
@@ -86,4 +90,16 @@ def limits_by_name(influence, *, max_weight=None, residual=None, forbidden=None)
             [np.broadcast_to(residual.get(name, free), free.shape) for name in influence.sensors]
         ),
         tuple(tuple(forbidden.get(name, ())) for name in influence.planes),
+    )
+
+
+def rigid(limit, **options):
+    """A tolerance of `limit` kg·m in each of the planes A and B."""
+    return tolerance(2 * limit * 100 * pi / 2.5e-3, 100 * pi, 2.5, planes={"A": None, "B": None}, **options)
+
+
+def check_run(made, W, residual, errors=ERRORS):
+    readings = np.einsum("scp,p->sc", W, residual)[None]
+    return replace(
+        made, runs=("check",), readings=readings, weights=np.zeros((1, 0)), planes=(), errors=errors
     )

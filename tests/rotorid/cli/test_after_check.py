@@ -51,8 +51,20 @@ def test_pieces_have_their_own_expectation(cli):
     plain, split = (cli("balance", job, *more) for more in ((), ("--split",)))
     assert plain.out.splitlines()[1] == "In holes: --split."
     assert "with all trial weights taken off" in split.out
+    assert cli("balance", job, "--split", "--table").out.count("Largest left") == 1
     found = cli("balance", job, "--split", "--json").json
     bound = found["mounting"]["rms_after_95"]
     assert f"below {bound:.2g} in 95 of 100" in split.out
     assert found["mounting"]["rms_after"] < bound
     assert found["judgement"]["rms_expected"] is None  # that of weights at any angle
+
+
+def test_limits_that_no_weights_keep_leave_the_check_run_its_verdict(cli):
+    job = ("balance", CHECKED, "--json", "--limit")
+    found, kept = (cli(*job, limit).json for limit in ("0.5um_pp", "1um_pp"))
+    assert (found["verdict"]["verdict"], found["left_to_do"]["word"]) == ("fail", "add nothing yet")
+    failed = [row["size"] > 0.5 for row in kept["verdict"]["rows"]]
+    assert [row["verdict"] == "fail" for row in found["verdict"]["rows"]] == failed
+    assert "without limits of readings: the limits cannot be met" in found["warnings"][-1]
+    assert "without limits" not in str(kept["warnings"])
+    assert "the limits cannot be met" in cli(*job, "0.5um_pp", "--refine").err

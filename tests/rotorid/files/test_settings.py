@@ -128,6 +128,7 @@ def test_samples_keep_to_their_schema_which_describes_each_key(kind):
         ("job", "[slow_roll.A]\namplitude_um = 2"),
         ("job", '[planes.1]\nuse = "no"'),
         ("job", "[sensors.A]\nlimit = 0"),
+        ("waveforms", "pulses = 0\nrecords = { a = 'a.csv' }"),
     ],
 )
 def test_what_the_reader_refuses_does_not_keep_to_its_schema(kind, text):

@@ -18,7 +18,7 @@ SAME = {
     "brackets": "Run,Plane,Weight [g],Angle\nTrial P1,P1,10,90°\nTrial P2,P2,10,270°\n",
     "units in cells": "run,plane,weight,angle\ntrial P1,P1,10 g,90°\ntrial P2,P2,10 g,270 deg\n",
     "clock in the angle": "run,plane,mass_g,angle_deg\ntrial P1,P1,10,3:00\ntrial P2,P2,10,9 o'clock\n",
-    "hole": "run,plane,mass_g,hole\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
+    "hole or blade": "run,plane,mass_g,hole,blade\ntrial P1,P1,10,3,\ntrial P2,P2,10,,7\n",
     "position": "run,plane,mass_g,Position\ntrial P1,P1,10,3\ntrial P2,P2,10,7\n",
     "hole in the angle": "run,plane,mass_g,angle\ntrial P1,P1,10,hole 3\ntrial P2,P2,10,#7\n",
     "columns for each plane": "Run,P1 weight (g),P1 angle (deg),P2 weight (g),P2 angle (deg)\n"

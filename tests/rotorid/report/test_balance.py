@@ -39,6 +39,13 @@ def test_every_number_shown_is_that_of_the_document(made):
     assert disagreements(sheet.shown, sheet.document) == []
 
 
+def test_runs_that_a_trim_rests_on_are_all_there():
+    plain, refined = (sheet_of(DATA / "turbo_job" / "checked.toml", refine=more)[0] for more in (False, True))
+    rests = [text.partition('id="runs"')[2] for text in (plain, refined)]
+    assert ["<strong>check</strong>: 417 g·mm at 172.0°" in text for text in rests] == [False, True]
+    assert [text.count(">check</th>") for text in rests] == [0, 1]
+
+
 def test_nothing_of_the_result_is_left_out(made):
     _, sheet, report, _ = made
     keys, document = sheet.keys, sheet.document
