@@ -325,6 +325,15 @@ def whitened(part: Influence, noise: Noise, *differences: ComplexArray) -> list[
     return [*each, np.column_stack(drawn)]
 
 
+def share_left(A: FloatArray, target: FloatArray, drawn: FloatArray) -> float:
+    """Square of what columns A leave of a target (n,), over what they leave of 95 % of draws (n, DRAWS)."""
+    basis = np.linalg.qr(A)[0]
+    left, usual = (
+        np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (target, drawn)
+    )
+    return float(left / np.quantile(usual, LEVEL))
+
+
 def _change(part: Influence, check: Trials, difference: ComplexArray) -> ComplexArray | None:
     """Weights δ (P,), the same in all runs, of one plane, else of all, with which errors explain the rest.
 
@@ -342,12 +351,8 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
             target, *columns, drawn = whitened(part, noise, difference, *effects)
             A = np.column_stack(columns)
             change[planes] = unstretch(solution(A, target, rcond=1e-10))
-        basis = np.linalg.qr(A)[0]
-        left, usual = (
-            np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (target, drawn)
-        )
-        if left <= (most := np.quantile(usual, LEVEL)):
-            fits.append((left / most, change))
+        if (share := share_left(A, target, drawn)) <= 1:
+            fits.append((share, change))
     return min(fits, key=lambda fit: fit[0])[1] if fits else None
 
 

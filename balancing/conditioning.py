@@ -214,11 +214,6 @@ def check_stack(
     return K, y, w
 
 
-def acting_alike(W: ComplexArray) -> list[int]:
-    """The planes that the weakest combination of W (N, P) is made of."""
-    return conditioning(W, ()).weakest
-
-
 def unresolved(W: ComplexArray, planes: Sequence[str], covariance: FloatArray) -> str:
     """Which planes act alike within their errors; empty where none do.
 

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.check_run import whitened
+from balancing.check_run import share_left, whitened
 from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
 from balancing.correction_result import Correction
 from balancing.groups import Groups, mapped, unknowns
@@ -226,6 +226,4 @@ def _explained(part: Influence, D: ComplexArray) -> bool:
     noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
     effects = (z * W[None] for W in np.moveaxis(part.W, -1, 0) for z in (1, 1j))
     rest, *columns, drawn = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)
-    basis = np.linalg.qr(np.column_stack(columns))[0]
-    left, usual = (np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (rest, drawn))
-    return bool(left <= np.quantile(usual, LEVEL))
+    return share_left(np.column_stack(columns), rest, drawn) <= 1

@@ -505,7 +505,7 @@ def fit_runs(trials: Trials) -> Influence:
         baseline=theta[..., 0],
         errors=errors,
         labels=trials.labels,
-        remarks=Remarks(reading.warnings + disagree + trials.warnings, unseen(run), disagree),
+        remarks=Remarks(reading.warnings + disagree + trials.warnings, unseen(run, trials), disagree),
     )
 
 

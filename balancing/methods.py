@@ -443,9 +443,10 @@ def _fit_weighted(job: Job) -> Solution:
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
         step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ response.T
-        others = np.roll(step - step.mean(axis=0), 1, axis=0)[..., None]
-        others *= norm(D) / np.fmax(norm(others, axis=1, keepdims=True), norm(D))
-        drawn = D + unstretch(step - (response @ (stretch(W[:, on] - errors.W) @ others))[..., 0])
+        off = step - step.mean(axis=0)
+        off *= norm(D) / np.fmax(norm(off, axis=1, keepdims=True), norm(D))
+        both = (off + np.roll(off, 1, axis=0))[..., None]
+        drawn = D + unstretch(step - (response @ (stretch(W[:, on] - errors.W) @ both))[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.conditioning import CLEAR, REMEDY, acting_alike
+from balancing.conditioning import CLEAR, REMEDY, conditioning
 from balancing.correction_result import Choice, Correction, MountDecision
 from balancing.influence import in_order
 from balancing.printed_readings import reading_names, rms
@@ -244,7 +244,7 @@ def remedies(case: Case) -> tuple[str, ...]:
     if case.coarse:
         words.append("read the instrument in a range that shows more digits")
     if len(case.names) > 1 and not weak:
-        planes = listing((repr(case.names[p]) for p in acting_alike(case.W)), "and")
+        planes = listing((repr(case.names[p]) for p in conditioning(case.W, ()).weakest), "and")
         words.append(f"add a sensor or a speed at which planes {planes} act differently")
     return tuple(f"{'Or' if i else 'Instead'}: {w}." for i, w in enumerate(words))
 
@@ -274,7 +274,7 @@ def _causes(result: Correction, case: Case) -> list[str]:
             f"only {case.clearness[p]:.2g} times its error"
         )
     if not case.weak and len(names) > 1:
-        alike, at = acting_alike(case.W), result.places(names, result.weights)
+        alike, at = conditioning(case.W, ()).weakest, result.places(names, result.weights)
         each = " against ".join(f"{words(float(sizes[p]))} at {at[p]:.0f}°" for p in alike)
         planes = listing((repr(names[p]) for p in alike), "and")
         causes.append(f"planes {planes} act alike, and their weights fight each other ({each})")

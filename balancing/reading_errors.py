@@ -405,10 +405,8 @@ def _estimated(each: Sequence[Block], level: float) -> RunErrors:
     evenly = EVENLY[int(np.argmax([np.logaddexp.reduce(values) for values in log]))]
     for _ in range(2):  # closer around what data do not exclude
         chance = _posterior(each, sizes, evenly).reshape(len(alone), len(common), -1)
-        alone, common = (
-            _finer(values, chance.sum(axis=axes), count)
-            for values, axes, count in ((alone, (1, 2), 5), (common, (0, 2), 6))
-        )
+        alone = _finer(alone, chance.sum(axis=(1, 2)), 5)
+        common = _finer(common, chance.sum(axis=(0, 2)), 6)
         sizes = _grid(alone, common, splits)
     return RunErrors(sizes, _posterior(each, sizes, evenly), "estimated", level, evenly)
 
@@ -467,14 +465,17 @@ def contradiction(trials: Trials, A: ComplexArray, run: RunErrors) -> tuple[str,
     )
 
 
-def unseen(run: RunErrors) -> tuple[str, ...]:
-    """A note about what no run measures."""
+def unseen(run: RunErrors, trials: Trials) -> tuple[str, ...]:
+    """Notes about what no run measures."""
     whole = float(np.linalg.norm(run.typical))
-    if run.origin == "estimated" and whole < ASSUMED_RUN / 2:
-        return (
+    if run.origin == "estimated":
+        notes = {
             "runs that should agree differ little: if the machine was not stopped between them, they do not "
-            "show what changes from run to run (state run_percent)",
-        )
+            "show what changes from run to run (state run_percent)": whole < ASSUMED_RUN / 2,
+            "trial weights are taken as exact, which these runs do not show (state placement_percent and "
+            "placement_deg)": not (any(trials.placement) or trials.relative or trials.planes[-1] == TURNED),
+        }
+        return tuple(filter(notes.get, notes))
     taken = {
         "none": "none are stated, and the ± are smaller, those of readings alone",
         "assumed": f"{percent(ASSUMED_RUN)} % are assumed of each of three kinds, {percent(whole)} % in all",

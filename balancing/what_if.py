@@ -41,7 +41,6 @@ from rotorid.base.text import capital, figures
 if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
 
-DRAWS = 400
 BETTER = 0.9
 """Of the rms of the bare rotor: what 95 of 100 check runs must stay below."""
 RISES = 0.1
@@ -198,7 +197,7 @@ def check_readings(influence: Influence, weights: ComplexArray, look: Look = lam
     """
     after = influence.baseline + influence.W @ weights
     off = [np.zeros((0, *after.shape), dtype=complex)]
-    for (Y, W), more in zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False):
+    for (Y, W), more in zip(influence.draws(), influence.further(after, weights), strict=False):
         look(Y, W)
         off.append(Y + W @ weights + more - after)
     return np.concatenate(off)

@@ -38,6 +38,8 @@ CHANCE = 1e-6
 """Probability below which residuals or what takes a share of them are no noise."""
 SHARE, FAR = 0.3, 5.0
 """Of the variance, or standard deviations of a parameter: what hum takes or moves if it is named."""
+SUSPECT = 0.05
+"""Probability of such correlations below which intervals are widened, with or without words."""
 HINT = (
     "a local minimum or an unsuitable model; try other starting values, bounds or several "
     "starts. No intervals are given"
@@ -60,8 +62,8 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
             alone = least_squares(J, -r, names=estimate.names, sigma=1.0, rcond=JACOBIAN_RCOND).at(theta, r)
             prior = replace(prior, alone=combined(problem, alone).describe_rank())
         estimate, r = prior.apart(estimate), -prior.data.residuals  # of the data alone
-    seen, factor = len(r) >= FEWEST and not _rounding_only(problem, r), 1.0
-    rho, chance, wider = _correlated(problem, r) if seen else (None, 1.0, 1.0)
+    seen = len(r) >= FEWEST and not _rounding_only(problem, r)
+    rho, chance, factor = _correlated(problem, r) if seen else (None, 1.0, 1.0)
     poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
     if seen and path.converged and linear:
         cause, wrong = _hum(problem, J, r)
@@ -72,20 +74,20 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         estimate = combined(problem, estimate)
         words += ["" if estimate.full_rank or poor else estimate.describe_rank()]
     words += [] if prior is None else prior.warnings
-    if rho is not None and chance < 1e-4 and not poor:
-        factor = wider if wider > 1.2 else 1.0
+    if ordered := rho is not None and chance < 1e-4 and not poor:
         words.append(
             "the residuals are not random: those of neighbouring samples are correlated "
             f"({rho:.2f}, Durbin–Watson {2 - 2 * rho:.2f})"
-            + (f": intervals were made {factor:.2g} times as wide" if factor > 1 else "")
+            + (f": intervals were made {factor:.2g} times as wide" if factor > 1.05 else "")
             + ". Either the noise is, or the model does not quite describe the record (initial values? an "
             "offset or drift, [nuisance]?), or this is a local minimum (try several starts)"
         )
     words += [] if poor else [*_errors_words(problem, estimate, r, linear)]
     sound = path.converged and not poor and not wrong and not problem.prior.ridge
     return {
-        "estimate": _widened(estimate, factor if sound else None),
-        "reliable": sound and factor == 1,
+        # too few samples to say that they are correlated may well make intervals too narrow
+        "estimate": _widened(estimate, (factor if chance < SUSPECT else 1.0) if sound else None),
+        "reliable": sound and not ordered,
         "warnings": [*words, _fast(problem, theta)],
         "autocorrelation": rho,
         "prior": prior,

@@ -1,6 +1,6 @@
 """Are the 95 % regions of the correction weights honest? Drawn jobs whose truth is known.
 
-Run `python tests/coverage/coverage_balance.py [jobs]`, jobs of each table (2500).
+Run `python tests/coverage/coverage_balance.py [jobs]`, jobs of each line (1000), of d. together.
 An ordinary job: 1–4 planes, 2–8
 sensors, 1–5 speeds, more readings than planes; coefficients normal, with different sensitivities of sensors
 (30 %) and speeds (50 %); a trial weight for each plane, 0.3–1.5 of its correction; 0.5–5 % of error in each
@@ -258,11 +258,11 @@ def percent(values: Sequence[Any]) -> str:
     return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if len(values) else "–"
 
 
-def main(jobs: int = 2500) -> None:
+def main(jobs: int = 1000) -> None:
     """Print the tables."""
     head = f"{'':<44}{'silent':>15}{'warned':>17}{'refused':>9}{'±/C–R':>9}"
     print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
-    each = -(-jobs // (len(SOURCES) * len(KINDS)))
+    each = -(-jobs // len(KINDS))
     cells = {(source, kind): simulate(each, source, kind) for source in SOURCES for kind in KINDS}
     for place, names in enumerate((SOURCES, KINDS)):
         for name in names:
@@ -273,14 +273,14 @@ def main(jobs: int = 2500) -> None:
 
     print(f"\nb. Errors assumed, the true ones so many times as large\n{head}")
     for times in TIMES:
-        print(line(f"{times:g} times", every_kind(jobs // 4, "assumed", lambda _, t=times: assumed(t))))
+        print(line(f"{times:g} times", every_kind(jobs, "assumed", lambda _, t=times: assumed(t))))
 
     print("\nc. Warned, of jobs with 8 or more redundant readings whose errors are twice as large as taken")
     for names, words in ((KINDS[:1], "independent"), (KINDS[1:], "in common")):
         for source in (*SOURCES[:2], SOURCES[-1]):
-            found = every_kind(jobs // 8, source, told=2.0, kinds=names)
+            found = every_kind(jobs, source, told=2.0, kinds=names)
             print(f"{source + ': ' + words:<44}{told_of(found, 8)}")
-        found = every_kind(jobs // 8, "assumed", lambda _: assumed(2.0), kinds=names)
+        found = every_kind(jobs, "assumed", lambda _: assumed(2.0), kinds=names)
         print(f"{'assumed: ' + words:<44}{told_of(found, 8)}")
 
     print("\nd. Stated errors, trial weights 0.05–1.5 of the correction: regions that hold the truth, by")
@@ -305,7 +305,7 @@ def main(jobs: int = 2500) -> None:
         ("planes nearly alike", SOURCES[0], KINDS[1], 0.1),
         ("planes nearly alike, spare runs", SOURCES[3], KINDS[1], 0.1),
     ):
-        print(line(name, simulate(jobs * 2 // 5, source, kind, apart=apart)))
+        print(line(name, simulate(jobs, source, kind, apart=apart)))
 
 
 def assumed(times: float) -> tuple[float, float]:
