@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -114,7 +114,7 @@ def exact(system: System) -> FloatArray:
     lengths, which = system.record.steps
     w = np.hstack((system.u[:-1], np.diff(system.u, axis=0) / lengths[which, None]))
     z = np.zeros((1 + system.k, n, len(system.t)))
-    z[..., 0], size = system.first.T, max(1, BATCH // M.size)
+    z[..., 0], size, shape = system.first.T, max(1, BATCH // M.size), (m + 1, 1 + len(still))
     for low in range(0, len(which), size):
         back = slice(low, min(low + size, len(which)))
         rows = slice(low + 1, back.stop + 1)
@@ -122,22 +122,25 @@ def exact(system: System) -> FloatArray:
         if len(lengths) > 1:
             used, place = np.unique(which[back], return_inverse=True)
         P = expm(lengths[used, None, None] * M)[place]
-        push = P[:, : m + 1, m + 1 :] @ w[back, :, None]
-        first = np.append(z[moving, :, low, None] * scale, 1.0)[:, None]
-        solved = recurrence(P[:, : m + 1, : m + 1], first, push)[:, :m, 0].T
-        z[moving, :, rows] = solved.reshape(len(moving), n, -1) / scale
-        if still.size:
-            push = np.zeros((len(push), n, len(still)))
-            z[still, :, rows] = recurrence(P[:, :n, :n], z[still, :, low].T, push).T
+        first, push = np.zeros(shape), np.zeros((back.stop - low, *shape))
+        first[:, 0], first[:n, 1:] = np.append(z[moving, :, low, None] * scale, 1.0), z[still, :, low].T
+        push[..., :1] = P[:, : m + 1, m + 1 :] @ w[back, :, None]
+        solved = recurrence(P[:, : m + 1, : m + 1], first, push).T
+        z[moving, :, rows] = solved[0, :m].reshape(len(moving), n, -1) / scale
+        z[still, :, rows] = solved[1:, :n]
     return z.T
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
-    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k) doubling spans if P is one for all."""
+    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k).
+
+    P is (n, m, m), and the result stands in the place of `push`; or one for all, and spans are doubled.
+    """
     n, m, k = push.shape
     if len(P) > 1:
-        steps = zip(P, push, strict=True)
-        return np.array([*accumulate(steps, lambda y, step: step[0] @ y + step[1], initial=first)][1:])
+        for i, A in enumerate(P):
+            push[i] = first = A @ first + push[i]
+        return push
     flat, driven, span = push.swapaxes(0, 1).copy().reshape(m, -1), push.any(), 1
     flat[:, :k] += P[0] @ first
     while span < n:
