@@ -18,7 +18,7 @@ from rotorid.identify.expressions import finite
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
 from rotorid.identify.quasilinearization import quasilinearization
 from rotorid.identify.record_least_squares import RTOL, Iterations, Problem
-from rotorid.identify.record_warnings import judge, misfit
+from rotorid.identify.record_warnings import judge
 from rotorid.identify.records import Record, for_copies, recorded_starts
 from rotorid.identify.result_records import Fit
 from rotorid.identify.sensitivity_steps import iterate, sensitivity_steps
@@ -136,9 +136,12 @@ def fit(  # noqa: PLR0913
     spread = partial(spread_starts, begin, problem.model.bounds, seed=seed)
     paths, more = _searched(search, problem, spread(count)), ""
     path = min(paths, key=_cost)
-    if starts is None and method == "levenberg-marquardt" and (path.converged or path.iterations > 20):
-        path, more = _from_elsewhere(search, problem, path, spread, loss)
-    judged, theta = judge(problem, path, loss), path.estimate.solution
+    judged, safe = judge(problem, path, loss), starts is None and method == "levenberg-marquardt"
+    if judged["poor"] and safe and (path.converged or path.iterations > 20):
+        path, more = _from_elsewhere(search, problem, path, spread)
+        judged = judge(problem, path, loss)
+    del judged["poor"]
+    theta = path.estimate.solution
     words = [*judged.pop("warnings"), more, *_rivals(paths, path)]
     if ((theta < low) | (theta > high)).any():
         words.append(f"{method} knows no bounds, and the result lies outside those of the model")
@@ -203,11 +206,8 @@ def _from_elsewhere(
     problem: Problem,
     path: Iterations,
     spread: Callable[[int], Sequence[FloatArray]],
-    loss: str,
 ) -> tuple[Iterations, str]:
     """A better minimum from other starts and words, where the first does not describe the record."""
-    if not misfit(problem, path.estimate, path.estimate.residuals, loss):
-        return path, ""
     paths = _searched(search, problem, spread(OTHERS)[1:], [path])
     best = min(paths, key=_cost)
     if _cost(path) <= 1.5 * _cost(best):
@@ -227,7 +227,11 @@ def _rivals(paths: Sequence[Iterations], path: Iterations) -> Iterator[str]:
     best = path.estimate
     for other in paths:
         theta = other.estimate.solution
-        apart = best.full_rank and not np.allclose(theta, best.solution, rtol=1e-3, atol=1e-12)
+        apart = (
+            other is not path
+            and best.full_rank
+            and not np.allclose(theta, best.solution, rtol=1e-3, atol=1e-12)
+        )
         if apart and other.converged and _cost(other) <= 1.5 * _cost(path):
             values = ", ".join(f"{n} = {x:.6g}" for n, x in zip(path.estimate.names, theta, strict=True))
             yield f"another start ends at {values}, which describes the record nearly as well"

@@ -51,9 +51,7 @@ class System:
         Whether S is part of the system.
     """
 
-    def __init__(
-        self, model: OdeModel, theta: FloatArray, record: Record, sensitivities: bool
-    ) -> None:
+    def __init__(self, model: OdeModel, theta: FloatArray, record: Record, sensitivities: bool) -> None:
         self.model, self.theta, self.record = model, theta, record
         self.t, self.u = record.t, inputs_of(model, record)
         self.k = len(theta) if sensitivities else 0
@@ -101,54 +99,49 @@ def exact(system: System) -> FloatArray:
 
     n, nu = len(system.first), system.u.shape[1]
     tables = system.model.matrices(system.theta)[: 1 + system.k]
-    sizes = np.abs(tables).max(axis=(1, 2))
-    moving, still = (1 + np.flatnonzero(each) for each in (sizes[1:] != 0, sizes[1:] == 0))
+    sizes = np.maximum(np.abs(tables).max(axis=(1, 2)), 1e-300)
+    still = sizes <= 1e-300
+    still[0] = False
+    moving, still = np.flatnonzero(~still), np.flatnonzero(still)
     # A_j as large as A: larger ones would cost digits
-    scale = 2.0 ** np.round(np.log2(np.maximum(sizes[0], 1e-300) / sizes[moving]))[:, None, None]
-    m = n * (1 + len(moving))
-    M = np.zeros((m + 1 + 2 * nu, m + 1 + 2 * nu))
-    parts = np.concatenate([tables[:1], tables[moving] * scale]).reshape(m, -1)
+    scale, m = 2.0 ** np.round(np.log2(sizes[0] / sizes[moving]))[:, None, None], n * len(moving)
+    M = np.eye(m + 1 + 2 * nu, k=nu)
+    M[: m + 1] = 0.0
+    parts = (tables[moving] * scale).reshape(m, -1)
     M[:m, :n], M[:m, m : m + 1 + nu] = parts[:, :n], parts[:, n:]
     for low in range(n, m, n):
         M[low : low + n, low : low + n] = tables[0, :, :n]
-    M[m + 1 : m + 1 + nu, m + 1 + nu :] = np.eye(nu)
     lengths, which = system.record.steps
-    slopes = np.diff(system.u, axis=0) / lengths[which, None]
+    w = np.hstack((system.u[:-1], np.diff(system.u, axis=0) / lengths[which, None]))
     z = np.zeros((1 + system.k, n, len(system.t)))
-    z[..., 0], size = system.first.T, max(1, BATCH // (M.size if len(lengths) > 1 else len(M)))
+    z[..., 0], size, shape = system.first.T, max(1, BATCH // M.size), (m + 1, 1 + len(still))
     for low in range(0, len(which), size):
         back = slice(low, min(low + size, len(which)))
-        rows, (used, place) = slice(low + 1, back.stop + 1), (slice(1), slice(1))
+        rows = slice(low + 1, back.stop + 1)
+        used = place = which[:1]
         if len(lengths) > 1:
             used, place = np.unique(which[back], return_inverse=True)
         P = expm(lengths[used, None, None] * M)[place]
-        push = P[:, : m + 1, m + 1 :] @ np.hstack((system.u[back], slopes[back]))[..., None]
-        first = [*z[0, :, low], *(z[moving, :, low, None] * scale).ravel(), 1.0]
-        solved = recurrence(P[:, : m + 1, : m + 1], np.array(first)[:, None], push)[..., 0].T
-        z[0, :, rows] = solved[:n]
-        z[moving, :, rows] = solved[n:m].reshape(len(moving), n, len(push)) / scale
-        if still.size:
-            push = np.zeros((len(push), n, len(still)))
-            z[still, :, rows] = recurrence(P[:, :n, :n], z[still, :, low].T, push).T
+        first, push = np.zeros(shape), np.zeros((back.stop - low, *shape))
+        first[:, 0], first[:n, 1:] = np.append(z[moving, :, low, None] * scale, 1.0), z[still, :, low].T
+        push[..., :1] = P[:, : m + 1, m + 1 :] @ w[back, :, None]
+        solved = recurrence(P[:, : m + 1, : m + 1], first, push).T
+        z[moving, :, rows] = solved[0, :m].reshape(len(moving), n, -1) / scale
+        z[still, :, rows] = solved[1:, :n]
     return z.T
 
 
 def recurrence(P: FloatArray, first: FloatArray, push: FloatArray) -> FloatArray:
-    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k), by doubling spans.
+    """y_i = P_i y_{i−1} + push_i after `first`, (n, m, k).
 
-    P is (n, m, m), or one for all, which then multiplies all steps at once.
+    P is (n, m, m), and the result stands in the place of `push`; or one for all, and spans are doubled.
     """
     n, m, k = push.shape
-    span = 1
     if len(P) > 1:
-        y = push.copy()
-        y[0] += P[0] @ first
-        while span < n:
-            y[span:] += P[span:] @ y[:-span]
-            P = np.concatenate([P[:span], P[span:] @ P[:-span]])
-            span *= 2
-        return y
-    flat, driven = push.swapaxes(0, 1).copy().reshape(m, -1), push.any()
+        for i, A in enumerate(P):
+            push[i] = first = A @ first + push[i]
+        return push
+    flat, driven, span = push.swapaxes(0, 1).copy().reshape(m, -1), push.any(), 1
     flat[:, :k] += P[0] @ first
     while span < n:
         new = flat[:, span * k :] if driven else flat[:, span * k : 2 * span * k]

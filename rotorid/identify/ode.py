@@ -78,7 +78,12 @@ class OdeModel:
 
     def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Rates of the states, then their derivatives by states and parameters, (*B, n_x, 1 + n_x + n_p)."""
-        table = self._values("rates", t, x, theta, u)
+        made, parts = self._compiled("rates", self.symbols, 1), [np.asarray(p, float) for p in (x, theta, u)]
+        if np.ndim(t) == 0:  # quickly
+            table = made.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
+        else:
+            rest = (part[..., j] for part in parts for j in range(part.shape[-1]))
+            table = made.many(np.shape(t), [t, *rest])
         if self.inertia:
             inverse, slopes = self.inverse(theta)
             table = inverse @ table
@@ -86,26 +91,20 @@ class OdeModel:
             table[..., 1 + len(self.states) :] -= np.moveaxis(moved, (0, 1), (-1, -2))
         return table
 
-    def h(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
-        """Outputs, then their derivatives by states and parameters, (*B, n_y, 1 + n_x + n_p)."""
-        return self._values("observed", t, x, theta, u)
+    def h(self, t: FloatArray, z: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
+        """Outputs and their derivatives (n, n_y, 1 + k), of states and theirs (n, n_x, 1 + k).
 
-    def outputs_of(
-        self, t: FloatArray, x: FloatArray, S: FloatArray, theta: FloatArray, u: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Outputs (n, n_y) and their derivatives by the parameters (n, n_y, k), of states and theirs, S."""
-        n, k = x.shape[1], S.shape[2]
-        y, y_theta = np.zeros((len(self.outputs), len(t))), np.zeros((k, len(self.outputs), len(t)))
-        table = self._compiled("observed", self.symbols, 1)
-        for place, value in zip(table.places, table.vector(t, *x.T, *theta, *u.T), strict=True):
-            j, i = divmod(int(place), table.shape[1])
-            if i == 0:
-                y[j] = value
-            elif i <= n:
-                y_theta[:, j] += value * S[:, i - 1].T
-            elif k:
-                y_theta[i - 1 - n, j] += value
-        return y.T, y_theta.T
+        k is the number of parameters, or 0, or larger for directions in which these do not change.
+        """
+        made, n = self._compiled("observed", self.symbols, 1), z.shape[1]
+        table = np.zeros((z.shape[2], len(self.outputs), len(t)))
+        for place, value in zip(made.places, made.vector(t, *z[..., 0].T, *theta, *u.T), strict=True):
+            j, i = divmod(int(place), made.shape[1])
+            if 0 < i <= n:
+                table[1:, j] += value * z[:, i - 1, 1:].T
+            elif i - n < len(table):
+                table[max(i - n, 0), j] += value
+        return table.T
 
     def x0(self, theta: ArrayLike) -> FloatArray:
         """Initial states, then their derivatives by the parameters, (n_x, 1 + n_p)."""
@@ -183,14 +182,6 @@ class OdeModel:
     def memory(self) -> dict[Any, Any]:
         """What was computed for this model: functions, the inverse of E, integrators that are worth it."""
         return {}
-
-    def _values(self, what: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
-        """Expressions with their derivatives by states and parameters, at one point quickly, or at (*B,)."""
-        table = self._compiled(what, self.symbols, 1)
-        parts = [np.asarray(part, dtype=float) for part in (x, theta, u)]
-        if np.ndim(t) == 0:
-            return table.one([float(np.asarray(t)), *np.concatenate(parts).tolist()])
-        return table.many(np.shape(t), [t, *(part[..., j] for part in parts for j in range(part.shape[-1]))])
 
     def _alone(self, what: str, theta: ArrayLike) -> FloatArray:
         """Expressions of the parameters alone, with the derivatives by these, (m, 1 + n_p)."""

@@ -137,12 +137,12 @@ def linear_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Rows K (θ − θ_s) = Y of the samples, from states and `linear_solutions` there; M θ = Y is Kᵀ of it."""
     slopes, left = [], []
-    parts = zip(problem.models, problem.records, problem.inputs, problem.measured, strict=True)
-    for (model, record, u, data), x, W in zip(parts, states, tables, strict=True):
-        outputs = model.h(record.t, x, theta, u)
-        C = outputs[..., 1 : 1 + x.shape[1]]
-        left.append(data - outputs[..., 0] - (C @ (W[..., 0] - x)[..., None])[..., 0])
-        slopes.append(C @ W[..., 1:] + outputs[..., 1 + x.shape[1] :])
+    parts = zip(problem.models, problem.records, problem.measured, strict=True)
+    for (model, record, data), x, W in zip(parts, states, tables, strict=True):
+        z = np.concatenate([x[..., None], W[..., 1:], W[..., :1] - x[..., None]], axis=-1)
+        table = model.h(record.t, z, theta, inputs_of(model, record))
+        left.append(data - table[..., 0] - table[..., -1])
+        slopes.append(table[..., 1:-1])
     K, Y = problem.vector(slopes), problem.vector(left)
     if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
         raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")

@@ -11,7 +11,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.identify.adaptive_steps import worth_compiling
 from rotorid.identify.ode import OdeModel, SimulationError, check_known
-from rotorid.identify.records import Record, inputs_of, models_of
+from rotorid.identify.records import Record, models_of
 from rotorid.identify.simulation import Trajectory, simulate
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
@@ -91,7 +91,6 @@ class Problem:
         self.model = self.models[0]
         self.prior = prior_rows(self.model.parameters, {})
         """Rows that count with those of the records."""
-        self.inputs = [inputs_of(model, record) for record in records]
         self.measured = [_table(record.outputs, outputs, len(record)) for record in records]
         self.series: list[tuple[str, slice]] = []
         """Words for each output of a record, and its rows."""
@@ -109,13 +108,13 @@ class Problem:
             raise ValueError("the records have no samples of an output beside those that known values fix")
         self.places = np.concatenate(places)
         """Of the rows in the samples of the first output of the first record, of the next, …"""
-        self.scale = np.ones(high)
-        sigma = self.vector([_table(record.sigma or {}, outputs, len(record)) for record in records])
-        self.stated = not np.isnan(sigma).all()
-        if self.stated and np.isnan(sigma).any():
-            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
-        self.scale = 1.0 / sigma if self.stated else self.scale
-        """1 over the standard deviations."""
+        self.stated, self.scale = any(record.sigma for record in records), np.ones(high)
+        """Whether errors are stated; 1 over the standard deviations."""
+        if self.stated:
+            sigma = self.vector([_table(record.sigma or {}, outputs, len(record)) for record in records])
+            if np.isnan(sigma).any():
+                raise ValueError("standard deviations must be stated for all measured outputs, or for none")
+            self.scale = 1.0 / sigma
         self.data = self.vector(self.measured)
         most = np.abs(self.data).max()
         if not (most == 0 or 1 / LARGEST < most < LARGEST):
@@ -128,7 +127,7 @@ class Problem:
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
-        flat = [table.T.reshape(*table.shape[:1:-1], table.shape[0] * table.shape[1]) for table in tables]
+        flat = [table.T.reshape(*table.shape[:1:-1], -1) for table in tables]
         rows = np.concatenate(flat, axis=-1).take(self.places, axis=-1)
         rows *= self.scale
         return rows.T

@@ -23,6 +23,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.identify.expression_functions import Compiled, jacobian, usual
 from rotorid.identify.ode import OdeModel, SimulationError
 from rotorid.identify.record_least_squares import Iterations, Problem
+from rotorid.identify.records import inputs_of
 from rotorid.identify.simulation import STEPWISE
 from rotorid.regression import gain, least_squares
 from rotorid.regression.estimate import Combination, Estimate
@@ -54,7 +55,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         r, J = estimate.residuals, problem.jacobian(theta)
     except SimulationError as error:
         words.append(f"the model cannot be simulated with the result: {error}")
-        nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix"))
+        nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix", "poor"))
         return nothing | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
     prior = effect(problem.prior, J, r, theta, at_bounds=path.at_bounds)
     if prior is not None:
@@ -88,6 +89,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         # too few samples to say that they are correlated may well make intervals too narrow
         "estimate": _widened(estimate, (factor if chance < SUSPECT else 1.0) if sound else None),
         "reliable": sound and not ordered,
+        "poor": bool(poor),
         "warnings": [*words, _fast(problem, theta)],
         "autocorrelation": rho,
         "prior": prior,
@@ -153,40 +155,39 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     """
     from scipy.special import fdtrc
 
-    t, Q = problem.by_time([record.t for record in problem.records]), np.linalg.svd(J, full_matrices=False)[0]
-    parts, G = np.vstack((r, Q.T)) * problem.scale, gain(J, rcond=JACOBIAN_RCOND)
+    t, (Q, R) = problem.by_time([record.t for record in problem.records]), np.linalg.qr(J)
+    Q, G = Q.T, gain(R, rcond=JACOBIAN_RCOND)
     # of noise it is χ² of two
     best, frequency, span, series = 20.0 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
     for _, rows in problem.series:
         times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
             continue
-        even = np.linspace(times[0], times[-1], n)
-        w, *A = np.fft.rfft([np.interp(even, times, part) for part in parts[:, rows]], 4 * n)[:, 4:]
-        half = float(size @ size) / 2
-        Z = np.square(A)
-        P, Z = half - np.abs(Z).sum(axis=0) / 2, Z.sum(axis=0) / 2
+        even, half = np.linspace(times[0], times[-1], n), size @ size / 2
+        w, P, Z = np.array([0.0, half, 0.0])
+        for column in (*Q, r):  # sums over those before
+            P, Z = P - np.abs(w) ** 2 / 2, Z + np.square(w) / 2
+            w = np.fft.rfft(np.interp(even, times, size * column[rows]), 4 * n)[4:]
         det = P**2 - np.abs(Z) ** 2
         power = (P * np.abs(w) ** 2 + (Z.conj() * w**2).real) / np.where(det > 1e-3 * half**2, det, np.inf)
         if power.max() > best:
-            best, span, series = float(power.max()), float(times[-1] - times[0]), rows
+            best, span, series = float(power.max()), float(np.ptp(times)), rows
             frequency = (4 + int(np.argmax(power))) / (4 * n) * (n - 1) / span
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
         frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
     C, waves = np.zeros((len(r), 2)), np.exp(2j * np.pi * frequency * t[series])
     C[series] = problem.scale[series, None] * np.column_stack((waves.real, waves.imag))
-    outside = C - J @ (G @ C)  # what the parameters take of y is J G y
-    free = len(r) - round(float(np.sum(G.T * J))) - 2
-    amount, _, _, size = np.linalg.lstsq(outside, -r, rcond=None)
-    if not frequency or free < 3 or size[1] <= 1e-6 * np.abs(C).max():
+    outside, free = C - Q.T @ (Q @ C), len(r) - len(Q) - 2
+    amount, _, _, lengths = np.linalg.lstsq(outside, -r, rcond=None)
+    if not frequency or free < 3 or lengths[1] <= 1e-6 * np.abs(C).max():
         return "", False
     rest = r + outside @ amount
     taken, left = float(r @ r - rest @ rest), max(float(rest @ rest) / free, 1e-300)
     _, white, factor = _correlated(problem, rest, [series])
     spread = max(left * factor**2, 1.0 * problem.stated)
     error = np.maximum(np.sqrt(spread * (G**2).sum(axis=1)), 1e-300)
-    share, shift = taken / float(r @ r), float(np.max(np.abs(G @ (C @ amount)) / error))
+    share, shift = taken / float(r @ r), float(np.max(np.abs(G @ (Q @ (C @ amount))) / error))
     # a line beside others is rather a vibration that the model does not describe
     if white < CHANCE or max(share / SHARE, shift / FAR) < 1 or fdtrc(2, free, taken / spread / 2) >= CHANCE:
         return "", False
@@ -219,7 +220,7 @@ def _errors_words(problem: Problem, estimate: Estimate, r: FloatArray, linear: b
 def _fast(problem: Problem, theta: FloatArray) -> str:
     """Words where vibrations about the first states are faster than samples can tell."""
     model, record, n = problem.model, problem.records[0], len(problem.model.states)
-    A = model.f(record.t[0], problem.runs[0].x[0], theta, problem.inputs[0][0])[:, 1 : 1 + n]
+    A = model.f(record.t[0], model.x0(theta)[:, 0], theta, inputs_of(model, record)[0])[:, 1 : 1 + n]
     if len(record) < 3 or not n or not np.isfinite(A).all():
         return ""
     fastest, most = np.abs(np.linalg.eigvals(A).imag).max(), np.pi / np.median(np.diff(record.t))

@@ -83,8 +83,8 @@ class Record:
         steps = np.diff(self.t)
         # of steps that differ by rounding the mean is taken: an error of one would add up over the record
         kinds = np.round((steps - steps[:1]) / (SAME_STEP * np.abs(self.t).max()))
-        _, one, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
-        return steps[one] + np.bincount(which, steps - steps[one][which]) / count, which
+        _, which, count = np.unique(kinds, return_inverse=True, return_counts=True)
+        return steps[:1] + np.bincount(which, steps - steps[:1]) / count, which
 
 
 def refined(record: Record, every: int) -> tuple[Record, IntArray]:

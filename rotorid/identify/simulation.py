@@ -13,7 +13,7 @@ from rotorid.base.choices import Method, find
 from rotorid.identify.adaptive_steps import LARGEST, adaptive
 from rotorid.identify.integrators import HEUN, System, exact, stepwise
 from rotorid.identify.ode import OdeModel, SimulationError
-from rotorid.identify.records import Record, inputs_of
+from rotorid.identify.records import Record
 
 STEPWISE = (*HEUN, "rk4")
 """Integrators without error control, of one step from sample to sample."""
@@ -49,7 +49,7 @@ class Trajectory:
     x, y
         States (n, n_x) and outputs (n, n_y).
     S, y_theta
-        Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
+        Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); empty without sensitivities.
     integrator
         The one used: "none" without states.
     calls
@@ -109,19 +109,27 @@ def simulate(
     t, n = given.t, len(model.states)
     system, used = System(model, values, given, sensitivities), "none"
     table = np.zeros((len(t), n, 1 + system.k))
-    if n:
-        table, used = _solved(system, integrator, rtol)
-        _check(model, t, table)
-    x, S = table[..., 0], table[..., 1:]
-    y, y_theta = model.outputs_of(t, x, S, values, system.u)
-    if not system.k:
-        S, y_theta = (np.zeros((len(t), each, len(values))) for each in (n, y.shape[1]))
-    for i, j in np.argwhere(~np.isfinite(y + y_theta.sum(axis=-1)))[:1]:
+    if integrator in STEPWISE and n:
+        table, used = stepwise(system, integrator), integrator
+    elif n and (integrator == "expm" or (integrator == "auto" and model.linear_driven)):
+        table, used = exact(system), "expm"
+    elif n:
+        table, used = adaptive(system, rtol, integrator)
+    if not -LARGEST < table.min(initial=0.0) <= table.max(initial=0.0) < LARGEST:
+        largest = np.append(LARGEST, np.full(system.k, np.inf))
+        lost = np.logical_not(np.abs(table) < largest)
+        for i, k, j in np.argwhere(lost.swapaxes(1, 2))[:1].tolist():
+            value = f"state {model.states[j]}{' or its sensitivity' * (k > 0)} is {table[i, j, k]:.3g}"
+            raise SimulationError(
+                f"the solution diverges: at t = {t[i]:.6g} the {value}; choose other parameters or bounds"
+            )
+    seen = model.h(t, table, values, system.u)
+    for i, j in np.argwhere(~np.isfinite(seen.sum(axis=-1)))[:1]:
         raise SimulationError(
             f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
             "the output"
         )
-    return Trajectory(t, x, S, y, y_theta, used, system.calls)
+    return Trajectory(t, table[..., 0], table[..., 1:], seen[..., 0], seen[..., 1:], used, system.calls)
 
 
 def simulated_record(
@@ -143,25 +151,3 @@ def simulated_record(
         y = y + errors * [sigma[name] for name in model.outputs]
     columns = y.T if digits is None else [significant(column, digits) for column in y.T]
     return replace(plan, outputs=dict(zip(model.outputs, columns, strict=True)), sigma=sigma)
-
-
-def _solved(system: System, integrator: str, rtol: float) -> tuple[FloatArray, str]:
-    """States and sensitivities (n, n_x, 1 + k), and the integrator used."""
-    if integrator in STEPWISE:
-        return stepwise(system, integrator), integrator
-    if integrator == "expm" or (integrator == "auto" and system.model.linear_driven):
-        return exact(system), "expm"
-    return adaptive(system, rtol, integrator)
-
-
-def _check(model: OdeModel, t: FloatArray, table: FloatArray) -> None:
-    """Refuse states and sensitivities (n, n_x, 1 + k) that have diverged, with the first time."""
-    if -LARGEST < table.min(initial=0) <= table.max(initial=0) < LARGEST:
-        return
-    largest = np.append(LARGEST, np.full(table.shape[2] - 1, np.inf))
-    lost = np.logical_not(np.abs(table) < largest)
-    for i, k, j in np.argwhere(lost.swapaxes(1, 2))[:1].tolist():
-        value = f"state {model.states[j]}{' or its sensitivity' * (k > 0)} is {table[i, j, k]:.3g}"
-        raise SimulationError(
-            f"the solution diverges: at t = {t[i]:.6g} the {value}; choose other parameters or bounds"
-        )

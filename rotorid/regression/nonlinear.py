@@ -241,20 +241,20 @@ class _Search:
     def polish(self, x: FloatArray) -> tuple[FloatArray, Estimate, bool]:
         """Gauss–Newton to the last digits; the kernel's judgement; whether the last step is negligible."""
         r = self.residual(x)
-        cost, (step, size, rows) = self._pass(x, r), self._step(x, r)
+        cost, (step, size, rows) = self._pass(x, self._cost(r)), self._step(x, r)
         for _ in range(POLISH):
             if size < 1e-9:
                 break
             new = np.clip(x + step, self.lower, self.upper)
             with np.errstate(all="ignore"):  # a step too far is refused
                 new_r = self.residual(new)
-                better = np.isfinite(new_r).all() and self._cost(new_r) <= cost * (1 + 1e-9)
-            if not better:
+                new_cost = self._cost(new_r)
+            if not new_cost <= cost * (1 + 1e-9) < np.inf:
                 break
             further = self._step(new, new_r)
             if further[1] > 0.9 * size:  # it does not contract here, or rounding is all that is left
                 break
-            x, r, cost, (step, size, rows) = new, new_r, self._pass(new, new_r), further
+            x, r, cost, (step, size, rows) = new, new_r, self._pass(new, new_cost), further
         sigma = 1.0 if self.stated and np.isinf(self.limit) else None
         best = least_squares(*rows, names=self.names, sigma=sigma, rcond=JACOBIAN_RCOND)
         left = 1.0 if sigma else best.residuals @ best.residuals / max(best.dof, 1)
@@ -266,16 +266,15 @@ class _Search:
         size = np.minimum(np.abs(r), self.limit)
         return float(np.sum(size * (np.abs(r) - size / 2)))
 
-    def _pass(self, x: FloatArray, r: FloatArray) -> float:
-        """Note an accepted point, once; its cost."""
-        cost = self._cost(r)
+    def _pass(self, x: FloatArray, cost: float) -> float:
+        """Note an accepted point, once, and its cost."""
         if not self.path or not np.array_equal(self.path[-1][0], x):
             self.path.append((x.copy(), cost))
         return cost
 
     def _at_accepted(self, x: FloatArray) -> FloatArray:
         """Derivatives for the driver, which asks for them at accepted points only."""
-        self._pass(x, self.residual(x))
+        self._pass(x, self._cost(self.residual(x)))
         return np.array(self.slopes(x))
 
     def _step(self, x: FloatArray, r: FloatArray) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray]]:

@@ -63,5 +63,7 @@ def state_space_of(model, theta=None):
     theta = model.start if theta is None else np.asarray(theta, dtype=float)
     n, both = len(model.states), np.eye(len(model.states) + len(model.inputs))
     A, _, B = np.split(model.matrices(theta)[0], np.add(n, (0, 1)), axis=1)
-    C, D = np.split(model.h(np.zeros(len(both)), both[:, :n], theta, both[:, n:])[..., 0].T, [n], axis=1)
+    C, D = np.split(
+        model.h(np.zeros(len(both)), both[:, :n, None], theta, both[:, n:])[..., 0].T, [n], axis=1
+    )
     return fem.StateSpace(A, B, C, D, model.states, model.inputs, model.outputs)

@@ -72,9 +72,7 @@ def test_sensitivities_against_differences(make, integrator):
     np.testing.assert_allclose(np.concatenate([run.S, run.y_theta], 1), slopes, atol=3e-8)
     plain = simulate(model, theta, t, integrator=integrator, rtol=1e-12, sensitivities=False)
     np.testing.assert_allclose(plain.x, run.x, atol=1e-8)
-    assert plain.S.shape == run.S.shape
-    assert not plain.S.any()
-    assert not plain.y_theta.any()
+    assert plain.S.shape[2] == plain.y_theta.shape[2] == 0
 
 
 @pytest.mark.parametrize("begin", [1e3, 1.7e9])
