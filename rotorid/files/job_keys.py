@@ -117,7 +117,7 @@ def _share(value: object) -> tuple[float, float]:
 
 Arcs = Annotated[
     tuple[Pair, ...],
-    BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | str),
+    BeforeValidator(_pairs, json_schema_input_type=Annotated[list[Pair], Field(min_length=1)] | Pair | Text),
     AfterValidator(_different),
     Field(min_length=1),
 ]

@@ -421,7 +421,7 @@ Date = Annotated[datetime.date, BeforeValidator(_day)]
 def listed(inner: Any, check: Callable[[Any], Any] = tuple) -> Any:  # noqa: ANN401  an annotation
     """The type of a list, checked, that may also be one value, or a text of values with semicolons."""
     several = Field(min_length=1)
-    written = inner | Annotated[list[inner], several] | str
+    written = inner | Annotated[list[inner], several] | Text
     parts = BeforeValidator(_parts, json_schema_input_type=written)
     return Annotated[tuple[inner, ...], parts, several, AfterValidator(check)]
 

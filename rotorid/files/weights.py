@@ -20,7 +20,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.cells import Cell, Grid, NotANumber, parse_number, show
+from rotorid.files.cells import Grid, NotANumber, Row, parse_number, show
 from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.input_problems import InputError, Problems
@@ -100,7 +100,6 @@ def _read_table(
 ) -> Weights | None:
     """Of one table."""
     find, before = partial(find_header, weights=True), len(problems)
-    unknown = _Unknown()
     try:
         grid, unknown = _without_marks(read_grid(source, "weights", problems, may_be_empty=True, find=find))
         grid = _one_weight_a_row(grid, conventions)
@@ -119,8 +118,11 @@ def _read_table(
     if table is None:
         return None
     size, plane, stem = table.numbers("mass"), table.texts("plane"), "run" if "run" in table else "plane"
-    expected = "a weight above 0 (a run without weights has no row here; what was removed is one 180° away)"
-    table.complain_where(size <= 0, "mass", expected)
+    table.complain_where(
+        size <= 0,
+        "mass",
+        "a weight above 0 (a run without weights has no row here; what was removed is one 180° away)",
+    )
     names = table.texts("run") if "run" in table else (runs or ("",)) * len(table)
     run_names = runs or ()
     folded = {name.casefold(): name for name in run_names}
@@ -193,11 +195,15 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
         raise NotANumber("a time of the clock face, such as 10:20")
     if not written or (stem not in _PLACES[1:3] and match is None):
         raise NotANumber("an angle from -360 to 360 degrees, a hole or a clock, such as 10:20")
+    if stem == "hole" and table.texts("blade")[i]:
+        raise NotANumber("nothing here, or no blade beside it")
     hole, plane = match[1] if match else written, table.texts("plane")[i]
     holes = conventions.holes.get(plane, {})
     if not holes:
-        keys = f"[planes.{plane}] holes = 12 or holes_deg = [0, 30, 75]"
-        raise NotANumber(f"an angle, or the holes of the plane in the job, {keys}")
+        raise NotANumber(
+            f"an angle, or the holes of the plane in the job, [planes.{plane}] holes = 12 or "
+            "holes_deg = [0, 30, 75]"
+        )
     if hole not in holes:
         hint = f"{did_you_mean(hole, holes)}; it has {listing(holes, 'and')}"
         raise NotANumber(f"a hole of plane {plane!r}{hint}")
@@ -209,7 +215,7 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
 def _without_marks(grid: Grid) -> tuple[Grid, _Unknown]:
     """A weights table with numbers in place of `?`, and where these stood."""
     columns = [h for h in read_headings(grid.header, weights=True) if h.stem in WEIGHT]
-    rows, unknown = list[tuple[int, tuple[Cell, ...]]](), _Unknown()
+    rows, unknown = list[Row](), _Unknown()
     for number, cells in grid.rows:
         new = list(cells)
         for heading in columns:

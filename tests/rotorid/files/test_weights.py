@@ -60,6 +60,7 @@ def test_units_of_weights_as_people_write_them(tmp_path, heading, unit, si):
 
 BAD = {
     "no holes": ("mass_g,hole", "10,3", "row 2, column hole: found '3', expected an angle, or the holes of"),
+    "hole and blade": ("mass_g,hole,blade", "10,3,4", "row 2, column hole: found '3', expected nothing here"),
     "no clock": ("mass_g,clock", "10,13:20", "row 2, column clock: found '13:20', expected a time of the"),
     "radians or degrees": ("Mass (g),Angle", "10,3", "row 1, column Angle: found 'Angle', expected its unit"),
     "nothing": ("mass_g,angle_deg", "0,3", "row 2, column mass_g: found '0', expected a weight above 0"),
