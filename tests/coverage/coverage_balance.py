@@ -206,32 +206,18 @@ def ordinary(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def simulate(
-    jobs: int,
-    source: str,
-    kind: str,
-    errors: Errors = ordinary,
-    told: float = 1.0,
-    seed: int = 1,
-    apart: float | None = None,
+    jobs: int, source: str, kind: str, errors: Errors = ordinary, groups: Groups | None = None, **more: Any
 ) -> list[Outcome]:
-    """So many jobs of a class."""
+    """So many jobs of a class; with `groups` of three planes, whose weights these hold together."""
     places = SOURCES.index(source) if source in SOURCES else 9, (*KINDS, *OTHERS).index(kind)
-    rng = np.random.default_rng([seed, *places])
-    return [outcome(draw(rng, source, kind, errors(rng), told, apart=apart)) for _ in range(jobs)]
+    rng, shares = np.random.default_rng([1, *places]), groups and unknowns(groups, [*groups], "ABC").shares
+    drawn = (draw(rng, source, kind, errors(rng), shares=shares, **more) for _ in range(jobs))
+    return [outcome(job, groups=groups) for job in drawn]
 
 
-def held_together(jobs: int, kind: str) -> list[Outcome]:
-    """So many jobs with the weights of three planes in two groups."""
-    rng, shares = np.random.default_rng([3, KINDS.index(kind)]), unknowns(GROUPS, [*GROUPS], "ABC").shares
-    drawn = (draw(rng, SOURCES[0], kind, ordinary(rng), shares=shares) for _ in range(jobs))
-    return [outcome(job, groups=GROUPS) for job in drawn]
-
-
-def every_kind(
-    jobs: int, source: str, errors: Errors = ordinary, told: float = 1.0, kinds: Sequence[str] = KINDS
-) -> list[Outcome]:
+def every_kind(jobs: int, source: str, kinds: Sequence[str] = KINDS, **more: Any) -> list[Outcome]:
     """Jobs of all kinds of errors between runs."""
-    return [one for kind in kinds for one in simulate(-(-jobs // len(kinds)), source, kind, errors, told)]
+    return [one for kind in kinds for one in simulate(-(-jobs // len(kinds)), source, kind, **more)]
 
 
 def line(name: str, found: Iterable[Outcome]) -> str:
@@ -273,15 +259,13 @@ def main(jobs: int = 1000) -> None:
 
     print(f"\nb. Errors assumed, the true ones so many times as large\n{head}")
     for times in TIMES:
-        print(line(f"{times:g} times", every_kind(jobs, "assumed", lambda _, t=times: assumed(t))))
+        print(line(f"{times:g} times", every_kind(jobs, "assumed", errors=assumed(times))))
 
     print("\nc. Warned, of jobs with 8 or more redundant readings whose errors are twice as large as taken")
     for names, words in ((KINDS[:1], "independent"), (KINDS[1:], "in common")):
-        for source in (*SOURCES[:2], SOURCES[-1]):
-            found = every_kind(jobs, source, told=2.0, kinds=names)
-            print(f"{source + ': ' + words:<44}{told_of(found, 8)}")
-        found = every_kind(jobs, "assumed", lambda _: assumed(2.0), kinds=names)
-        print(f"{'assumed: ' + words:<44}{told_of(found, 8)}")
+        every = [(source, {"told": 2.0}) for source in (*SOURCES[:2], SOURCES[-1])]
+        for source, how in (*every, ("assumed", {"errors": assumed(2.0)})):
+            print(f"{source + ': ' + words:<44}{told_of(every_kind(jobs, source, names, **how), 8)}")
 
     print("\nd. Stated errors, trial weights 0.05–1.5 of the correction: regions that hold the truth, by")
     for method in ("weighted", "least-squares"):
@@ -294,23 +278,21 @@ def main(jobs: int = 1000) -> None:
             print(f"{name:<60}{percent(at):>6} of {len(at)}")
 
     print(f"\ne. Weights of three planes that two groups hold together; errors stated\n{head}")
-    print(line("all", [one for kind in KINDS for one in held_together(jobs // 5, kind)]))
+    print(line("all", every_kind(jobs, SOURCES[0], groups=GROUPS)))
 
     print(f"\nf. Errors of other kinds, stated as of runs, and planes that act alike but for a tenth\n{head}")
-    for name, source, kind, apart in (
-        ("drift of all runs", SOURCES[0], "drift", None),
-        ("drift of all runs, spare runs", SOURCES[3], "drift", None),
-        ("weights misplaced", SOURCES[0], "placement", None),
-        ("weights misplaced, spare runs", SOURCES[3], "placement", None),
-        ("planes nearly alike", SOURCES[0], KINDS[1], 0.1),
-        ("planes nearly alike, spare runs", SOURCES[3], KINDS[1], 0.1),
+    for name, kind, apart in (
+        ("drift of all runs", "drift", None),
+        ("weights misplaced", "placement", None),
+        ("planes nearly alike", KINDS[1], 0.1),
     ):
-        print(line(name, simulate(jobs, source, kind, apart=apart)))
+        for source, words in ((SOURCES[0], ""), (SOURCES[3], ", spare runs")):
+            print(line(name + words, simulate(jobs, source, kind, apart=apart)))
 
 
-def assumed(times: float) -> tuple[float, float]:
+def assumed(times: float) -> Errors:
     """Errors so many times as large as those that are assumed."""
-    return ASSUMED * times, ASSUMED * times
+    return lambda _: (ASSUMED * times, ASSUMED * times)
 
 
 if __name__ == "__main__":

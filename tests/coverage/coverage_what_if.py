@@ -1,6 +1,6 @@
 """Does what is predicted for given weights hold? Drawn jobs whose truth is known, each with a check run.
 
-Run `python tests/coverage/coverage_what_if.py [jobs]`, jobs of each source of errors (200).
+Run `python tests/coverage/coverage_what_if.py [jobs]`, jobs of each source of errors (1000).
 The jobs are those of `coverage_balance`. The weights are the true correction, each off by 0.1–1 of its size
 in any direction. The check run has the errors of every other run. Corrections that may make it worse are
 those of the first speed; at the others there is unbalance outside the planes, 0.3–3 times what these hold.
@@ -65,7 +65,7 @@ def simulate(jobs, source):
     return [np.concatenate(each) for each in zip(*found, strict=True)]
 
 
-def main(jobs=200):
+def main(jobs=1000):
     """Print the table."""
     print(" " * 24 + "".join(f"{head:>12}" for head in HEADS))
     every = {source: simulate(jobs, source) for source in balance.SOURCES}

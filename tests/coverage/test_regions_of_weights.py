@@ -4,6 +4,8 @@ The tables of the example with fewer jobs. Bounds: a share that is at its requir
 distribution of so many jobs.
 """
 
+from importlib import import_module
+
 import coverage_balance as example
 import coverage_special as special
 import numpy as np
@@ -51,13 +53,14 @@ def test_errors_twice_as_large_as_stated():
 
 
 def test_assumed_errors_that_are_not_too_small():
-    inside = silent(example.every_kind(500 if FULL else 150, "assumed", lambda _: example.assumed(1.0)))
+    inside = silent(example.every_kind(500 if FULL else 150, "assumed", errors=example.assumed(1.0)))
     assert np.mean(inside) >= lowest_share(len(inside), 0.93)
 
 
-def test_the_tables_are_printed(capsys):
-    example.main(8)
-    assert sure.titles(capsys.readouterr().out) == sure.titles("".join(sure.blocks("balance")))
+@pytest.mark.parametrize("name", ["balance", "special", "what_if", "without_phase"])
+def test_the_tables_are_those_of_the_page(name, capsys):
+    import_module(f"coverage_{name}").main(3)
+    assert sure.titles(capsys.readouterr().out) == sure.titles("".join(sure.blocks(name)))
 
 
 @pytest.mark.parametrize(("count", "before"), special.ROWS.values(), ids=special.ROWS)

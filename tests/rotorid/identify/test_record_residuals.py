@@ -250,3 +250,12 @@ def test_combinations_are_what_the_record_determines(rates, initial, output, sta
     for one, (name, value) in zip(combinations, words.items(), strict=True):
         assert name in (None, one.words)
         assert abs(one.value - value) < 4 * one.std
+
+
+def test_order_that_is_too_slight_for_words_widens_intervals(monkeypatch):
+    data = record(0, extra=0.006 * autoregressive(0.6, 0, len(T)))
+    wide = fit(oscillator(), data)
+    monkeypatch.setattr("rotorid.identify.record_warnings.SUSPECT", 0)
+    rho, plain = wide.autocorrelation, fit(oscillator(), data)
+    assert wide.reliable
+    assert (wide.std / plain.std)[0] ** 2 == pytest.approx((1 + rho) / (1 - rho))
