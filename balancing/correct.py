@@ -96,7 +96,7 @@ def correct(  # noqa: PLR0913
     today = todays(influence, baseline)
     grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
     chosen = plane_indices(today, grouped.planes if grouped else planes)
-    used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
+    used = match_speeds(speeds, today.speeds)
     if grouped is not None and grouped.constrained:
         every = range(len(today.speeds))
         result = correct(
@@ -225,7 +225,5 @@ def _explained(part: Influence, D: ComplexArray) -> bool:
     """Whether what is left of Y₀ + W D, free of other weights, is within what 95 % of the draws leave."""
     noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
     effects = (z * W[None] for W in np.moveaxis(part.W, -1, 0) for z in (1, 1j))
-    rest, *columns, drawn = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)
-    basis = np.linalg.qr(np.column_stack(columns))[0]
-    left, usual = (np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (rest, drawn))
+    left, *usual = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)[2]
     return bool(left <= np.quantile(usual, LEVEL))
