@@ -274,7 +274,7 @@ def compare_check(
     ValueError
         For sensors, speeds or planes without coefficients, and a baseline that does not fit.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
+    today = influence.rebased(baseline)
     part = today.part(*match_readings(check, today))
     local = local_runs(part, _as_mounted(check, correction))
     predicted = part.baseline + np.einsum("scp,rp->rsc", part.W, local.weights)
@@ -290,9 +290,9 @@ def compare_check(
         covariance = np.einsum("scrarb->rscab", V.reshape(S, C, R, 2, R, 2))
         d = real_parts(difference[..., None])
         distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
-        target, drawn = whitened(part, noise, difference)
-        chi_square = float(np.sum(target**2))
-        probability = (1 + np.count_nonzero(np.sum(drawn**2, axis=0) >= chi_square)) / (1 + DRAWS)
+        squares = whitened(part, noise, difference)[2]
+        chi_square = float(squares[0])
+        probability = np.count_nonzero(squares >= chi_square) / (1 + DRAWS)
         explained = bool(probability >= 1 - LEVEL)
         change = None if explained else _change(part, local, difference)
     return CheckComparison(
@@ -317,21 +317,20 @@ def compare_check(
     )
 
 
-def whitened(part: Influence, noise: Noise, *differences: ComplexArray) -> list[FloatArray]:
-    """Differences (R, S, C) and draws of their noise divided by its size: (n,) each, and (n, DRAWS)."""
+def whitened(
+    part: Influence, noise: Noise, difference: ComplexArray, *effects: ComplexArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A difference and effects (R, S, C) divided by the size of a noise, (n,) and (n, k).
+
+    And the sums of squares that the effects leave of it and of draws of the noise, (1 + DRAWS,).
+    """
     white = Whitening(noise, part.errors.sizes)
-    each = [white.white(real_parts(np.moveaxis(one, 0, -1))[..., None])[:, 0] for one in differences]
-    drawn = [white.white(np.moveaxis(real_parts(block), 0, -1)) for block in part.noise_draws(noise, DRAWS)]
-    return [*each, np.column_stack(drawn)]
-
-
-def share_left(A: FloatArray, target: FloatArray, drawn: FloatArray) -> float:
-    """Square of what columns A leave of a target (n,), over what they leave of 95 % of draws (n, DRAWS)."""
+    y, *columns = (white.white(real_parts(np.moveaxis(z, 0, -1))[..., None]) for z in (difference, *effects))
+    A = np.hstack((y[:, :0], *columns))
     basis = np.linalg.qr(A)[0]
-    left, usual = (
-        np.sum(each**2, axis=0) - np.sum((basis.T @ each) ** 2, axis=0) for each in (target, drawn)
-    )
-    return float(left / np.quantile(usual, LEVEL))
+    drawn = (white.white(np.moveaxis(real_parts(z), 0, -1)) for z in part.noise_draws(noise, DRAWS))
+    left = [np.sum(z**2, axis=0) - np.sum((basis.T @ z) ** 2, axis=0) for z in chain((y,), drawn)]
+    return y[:, 0], A, np.concatenate(left)
 
 
 def _change(part: Influence, check: Trials, difference: ComplexArray) -> ComplexArray | None:
@@ -348,11 +347,10 @@ def _change(part: Influence, check: Trials, difference: ComplexArray) -> Complex
         change = np.zeros(P, dtype=complex)
         for _ in range(2):  # errors depend on what is mounted
             noise = part.difference_noise(replace(check, weights=check.weights + change))
-            target, *columns, drawn = whitened(part, noise, difference, *effects)
-            A = np.column_stack(columns)
+            target, A, (left, *usual) = whitened(part, noise, difference, *effects)
             change[planes] = unstretch(solution(A, target, rcond=1e-10))
-        if (share := share_left(A, target, drawn)) <= 1:
-            fits.append((share, change))
+        if left <= (most := np.quantile(usual, LEVEL)):
+            fits.append((left / most, change))
     return min(fits, key=lambda fit: fit[0])[1] if fits else None
 
 

@@ -229,7 +229,7 @@ def mount(
             f'free: taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
         )
     if mounted.any():
-        today = influence if baseline is None else influence.rebased(baseline)
+        today = influence.rebased(baseline)
         loads = in_order(mounted, c.mounted.planes, today.planes)
         Y = Y + today.W[match_speeds(c.speeds, today.speeds)] @ loads
     counts = c.row_weights
@@ -260,8 +260,7 @@ def mount(
 
 def _bound(c: Correction) -> Callable[[ComplexArray], float]:
     """Root mean square that 95 of 100 check runs stay below around a prediction (S, C)."""
-    drawn = check_readings(c.influence, c.weights)
-    errors = drawn if len(drawn) else np.zeros((1, *c.after.shape))
+    errors = np.concatenate([*check_readings(c.influence, c.weights)] or [np.zeros((1, *c.after.shape))])
     return lambda left: float(np.quantile(np.sqrt(np.mean(np.abs(left + errors) ** 2, axis=(1, 2))), LEVEL))
 
 

@@ -34,11 +34,7 @@ from balancing.conditioning import chance
 from balancing.conventions import Labels
 from balancing.error_draws import Gaussian
 from balancing.groups import mapped
-from balancing.influence import (
-    Influence,
-    Remarks,
-    match_speeds,
-)
+from balancing.influence import Influence, Remarks, match_readings
 from balancing.regions import mean_variances
 from rotorid.base.text import Quantity, rpm_text
 
@@ -181,11 +177,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
             f"{computed.labels.weight_unit}: compute them with the radii of the planes, per mass, or "
             "without, per unbalance"
         )
-    at = match_speeds(measured.speeds, computed.speeds, "computed coefficients")
-    lacking = [name for name in measured.sensors if name not in computed.sensors]
-    if lacking:
-        raise ValueError(f"there are no computed coefficients of sensor {', '.join(map(repr, lacking))}")
-    computed = computed.part(at, [computed.sensors.index(name) for name in measured.sensors])
+    computed = computed.part(*match_readings(measured, computed, "computed coefficients"))
     planes = tuple(dict.fromkeys((*measured.planes, *computed.planes)))
     first, second = (np.isin(planes, side.planes) for side in (measured, computed))
     one, other = (mapped(side, planes, np.equal.outer(side.planes, planes)) for side in (measured, computed))

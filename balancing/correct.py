@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.check_run import share_left, whitened
+from balancing.check_run import whitened
 from balancing.conditioning import UndeterminedError, check_planes, check_stack, conditioning, unresolved
 from balancing.correction_result import Correction
 from balancing.groups import Groups, mapped, unknowns
@@ -96,7 +96,7 @@ def correct(  # noqa: PLR0913
     today = todays(influence, baseline)
     grouped = unknowns(groups, planes, today.planes) if planes and set(planes) & set(groups) else None
     chosen = plane_indices(today, grouped.planes if grouped else planes)
-    used = list(range(len(today.speeds))) if speeds is None else match_speeds(speeds, today.speeds)
+    used = match_speeds(speeds, today.speeds)
     if grouped is not None and grouped.constrained:
         every = range(len(today.speeds))
         result = correct(
@@ -225,5 +225,5 @@ def _explained(part: Influence, D: ComplexArray) -> bool:
     """Whether what is left of Y₀ + W D, free of other weights, is within what 95 % of the draws leave."""
     noise = part.errors.noise.changed(np.concatenate(([1.0], D))[None])
     effects = (z * W[None] for W in np.moveaxis(part.W, -1, 0) for z in (1, 1j))
-    rest, *columns, drawn = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)
-    return share_left(np.column_stack(columns), rest, drawn) <= 1
+    left, *usual = whitened(part, noise, (part.baseline + part.W @ D)[None], *effects)[2]
+    return bool(left <= np.quantile(usual, LEVEL))

@@ -12,6 +12,7 @@ each kind (readings, own part of a run, what is common to it, further unbalance,
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import covariance_root, stretch, unstretch
 
-BLOCK = 200_000
+BLOCK = 20_000
 """Readings of a block of draws."""
 READING, OWN, COMMON, LOADS, UNBALANCE, KNOWN = range(6)
 
@@ -38,7 +39,7 @@ READING, OWN, COMMON, LOADS, UNBALANCE, KNOWN = range(6)
 class Noise(NamedTuple):
     """Errors of (Y₀, W): blocks by reading, and columns in common.
 
-    `blocks` (2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1;
+    `blocks` (1 or 2, S, C, 2P + 2, 2P + 2): covariances by readings, and by the own part of runs of size 1;
     `columns` (M, S, C, P + 1) of size 1, and `kind` (M,), which size each has.
     """
 
@@ -51,7 +52,7 @@ class Noise(NamedTuple):
         chosen = [0, *(1 + p for p in planes)]
         real = [2 * k + part for k in chosen for part in (0, 1)]
         return Noise(
-            self.blocks[np.ix_((0, 1), speeds, sensors, real, real)],
+            self.blocks[np.ix_(range(len(self.blocks)), speeds, sensors, real, real)],
             self.columns[np.ix_(range(len(self.columns)), speeds, sensors, chosen)],
             self.kind,
         )
@@ -65,18 +66,21 @@ class Noise(NamedTuple):
     def plus(self, other: Noise) -> Noise:
         """Together with an independent one."""
         columns = np.concatenate((self.columns, other.columns))
-        return Noise(self.blocks + other.blocks, columns, np.concatenate((self.kind, other.kind)))
+        blocks = [a + b for a, b in zip_longest(self.blocks, other.blocks, fillvalue=0.0)]
+        return Noise(np.array(blocks), columns, np.concatenate((self.kind, other.kind)))
 
     def at(self, sizes: FloatArray) -> tuple[FloatArray, ComplexArray]:
         """Own covariances (S, C, 2P + 2, 2P + 2) and columns at sizes (6,) of the kinds."""
-        blocks = np.tensordot(sizes[:2] ** 2, self.blocks, axes=1)
+        blocks = np.tensordot(sizes[: len(self.blocks)] ** 2, self.blocks, axes=1)
         return blocks, self.columns * sizes[self.kind][:, None, None, None]
 
     def covariance(self, sizes: FloatArray) -> FloatArray:
         """Covariance of each reading, (S, C, 2P + 2, 2P + 2), at sizes (6,) of the kinds."""
         blocks, columns = self.at(sizes)
-        F = real_parts(columns)
-        return np.asarray(blocks + np.einsum("mscp,mscq->scpq", F, F, optimize=True))
+        if len(columns):
+            F = real_parts(columns)
+            blocks += np.einsum("mscp,mscq->scpq", F, F, optimize=True)
+        return blocks
 
 
 def kind_sizes(run: RunErrors) -> FloatArray:
@@ -155,7 +159,7 @@ class Gaussian(Errors):
         mounted: Mounted | None = None,
     ) -> Gaussian:
         """Normal errors of this covariance."""
-        noise = Noise(np.stack((blocks, 0 * blocks)), columns, np.full(len(columns), KNOWN))
+        noise = Noise(blocks[None], columns, np.full(len(columns), KNOWN))
         nothing = Mounted("", (), np.zeros(columns.shape[-1] - 1, dtype=complex))
         return super().__new__(cls, noise, reading, run, mounted or nothing)
 
@@ -183,20 +187,19 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
     Y = trials.mean
     R, S, C = Y.shape
     n = G.shape[-2]
+    B = np.broadcast_to(stretch(G), (S, C, 2 * n, 2 * R)).reshape(S, C, 2 * n, R, 2)
     G = np.broadcast_to(G, (S, C, n, R))
-    B = stretch(G).reshape(S, C, 2 * n, R, 2)
-    by_size = np.einsum("rsc,ij->rscij", own_variance(Y, run.evenly), np.eye(2))
-    blocks = [
-        np.einsum("scark,rsckl,scbrl->scab", B, part, B, optimize=True)
-        for part in (reading.covariance(trials), by_size)
-    ]
-    loads = np.einsum("scp,rp->rsc", W, trials.weights)
-    common, loaded = (np.moveaxis(G, -1, 0) * part[..., None] for part in (Y, loads))
-    c = unbalances(W, run.level or rms(Y))
-    further = np.einsum("scnr,scp->rpscn", G, c).reshape(-1, S, C, n)
-    fixed = np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))
-    parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, fixed]
-    kinds = (COMMON, COMMON, LOADS, LOADS, UNBALANCE, UNBALANCE, KNOWN)
+    variances = [reading.covariance(trials)]
+    parts, kinds = [np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))], [KNOWN]
+    if run.sizes.any():
+        variances.append(np.einsum("rsc,ij->rscij", own_variance(Y, run.evenly), np.eye(2)))
+        loads = np.einsum("scp,rp->rsc", W, trials.weights)
+        common, loaded = (np.moveaxis(G, -1, 0) * part[..., None] for part in (Y, loads))
+        c = unbalances(W, run.level or rms(Y))
+        further = np.einsum("scnr,scp->rpscn", G, c).reshape(-1, S, C, n)
+        parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, *parts]
+        kinds = [COMMON, COMMON, LOADS, LOADS, UNBALANCE, UNBALANCE, KNOWN]
+    blocks = [np.einsum("scark,rsckl,scbrl->scab", B, part, B, optimize=True) for part in variances]
     return Noise(np.array(blocks), np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
 
 
@@ -210,10 +213,10 @@ def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray
         f = factors[start : start + step]
         z = rngs[2].standard_normal((len(f), len(noise.kind))) * f[:, noise.kind]
         error = np.tensordot(z, noise.columns, 1)
-        for kind in (READING, OWN):
-            if roots[kind].any() and factors[:, kind].any():
-                z = rngs[kind].standard_normal((len(f), *roots[kind].shape[:-1], 1))
-                error = error + f[:, kind, None, None, None] * unstretch((roots[kind] @ z)[..., 0])
+        for kind, root in enumerate(roots):
+            if root.any() and factors[:, kind].any():
+                z = rngs[kind].standard_normal((len(f), *root.shape[:-1], 1))
+                error += f[:, kind, None, None, None] * unstretch((root @ z)[..., 0])
         yield error
 
 

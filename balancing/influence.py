@@ -229,6 +229,8 @@ class Influence:
         """Coefficients of some speeds, sensors and planes, by their indices; None: of all."""
         sensors = range(len(self.sensors)) if sensors is None else sensors
         planes = list(range(len(self.planes)) if planes is None else planes)
+        if [*speeds, *sensors, *planes] == [k for n in self.W.shape for k in range(n)]:
+            return self
         chosen = tuple(self.planes[p] for p in planes)
         mounted = self.mounted._replace(planes=chosen, weights=self.mounted.weights[planes])
         noise = self.errors.noise.part(speeds, sensors, planes)
@@ -242,13 +244,14 @@ class Influence:
             errors=self.errors._replace(noise=noise, mounted=mounted),
         )
 
-    def rebased(self, baseline: Trials | ArrayLike) -> Influence:
+    def rebased(self, baseline: Trials | ArrayLike | None) -> Influence:
         """The same coefficients with today's vibration as baseline.
 
         Parameters
         ----------
         baseline
-            Runs at known weights (the bare rotor is the mean of Y − W T), or its readings (S, C).
+            Runs at known weights (the bare rotor is the mean of Y − W T), or its readings (S, C); None: the
+            baseline that the coefficients have.
 
         Raises
         ------
@@ -256,6 +259,8 @@ class Influence:
             For planes, sensors or speeds that do not fit, and readings that are not finite.
         """
         P = len(self.planes)
+        if baseline is None:
+            return self
         if not isinstance(baseline, Trials):
             baseline = self._run(baseline, np.zeros(P, dtype=complex))
         local = local_runs(self, baseline)
@@ -380,13 +385,13 @@ def match_readings(
     return match_speeds(wanted.speeds, available.speeds, what), sensors
 
 
-def match_speeds(wanted: ArrayLike, available: FloatArray, what: str = "coefficients") -> list[int]:
+def match_speeds(wanted: ArrayLike | None, available: FloatArray, what: str = "coefficients") -> list[int]:
     """Indices of available speeds equal to the wanted ones within 0.5 %.
 
     Parameters
     ----------
     wanted, available
-        rad/s, one or many.
+        rad/s, one or many; None: all of the available ones.
     what
         What the available speeds have, for the complaint.
 
@@ -400,7 +405,7 @@ def match_speeds(wanted: ArrayLike, available: FloatArray, what: str = "coeffici
         For a speed that is not among the available ones.
     """
     out = []
-    for speed in np.atleast_1d(np.asarray(wanted, dtype=np.float64)):
+    for speed in np.atleast_1d(np.asarray(available if wanted is None else wanted, dtype=np.float64)):
         i = int(np.argmin(np.abs(available - speed)))
         if not abs(available[i] - speed) <= SPEED_TOLERANCE * available[i]:
             rpm = ", ".join(f"{v * RPM:.6g}" for v in available)

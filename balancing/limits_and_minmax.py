@@ -325,7 +325,7 @@ def _convex(bounds: Bounds, chosen: tuple[Arc | None, ...], goal: _Goal, toleran
 def _shortened(weights: ComplexArray, most: FloatArray) -> ComplexArray:
     """Weights of at most some size."""
     size = np.maximum(np.abs(weights), TINY)
-    return np.asarray(weights * np.where(size > most, most * (1 - 1e-15) / size, 1.0))
+    return weights * np.where(size > most, most * (1 - 1e-15) / size, 1.0)
 
 
 def _sides(

@@ -51,7 +51,7 @@ from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.choices import Method, find
 from rotorid.base.text import capital
-from rotorid.regression import covariance_root, solution, solution_and_rank, stretch, unstretch
+from rotorid.regression import solution, solution_and_rank, stretch, unstretch
 
 Resolve = Callable[[ComplexArray, ComplexArray], ComplexArray]
 Explained = Callable[[ComplexArray], bool]
@@ -310,29 +310,30 @@ class _State(NamedTuple):
 
 
 class _Errors(NamedTuple):
-    """Readings that count for the weighted fit: W (N, P), Y (N,), covariances C, row weights w (N,)."""
+    """Readings that count for the weighted fit: W (N, P), Y (N,), covariances C, row weights w (N,).
+
+    Both parts of Y have a further variance.
+    """
 
     W: ComplexArray
     Y: ComplexArray
     C: FloatArray
     w: FloatArray
-
-    def rows(self, white: FloatArray, W: ComplexArray) -> FloatArray:
-        """Stretched and whitened, of W (N, M, P): (2NM, 2P)."""
-        whitened = self.w[:, None, None, None] * (white[:, None] @ stretch(W[:, :, None]))
-        return whitened.reshape(-1, 2 * W.shape[-1])
+    further: float = 0.0
 
     def at(self, D: ComplexArray) -> _State:
         """What the fit needs at some weights."""
         B = stretch([[1.0, *D]])
         CB = self.C @ B.T
+        CB[:, :2] += self.further * np.eye(2)
         S = B @ CB
         S = S + 1e-14 * np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(2)
         white = np.linalg.inv(np.linalg.cholesky(S))
         A = CB @ np.swapaxes(white, 1, 2)
         r = white @ stretch(self.Y + self.W @ D).reshape(-1, 2, 1)
         true = self.W - unstretch((A @ r)[..., 0])[:, 1:]
-        return _State(self.rows(white, true[:, None]), (self.w[:, None] * r[..., 0]).ravel(), A, white)
+        rows = self.w[:, None, None] * (white @ stretch(true[:, None]))
+        return _State(rows.reshape(-1, 2 * len(D)), (self.w[:, None] * r[..., 0]).ravel(), A, white)
 
     def minimum(self, start: ComplexArray) -> ComplexArray:
         """Weights at which Q is smallest, sought from some start by steps of Levenberg and Marquardt."""
@@ -367,11 +368,12 @@ class _Errors(NamedTuple):
 
     def inverse(self, at: _State) -> FloatArray:
         """A⁻¹ (2P, 2P)."""
-        K = self.C - at.A @ np.swapaxes(at.A, 1, 2)
-        root = covariance_root(K, np.einsum("nii->ni", K))
+        A, (N, P) = at.A[:, 2:], self.W.shape
+        K = (self.C[:, 2:, 2:] - A @ np.swapaxes(A, 1, 2)).reshape(N, P, 2, P, 2)
+        white = self.w[:, None, None, None] * (at.white[:, None] @ stretch(np.reshape([1, 1j], (2, 1, 1))))
+        square = np.einsum("nixa,njxb,npaqb->piqj", white, white, K).reshape(2 * P, 2 * P)  # of e
         whiten = np.linalg.inv(np.linalg.cholesky(at.rows.T @ at.rows))
-        noise = self.rows(at.white, unstretch(np.swapaxes(root, 1, 2))[..., 1:]) @ whiten.T
-        share, V = np.linalg.eigh(noise.T @ noise)
+        share, V = np.linalg.eigh(whiten @ square @ whiten.T)
         V = whiten.T @ V
         return np.asarray((V / np.maximum(1 - share, LEAST_INFORMATION)) @ V.T)
 
@@ -408,9 +410,7 @@ def _fit_weighted(job: Job) -> Solution:
 
     def wider(share: float) -> _Errors:
         """The errors with a further variance of both parts of Y."""
-        C = errors.C.copy()
-        C[:, [0, 1], [0, 1]] += (FLOOR**2 + share) * variance
-        return errors._replace(C=C)
+        return errors._replace(further=(FLOOR**2 + share) * variance)
 
     @cache
     def least(share: float) -> float:
@@ -438,15 +438,22 @@ def _fit_weighted(job: Job) -> Solution:
     root = np.linalg.cholesky(np.linalg.inv(inverse)).T
     rows = at.rows.reshape(len(at.white), 2, -1)
     gradient = np.moveaxis(wide.w[:, None, None] * (np.swapaxes(at.white, 1, 2) @ rows), -1, 0)
-    response = inverse @ gradient.reshape(len(inverse), -1)
+    response = -(inverse @ gradient.reshape(len(inverse), -1)).T
+
+    def step(left: ComplexArray) -> ComplexArray:
+        """To the weights (B, P) of what these leave, (B, N)."""
+        return unstretch(real_parts(left[:, on]) @ response)
+
+    previous = mean = step((bounds.Y + bounds.W @ D)[None])
 
     def resolve(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
+        nonlocal previous
         further = model_error * rng.standard_normal((*Y.shape, 2)).view(complex)[..., 0]
-        step = -((Y + further)[:, on] + W[:, on] @ D).view(np.float64) @ response.T
-        off = step - step.mean(axis=0)
+        first = step(Y + further + W @ D)
+        off, previous = np.concatenate((previous, first)) - mean, first[-1:]
         off *= norm(D) / np.fmax(norm(off, axis=1, keepdims=True), norm(D))
-        both = (off + np.roll(off, 1, axis=0))[..., None]
-        drawn = D + unstretch(step - (response @ (stretch(W[:, on] - errors.W) @ both))[..., 0])
+        both = (off[1:] + off[:-1])[..., None]
+        drawn = D + first + step(((W - bounds.W) @ both)[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 

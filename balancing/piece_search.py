@@ -27,6 +27,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.conditioning import check_stack
 from balancing.holes import KEPT, Holes, Mounting, equal_holes, from_list, lightest, mounting
 from balancing.trials import Limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, IntArray
@@ -345,12 +346,9 @@ def solve_discrete(
         For NaN, shapes that do not fit, planes in which nothing can be mounted, and where no mounting that
         keeps the limits is found.
     """
-    W, Y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
+    W, Y, w = check_stack(W, Y, row_weights)
     N, P = W.shape
-    w = np.ones(N) * np.asarray(1.0 if row_weights is None else row_weights)
     named: Mapping[Any, Holes | None] = planes if isinstance(planes, Mapping) else dict(enumerate(planes, 1))
-    if not np.isfinite(W.sum() + Y.sum() + w.sum()):
-        raise ValueError("coefficients, readings and their weights must be finite")
     if len(named) != P:
         raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     limits, heavier = limits or Limits.none(1, N, P), HEAVIER if enough else np.inf

@@ -98,7 +98,7 @@ def reach(covariance: FloatArray) -> FloatArray:
 
 def half_width(deviations: FloatArray) -> FloatArray:
     """Half of the 95 % interval of real deviations from an estimate, over the first axis."""
-    return np.asarray(np.quantile(np.abs(deviations), LEVEL, axis=0))
+    return np.quantile(np.abs(deviations), LEVEL, axis=0)
 
 
 def mean_variances(covariance: FloatArray) -> FloatArray:

@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.conditioning import HOPELESS, UndeterminedError
+from balancing.conditioning import HOPELESS, UndeterminedError, check_stack
 from balancing.conventions import Labels
 from balancing.influence import Influence
 from balancing.printed_readings import weight_columns
 from balancing.regions import NORMAL_RADIUS, real_parts
 from balancing.trials import Trials, check_names
+from balancing.what_if import todays
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -194,14 +195,12 @@ def estimate_unbalance(
     UndeterminedError
         Where no station has an effect.
     """
-    A, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    if A.ndim != 2 or 0 in A.shape or y.shape != A.shape[:1]:
-        raise ValueError(f"coefficients (N, Q) and readings (N,) are needed; got {A.shape} and {y.shape}")
+    A, y, _ = check_stack(W, Y)
     N, Q = A.shape
     drawn = np.zeros((0, N)) if errors is None else np.asarray(errors, dtype=complex)
     stations = check_names(names or [str(q) for q in range(1, Q + 1)], "stations")
-    if not np.isfinite(A.sum() + y.sum() + drawn.sum()) or drawn.shape[1:] != (N,) or len(stations) != Q:
-        raise ValueError(f"readings and {N} errors of each draw must be finite, with {Q} names of stations")
+    if not np.isfinite(drawn.sum()) or drawn.shape[1:] != (N,) or len(stations) != Q:
+        raise ValueError(f"{N} errors of each draw must be finite, with {Q} names of stations")
     if not A.any():
         raise UndeterminedError("no station has an effect on any reading: check the coefficients")
     variance = np.mean(np.abs(drawn) ** 2, axis=0) / 2 if drawn.any() else np.ones(N)
@@ -263,17 +262,13 @@ def unbalance_of_run(
     ValueError
         As `correct` and `estimate_unbalance`.
     """
-    today = influence if baseline is None else influence.rebased(baseline)
-    if not today.has_baseline:
-        raise ValueError("there is no vibration to explain: give the readings of a baseline run")
+    today = todays(influence, baseline)
     of = influence.labels
     result = estimate_unbalance(
         today.W.reshape(-1, len(today.planes)),
         today.baseline.ravel(),
         names=today.planes,
-        errors=np.concatenate([(y - today.baseline).reshape(len(y), -1) for y, _ in today.draws()])
-        if today.known_errors
-        else None,
+        errors=[off.ravel() for y, _ in today.draws() for off in y - today.baseline] or None,
         labels=replace(today.labels, weight_unit=of.weight_unit, weight_scale=of.weight_scale),
     )
     return replace(result, warnings=today.remarks.warnings + result.warnings)

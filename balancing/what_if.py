@@ -21,8 +21,9 @@ agree with these says nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -41,6 +42,7 @@ from rotorid.base.text import capital, figures
 if TYPE_CHECKING:
     from rotorid.base.arrays import ComplexArray, FloatArray
 
+DRAWS = 400
 BETTER = 0.9
 """Of the rms of the bare rotor: what 95 of 100 check runs must stay below."""
 RISES = 0.1
@@ -164,7 +166,7 @@ def what_if(
     D = np.zeros(len(today.planes), dtype=complex)
     if weights:
         D[plane_indices(today, list(weights))] = list(weights.values())
-    used = range(len(today.speeds)) if speeds is None else match_speeds(speeds, today.speeds)
+    used = match_speeds(speeds, today.speeds)
     part = today.part(used)
     (covariance, sizes), before = check_run_spread(part, D), rms(part.baseline)
     low, bound = np.quantile(sizes, (1 - LEVEL, LEVEL)).tolist()
@@ -184,23 +186,23 @@ def what_if(
 
 def todays(influence: Influence, baseline: Trials | ArrayLike | None) -> Influence:
     """Coefficients with the vibration to correct, that of a baseline or their own."""
-    today = influence if baseline is None else influence.rebased(baseline)
+    today = influence.rebased(baseline)
     if not today.has_baseline:
-        raise ValueError("there is no vibration to correct: give the readings of a baseline run")
+        raise ValueError("there is no vibration to correct or explain: give the readings of a baseline run")
     return today
 
 
-def check_readings(influence: Influence, weights: ComplexArray, look: Look = lambda *_: None) -> ComplexArray:
-    """How far check runs with weights (P,) are off, drawn, (n, S, C); n = 0 where errors are unknown.
+def check_readings(
+    influence: Influence, weights: ComplexArray, look: Look = lambda *_: None
+) -> Iterator[ComplexArray]:
+    """How far check runs with weights (P,) are off, blocks (B, S, C) of draws; none: errors are unknown.
 
     `look` is shown the draws (Y₀, W), block by block.
     """
     after = influence.baseline + influence.W @ weights
-    off = [np.zeros((0, *after.shape), dtype=complex)]
-    for (Y, W), more in zip(influence.draws(), influence.further(after, weights), strict=False):
+    for (Y, W), more in zip(influence.draws(DRAWS), influence.further(after, weights, DRAWS), strict=False):
         look(Y, W)
-        off.append(Y + W @ weights + more - after)
-    return np.concatenate(off)
+        yield Y + W @ weights + more - after
 
 
 def check_run_spread(
@@ -211,14 +213,26 @@ def check_run_spread(
     The one draw in twenty that is farthest off counts as if it were as far as the next: where errors of runs
     are hardly known, one in four hundred may be off by more than all others together.
     """
-    off = check_readings(influence, weights, *look)
-    off = off if len(off) else np.full((1, *influence.baseline.shape), np.nan * 1j)
-    read, size = influence.baseline + influence.W @ weights + off, np.abs(off)
-    near = np.minimum(1.0, np.quantile(size, LEVEL, axis=0) / (size + 1e-300))
-    parts = real_parts((near * off)[..., None])
+    after, at = influence.baseline + influence.W @ weights, LEVEL * (DRAWS - 1)
+    few, sizes, squares = DRAWS - int(at), np.zeros(0), np.zeros((*after.shape, 2, 2))
+    far, blocks = np.zeros((0, *after.shape), dtype=complex), check_readings(influence, weights, *look)
+    while more := [*islice(blocks, few)]:
+        off = np.concatenate((far, *more))
+        sizes = np.append(sizes, np.linalg.norm(after + off[len(far) :], axis=(1, 2)))
+        off = np.take_along_axis(off, np.argpartition(np.abs(off), -few, axis=0), axis=0)
+        squares, far = squares + _squares(off[:-few]), off[-few:]
+    if not len(sizes):
+        return np.nan * squares, np.array([np.nan])
+    size = np.abs(far)
+    near = np.minimum(1.0, np.quantile(size, at % 1 / (few - 1), axis=0) / (size + 1e-300))
     # what a normal complex number loses by this
-    covariance = np.einsum("nsci,nscj->scij", parts, parts) / (LEVEL * len(off))
-    return covariance, np.sqrt(np.mean(np.abs(read) ** 2, axis=(1, 2)))
+    return (squares + _squares(near * far)) / (LEVEL * DRAWS), sizes / np.sqrt(after.size)
+
+
+def _squares(off: ComplexArray) -> FloatArray:
+    """Squares and products of both parts of (n, S, C), summed: (S, C, 2, 2)."""
+    parts = real_parts(off[..., None])
+    return np.asarray(np.einsum("nsci,nscj->scij", parts, parts))
 
 
 def worse_elsewhere(today: Influence, weights: ComplexArray, used: FloatArray) -> tuple[str, ...]:

@@ -99,7 +99,7 @@ class Fit:
 
     def _missed(self, x: FloatArray) -> FloatArray:
         """(|…| − a)/σ (…, R) of parameters (…, 1 + 2P)."""
-        return np.asarray((np.abs(x[..., :1] + effects(x) @ self._T.T) - self._a) / self._s)
+        return (np.abs(x[..., :1] + effects(x) @ self._T.T) - self._a) / self._s
 
 
 def _slopes(missed: Residuals, x: FloatArray) -> FloatArray:
@@ -133,7 +133,7 @@ def refined(missed: Residuals, x: FloatArray, steps: int) -> tuple[FloatArray, F
 
 def effects(parameters: FloatArray) -> ComplexArray:
     """Complex w (…, P) of parameters (…, 1 + 2P)."""
-    return np.asarray(parameters[..., 1::2] + 1j * parameters[..., 2::2])
+    return parameters[..., 1::2] + 1j * parameters[..., 2::2]
 
 
 def best_weights(x: FloatArray, weights: FloatArray) -> ComplexArray:

@@ -8,7 +8,7 @@ are −Qᵀ K' c, c = T⁻¹ Qᵀ x above (variable projection, Kaufman 1975). S
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,7 @@ from rotorid.base.tables import Column, Table
 from rotorid.base.text import listing
 from rotorid.identify.amplitudes import AmplitudeErrors, inverse_roots, real_matrices
 from rotorid.identify.answers import Answers
+from rotorid.regression import stack
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 LARGEST = 10.0
@@ -110,21 +111,21 @@ def projected(
     from scipy.linalg import lapack
 
     columns, slopes = basis
-    design = np.stack((columns, 1j * columns), axis=-1).reshape(len(columns), -1)
-    size, parts = design.shape[1], []
+    size, parts = 2 * columns.shape[1], []
     for x, over in zip(vectors.T, np.swapaxes(root, 0, 1), strict=True):
         seen = ~np.isnan(x)
 
-        def real(z: ComplexArray, seen: FloatArray = seen, over: FloatArray = over) -> FloatArray:
-            whitened = over[seen] @ np.stack((z[seen].real, z[seen].imag), axis=1)
-            return np.asarray(whitened.reshape(-1, z.shape[1]))
+        def real(each: Iterable[ComplexArray], over: FloatArray = over[seen]) -> FloatArray:
+            return np.array([np.einsum("nij,nj->ni", over, stack(z).reshape(-1, 2)).ravel() for z in each]).T
 
-        triangle, tau, *_ = lapack.dgeqrf(real(design))
-        y = lapack.dormqr("L", "T", triangle, tau, real(x[:, None]), 64)[0][:, 0]
+        triangle, tau, *_ = lapack.dgeqrf(
+            real(z * c for c in columns[seen].T for z in (1, 1j)), overwrite_a=1
+        )
+        y = lapack.dormqr("L", "T", triangle, tau, real([x[seen]]), 64)[0][:, 0]
         inverse = np.linalg.inv(np.triu(triangle[:size]))
         linear = (inverse @ y[:size]).reshape(-1, 2) @ (1, 1j)
-        turned = real(slopes * np.tile(linear[:-2], 2))
-        turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1])[0]
+        turned = real((slopes[seen] * np.tile(linear[:-2], 2)).T)
+        turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1], overwrite_c=1)[0]
         spread = (inverse @ inverse.T).reshape(size // 2, 2, -1, 2)
         parts.append((y[size:], -turned[size:], linear, spread))
     rest, by_q, *others = zip(*parts, strict=True)

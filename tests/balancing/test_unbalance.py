@@ -100,7 +100,7 @@ def test_from_a_run_with_a_weight_mounted(rotor):
 
 BAD = [
     ({"W": [[1.0, np.nan]]}, ValueError, "must be finite"),
-    ({"Y": [1.0, 2.0]}, ValueError, r"coefficients \(N, Q\) and readings \(N,\)"),
+    ({"Y": [1.0, 2.0]}, ValueError, r"coefficients \(readings, planes\)"),
     ({"W": [[0.0, 0.0]]}, UndeterminedError, "no station has an effect on any reading"),
 ]
 

@@ -57,11 +57,11 @@ def test_other_weights_leave_what_the_machine_does(job):
 
 def test_one_draw_far_off_widens_nothing(job, monkeypatch):
     module, influence = sys.modules["balancing.what_if"], job[0]
-    off = complex_normal(np.random.default_rng(1), (10_000, *influence.baseline.shape)) * np.sqrt(0.5)
-    off[0] *= 1e4
-    monkeypatch.setattr(module, "check_readings", lambda *_: off)
-    covariance = module.check_run_spread(influence, np.zeros(2))[0]
-    assert np.abs(covariance - np.eye(2) / 2).max() < 0.03
+    off = complex_normal(np.random.default_rng(1), (100, 100, *influence.baseline.shape))
+    off[0, 0] *= 1e4
+    monkeypatch.setattr(module, "check_readings", lambda *_: iter(off))
+    monkeypatch.setattr(module, "DRAWS", 10_000)
+    assert np.abs(module.check_run_spread(influence, np.zeros(2))[0] - np.eye(2)).max() < 0.06
 
 
 def rigid(relative=0.01, further=1.0):
