@@ -134,7 +134,7 @@ bench-all: $(BENCH_VENV)/.bench-all $(HSBALANCE_VENV)/.peer
 	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python \
 	  $(BENCH_VENV)/bin/python -m benchmarks --all --page docs/benchmarks.md
 
-# Peak memory of the commands beside the size of their data, a table for docs/benchmarks.md; with COMMANDS only those.
+# Peak memory of the commands beside the size of their data, the table of docs/stability.md; with COMMANDS only those.
 COMMANDS ?=
 memory: $(VENV)/.dev
 	$(BIN)/python .ci/memory.py $(COMMANDS)

@@ -174,7 +174,7 @@ def main(wanted: Sequence[str]) -> None:
     if wanted[:1] == ["--write"]:
         print(globals()[wanted[1]](Path(wanted[2])))
         return
-    print("| command | data, MB | peak above a small input's, MB | ratio |\n|---|--:|--:|--:|")
+    print("|command|data, MB|peak above a small input's, MB|ratio|\n|---|--:|--:|--:|")
     with tempfile.TemporaryDirectory(prefix="memory") as name:
         for command, large, small, write in CASES:
             shown = command.replace("FILE", large).replace(f"{SAMPLES}/", "")
@@ -184,12 +184,12 @@ def main(wanted: Sequence[str]) -> None:
             most, base = (peak(command.replace("FILE", each), Path(name)) for each in (large, small))
             if isinstance(most, str) or isinstance(base, str):
                 print(
-                    f"| {shown} | {size / 1e6:.3g} | {most if isinstance(most, str) else base} | |",
+                    f"|{shown}|{size / 1e6:.3g}|{most if isinstance(most, str) else base}||",
                     flush=True,
                 )
                 continue
             more = most - base
-            print(f"| {shown} | {size / 1e6:.3g} | {more / 1e6:.3g} | {more / size:.1f} |", flush=True)
+            print(f"|{shown}|{size / 1e6:.3g}|{more / 1e6:.3g}|{more / size:.1f}|", flush=True)
 
 
 if __name__ == "__main__":

@@ -128,8 +128,8 @@ def projected(
         turned = lapack.dormqr("L", "T", triangle, tau, turned, 64 * turned.shape[1], overwrite_c=1)[0]
         spread = (inverse @ inverse.T).reshape(size // 2, 2, -1, 2)
         parts.append((y[size:], -turned[size:], linear, spread))
-    rest, by_q, *others = zip(*parts, strict=True)
-    return np.concatenate(rest), np.concatenate(by_q), np.array(others[0]), np.array(others[1])
+    rest, by_q, factors, spreads = zip(*parts, strict=True)
+    return np.concatenate(rest), np.concatenate(by_q), np.array(factors), np.array(spreads)
 
 
 @dataclass(frozen=True, eq=False)
