@@ -58,7 +58,7 @@ def test_a_split_says_how_sure_it_is_and_which_hole_is_the_first(cli, tmp_path, 
     places = {False: 191.1, True: 11.1}  # 168.9° counted against the rotation, and opposite
     for text in (
         "Angles from the mark against the rotation: holes 1 at 0°, 2 at 30°.",
-        f"Weights at any angle: left 423.0 ± 31 at {places[remove]}° ± 6.0°, middle",
+        f"Weights at any angle: left 423.0 ± 31 at {places[remove]}° ± 5.8°, middle",
     ):
         assert text in words
     most = float(re.search(r"rms 28.4 → (\S+) µm pp; a check run stays below (\S+) in 95 of 100", words)[2])
