@@ -123,7 +123,7 @@ class Problem:
             )
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
-        self._latest = lru_cache(maxsize=3)(self._evaluated)
+        self._latest = lru_cache(maxsize=2)(self._evaluated)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
