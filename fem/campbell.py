@@ -125,7 +125,7 @@ class Campbell(Result):
     @property
     def eigenvalues(self) -> ComplexArray:
         """λ with Im λ > 0, rad/s, shape (S, n)."""
-        return np.asarray(self.frequencies * (1j - self.log_decrements / (2 * np.pi)))
+        return self.frequencies * (1j - self.log_decrements / (2 * np.pi))
 
     @property
     def criticals(self) -> list[tuple[float, float]]:
@@ -317,7 +317,7 @@ def _crossings(paths: _Paths) -> _Crossings:
 
 def off_synchronous(lam: ComplexArray, speeds: FloatArray) -> FloatArray:
     """Whirl frequencies less the speed, of modes (S, …)."""
-    return np.asarray(np.abs(lam.imag) - speeds[:, None])
+    return np.abs(lam.imag) - speeds[:, None]
 
 
 def _words(direction: FloatArray, there: FloatArray) -> AnyArray:

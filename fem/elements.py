@@ -53,16 +53,15 @@ def shaft_bands(rotor: Rotor) -> FloatArray:
     """Upper bands of stiffness, mass, gyroscopic form and material damping, shape (4, width + 1, size)."""
     model, L, outer = rotor.model, rotor.length, np.multiply.outer
     unknowns, (bending, shear, inertia, tilt) = _SHEAR if model.shear else _BENDING
-    scale = L ** _LENGTHS[unknowns, None]
+    scale = np.where(_LENGTHS[unknowns, None], L, 1.0)
     stiffness = outer(bending, rotor.youngs_modulus * rotor.second_moment / L**3)
     if model.shear:
         stiffness += outer(shear, rotor.shear_coefficient * rotor.shear_modulus * rotor.area / L)
     mass = outer(inertia, rotor.density * rotor.area * L)
     tilting = outer(tilt, rotor.density * rotor.second_moment / L)
-    turning = 2 * model.gyroscopic * tilting
-    damping = rotor.material_damping * stiffness
-    forms = np.array((stiffness, mass + model.rotary_inertia * tilting, turning, damping))
-    forms *= scale * scale[:, None]
+    mass += model.rotary_inertia * tilting
+    turning, damping = 2 * model.gyroscopic * tilting, rotor.material_damping * stiffness
+    forms = np.array((stiffness, mass, turning, damping)) * (scale * scale[:, None])
     stride, width = unknowns.size - 2, unknowns.size - 1
     # Each as LAPACK takes it without a copy.
     bands = np.zeros((4, stride * L.size + 2, width + 1)).transpose(0, 2, 1)
@@ -98,7 +97,7 @@ def strains(rotor: Rotor, X: FloatArray) -> FloatArray:
 def multiply(band: AnyArray, X: AnyArray) -> AnyArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
     if band.shape[1] <= DENSE:
-        return np.asarray(dense(band) @ X)
+        return dense(band) @ X
     product = band[-1, :, None] * X
     for off in range(1, len(band)):
         entries = band[-1 - off, off:, None]
@@ -111,7 +110,7 @@ def dense(band: AnyArray) -> AnyArray:
     """Full symmetric or Hermitian matrix of a band, shape (size, size)."""
     size = band.shape[1]
     A = np.zeros(size * size, band.dtype)
-    for off in range(min(len(band), size)):
+    for off in range(len(band)):
         A[off * size :: size + 1] = entries = band[-1 - off, off:]
         A[off : (size - off) * size : size + 1] = entries.conj()
     return A.reshape(size, size).T

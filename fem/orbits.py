@@ -98,6 +98,6 @@ def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
     X, Y = np.asarray(x), np.asarray(y)
     area = X.imag * Y.real - X.real * Y.imag  # over π
     line = STRAIGHT * (X.real**2 + X.imag**2 + Y.real**2 + Y.imag**2).max(axis=-1)
-    least = np.maximum(1e-2 * np.abs(area).max(axis=-1), line)
-    counts = np.where(np.abs(area) > least[..., None], np.sign(area), 0.0)
+    least = np.maximum(1e-2 * abs(area).max(axis=-1), line)
+    counts = np.sign(area) * (abs(area) > least[..., None])
     return np.asarray((counts.max(axis=-1) + counts.min(axis=-1)).clip(-1, 1))

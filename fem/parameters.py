@@ -319,4 +319,4 @@ def nearest_modes(middle: FloatArray, other: FloatArray) -> FloatArray:
     from scipy.optimize import linear_sum_assignment
 
     apart = np.nan_to_num(middle[:, :, None] - other[:, None, :]) ** 2
-    return np.asarray(other[:, linear_sum_assignment(apart.sum(axis=0))[1]])
+    return other[:, linear_sum_assignment(apart.sum(axis=0))[1]]

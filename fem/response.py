@@ -498,9 +498,7 @@ def unit_loads(A: Matrices, unknowns: IndexArray) -> FloatArray:
     -------
     Shape (size, m).
     """
-    unit = np.zeros((A.size, unknowns.size))
-    unit[unknowns, np.arange(unknowns.size)] = 1.0
-    return unit
+    return np.asarray(np.arange(A.size)[:, None] == unknowns, float)
 
 
 class Receptance:

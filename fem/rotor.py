@@ -547,7 +547,7 @@ class Rotor:
     @cached_property
     def positions(self) -> FloatArray:
         """Axial position of each node from the left end, m, shape (n + 1,)."""
-        positions = np.append(0.0, self.length.cumsum())
+        positions = np.array([0.0, *self.length]).cumsum()
         read_only(positions)
         return positions
 

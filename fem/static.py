@@ -80,7 +80,7 @@ class StaticDeflection(Result):
 
     def sentence(self) -> str:
         """Weight and largest deflection."""
-        k = int(np.argmax(self.deflection))
+        k = int(self.deflection.argmax())
         largest = f"{1e6 * self.deflection[k]:.4g} µm at node {k + 1}"
         return f"Weight {self.weight:.6g} N; largest deflection {largest}"
 
@@ -149,9 +149,8 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
     """
     P = both_planes(rotor, complex_coordinate=False)
     P = replace(P, A=replace(P.A, material=np.zeros_like(P.A.material)))
-    unknowns = np.array([P.A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
-    forces = np.zeros((unknowns.size, 2, P.A.size))
-    forces[np.arange(unknowns.size), 0, unknowns] = 1.0
+    unknowns = P.A.deflections[[rotor.node(node) - 1 for node in nodes]]
+    forces = (np.arange(P.A.size) == unknowns[:, None, None]) * [[1.0], [0.0]]
     alpha = _solved(P, forces, number(speed, "speed"))[:, 0, unknowns].T
     symmetric = all(support.plain for support in rotor.supports)
     return (alpha + alpha.T) / 2 if symmetric else alpha
@@ -166,11 +165,11 @@ def _solved(P: Planes, forces: FloatArray, speed: float) -> FloatArray:
     loads = (FROM_XY @ forces).swapaxes(1, 2).reshape(len(forces), -1)  # F and b alternate
     answers = WholeBand(P).factor(0.0, speed)(loads.T).T.reshape(len(forces), -1, 2)
     X = (TO_XY @ answers.swapaxes(1, 2)).real
-    flat, work = X.reshape(-1, P.A.size), np.abs((forces * X).sum(axis=(1, 2)))
+    flat, work = X.reshape(-1, P.A.size), abs((forces * X).sum(axis=(1, 2)))
     if not (rounding_error(P.A.shaft, flat.T, np.repeat(work, 2)) < 1e-3).all():
         raise ValueError(
             f"the compliance of {P.rotor.n_elements} elements on these supports is lost in float64; "
             "join neighbouring elements (50 to 200 are ample for a rotor) or check the support stiffness"
         )
     # What rounding alone moves across does not move.
-    return np.where(np.abs(X) < 1e-9 * np.abs(X).max(axis=1, keepdims=True), 0.0, X)
+    return np.where(abs(X) < 1e-9 * abs(X).max(axis=1, keepdims=True), 0.0, X)

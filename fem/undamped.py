@@ -28,14 +28,13 @@ from fem.assembly import (
     TO_XY,
     Matrices,
     assemble,
-    dense,
     free_motions,
     ignored_inertia,
     multiply,
     on_waves,
     rounding_error,
 )
-from fem.elements import DENSE, strains
+from fem.elements import DENSE, dense, strains
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.result import NORMAL_95, Result, holding_arrays
 from fem.rotor import Pedestal, Rotor, refined
@@ -199,7 +198,7 @@ class MeshCheck(Result):
 
     def sentence(self) -> str:
         """Whether the mesh is fine enough for 0.1 %, and what would be."""
-        worst = int(np.abs(self.errors).argmax())
+        worst = int(abs(self.errors).argmax())
         size = abs(float(self.errors[worst]))
         text = (
             f"The mesh of {counted(self.elements, 'element')} changes these speeds by at most "
@@ -305,18 +304,19 @@ def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
         warnings = beyond + warnings
         squares, rounding = np.array([(*part.squares, *part.rounding) for part in parts]).T
         motion = np.concatenate([part.motion for part in parts], axis=2)
-    major, direction = motion[::2], squares.size * ("forward",)
+    major, lateral, direction = motion[0], motion[:, :: A.stride], squares.size * ("forward",)
     if not rotor.symmetric:
-        largest, ways = np.abs(motion[:2]).max(axis=1), whirl_direction(*motion[:2].swapaxes(1, 2))
-        major = np.where(largest[0] >= largest[1] * (1 - 1e-6), major, motion[1::2])
+        largest, ways = abs(lateral).max(axis=1), whirl_direction(*lateral.swapaxes(1, 2))
+        major = np.where(largest[0] >= largest[1] * (1 - 1e-6), *motion)
         direction = tuple(DIRECTION_NAMES[way] for way in ways.tolist())
-    size = np.abs(major[0])
+    size = abs(major[:: A.stride])
     size[0] *= 1e6  # 1 there, unless it is a node of the mode
-    scale = 1 / major[0, size.argmax(axis=0), range(squares.size)]
-    x, y = motion[:2] * scale
-    frequencies, (shapes, slopes) = np.sqrt(squares), (major * scale).real
+    scale = 1 / major[A.stride * size.argmax(axis=0), np.arange(squares.size)]
+    x, y = lateral * scale
+    shapes = (major * scale).real
     warnings += fine_mesh_warning(rotor, rounding)
-    return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings, cut)
+    shapes, slopes = shapes[:: A.stride], shapes[1 :: A.stride]
+    return Modes(np.sqrt(squares), shapes, slopes, rotor, direction, x, y, warnings, cut)
 
 
 def critical_speeds_below(rotor: Rotor, top: float, most: float = np.inf) -> FloatArray:
@@ -340,7 +340,7 @@ def critical_speeds_below(rotor: Rotor, top: float, most: float = np.inf) -> Flo
     while True:
         speeds = lowest_critical_speeds(rotor, n).frequencies
         if speeds.size < n or speeds[-1] > top or n >= most:
-            return np.asarray(speeds[(speeds > 0) & (speeds <= top)])
+            return speeds[(speeds > 0) & (speeds <= top)]
         n *= 2
 
 
@@ -370,7 +370,7 @@ def critical_speeds_near(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     def nearest(speed: float) -> float:
         """Frequency of the mode nearest to a speed."""
         squares = _positive(whole_rotor(rotor, A, float(speed)), 1, speed**2).squares
-        return math.sqrt(squares[np.argmin(np.abs(squares - speed**2))])
+        return math.sqrt(squares[np.argmin(abs(squares - speed**2))])
 
     try:
         moved = [fixed_point(nearest, speed, xtol=1e-11, maxiter=12) if speed else 0.0 for speed in speeds]
@@ -453,7 +453,7 @@ def _positive(pencil: Pencil, n: int, top: float = 0.0) -> Spectrum:
         if m >= finite or (m - negative >= n and spectrum.squares.max() > top):
             if not negative:
                 return spectrum
-            return spectrum.only(np.argsort(spectrum.squares, kind="stable")[negative:])
+            return spectrum.only(spectrum.squares.argsort(kind="stable")[negative:])
         m = 2 * m + 2
 
 
@@ -494,7 +494,7 @@ class Pencil:
     def energy(self, X: AnyArray) -> AnyArray:
         """Xᴴ K X, shape (m, m), summed from strains: few digits are lost."""
         S = [strains(self.rotor, X[unknowns]).reshape(-1, X.shape[1]) for unknowns in self.shaft]
-        parts = [s.conj().T @ s for s in S] + [X[u].conj().T @ k @ X[u] for u, k in self.springs]
+        parts = [s.conj().T @ s for s in S] + [(v := X[u]).conj().T @ k @ v for u, k in self.springs]
         return np.asarray(sum(parts))
 
 
@@ -535,7 +535,8 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     """
     held = []
     for support in rotor.supports:
-        (xx, xy), (yx, yy) = support.at(speed)[0].tolist()
+        k = support.stiffness
+        (xx, xy), (yx, yy) = ((k, 0.0), (0.0, k)) if support.plain else support.at(speed)[0].tolist()
         # Antisymmetric stiffness does work over an orbit, as damping does: no conservative rotor has it.
         cross = xy + yx
         held.append((support.node, (xx + yy) / 2, (xx - yy + (cross and 1j * cross)) / 2, support.pedestal))
@@ -549,18 +550,16 @@ def _pencil(
     supports: Iterable[tuple[int, float, complex, Pedestal | None]],
 ) -> Pencil:
     """Pencil on springs: node, stiffness of each wave, force on the forward of the backward one, pedestal."""
-    planes, w, springs = len(whirls), A.deflections, list[tuple[IndexArray, AnyArray]]()
-    held = [
-        (node, np.array(((k, beside), (beside.conjugate(), k)))[:planes, :planes], stand)
-        for node, k, beside, stand in supports
-        if k or beside
-    ]
-    kind = np.result_type(float, *(form for _, form, _ in held))
+    planes = len(whirls)
+    springs: list[tuple[IndexArray, AnyArray]] = []
+    held = [support for support in supports if support[1] or support[2]]
+    forms = np.array([((k, b), (b.conjugate(), k)) for _, k, b, _ in held]).reshape(-1, 2, 2)
+    forms, kind = forms[:, :planes, :planes], forms.dtype
     bands = np.zeros((2, planes * A.size, planes * A.width + 1), kind).transpose(0, 2, 1)
     for wave, whirl in enumerate(whirls):
         bands[:, ::planes, wave::planes] = A.shaft, A.mass - whirl * A.gyroscopic
     # Waves alternate, and a foot stands behind the deflection of its node.
-    feet = [A.deflection(node) + 0.5 for node, _, stand in held if stand]
+    feet = [A.deflection(node) + 0.5 for node, *_, stand in held if stand]
     places = np.arange(planes * A.size).reshape(-1, planes).T
     if feet:
         ranks = np.append(np.arange(A.size), feet).argsort(kind="stable").argsort()
@@ -574,7 +573,7 @@ def _pencil(
         bands[1, -1, places[:, A.size :]] = [stand.mass for *_, stand in held if stand]
     K, M = bands
     shaft, stands, hold = places[:, : A.size], iter(places[:, A.size :].T), 0.0
-    for node, form, pedestal in held:
+    for (node, *_, pedestal), form in zip(held, forms, strict=True):
         hold += form[0, 0].real
         unknowns = shaft[:, A.deflection(node)]
         if pedestal:
@@ -596,8 +595,9 @@ def _pencil(
     if planes > 1 or free_motions(rotor, {node for node, *_ in held}):
         motions = np.zeros((places.size, 2 * planes))
         for wave, row in enumerate(shaft):
-            motions[row[w], wave], motions[row[w], planes + wave] = 1.0, rotor.positions / span
-            motions[row[w + 1], planes + wave] = 1 / span
+            motions[row[:: A.stride], wave] = 1.0
+            motions[row[:: A.stride], planes + wave] = rotor.positions / span
+            motions[row[1 :: A.stride], planes + wave] = 1 / span
         # Not their work: what pushes back and what pushes outwards at one node could sum up to none.
         forces = [form @ motions[unknowns] / np.abs(form).max() for unknowns, form in springs]
         _, values, V = np.linalg.svd(np.vstack((np.zeros(2 * planes), *forces)))
@@ -636,15 +636,14 @@ class Spectrum:
 
     def only(self, which: slice | IndexArray) -> Spectrum:
         """The spectrum of some of the modes."""
-        squares, rounding = self.squares[which], self.rounding[which]
-        return replace(self, squares=squares, vectors=self.vectors[:, which], rounding=rounding)
+        vectors, rounding = self.vectors[:, which], self.rounding[which]
+        return replace(self, squares=self.squares[which], vectors=vectors, rounding=rounding)
 
     @property
     def motion(self) -> ComplexArray:
-        """Amplitudes of x and y and of their slopes, shape (4, N, m)."""
-        shaft, stride = self.pencil.shaft, self.pencil.matrices.stride
-        X = self.vectors[np.array((shaft[:, ::stride], shaft[:, 1::stride]))]
-        return (TO_XY[:, : X.shape[1]] @ X.reshape(*X.shape[:2], -1)).reshape(4, *X.shape[2:])
+        """Amplitudes of the unknowns of the shaft in x and y, shape (2, size, m)."""
+        X = self.vectors[self.pencil.shaft]
+        return (TO_XY[:, : len(X)] @ X.reshape(len(X), -1)).reshape(2, *X.shape[1:])
 
 
 def finite_modes(pencil: Pencil) -> int:
@@ -679,15 +678,15 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray, AnyArray]:
     ValueError
         If the matrix is singular, or not positive, all the same.
     """
-    from scipy.linalg import lapack
+    from scipy.linalg.lapack import dpbtrf, zpbtrf
 
     rotor, free = pencil.rotor, pencil.rigid.size
     mass = rotor.total_mass
     if not mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
     bending = 500 * (rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
-    scale = float(bending / mass)
-    pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
+    scale = bending / mass
+    pbtrf = zpbtrf if np.iscomplexobj(pencil.stiffness) else dpbtrf
     for shift in (scale,) if free else (0.0,) if pencil.hold >= 1e-3 * bending else (scale, 0.0):
         K = pencil.stiffness + shift * pencil.mass
         U, info = pbtrf(K)
@@ -729,14 +728,14 @@ def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
     elastic = max(m - free, 0)
     moving, pushed = _vectors(pencil, U, elastic, loads)
     mu, Y = _largest(moving.conj().T @ pushed, elastic, pencil.energy(moving))
-    X = moving @ (Y / np.sqrt(np.abs(mu)))
+    X = moving @ (Y / np.sqrt(abs(mu)))
     if free:
         X, mu = np.hstack((fixed, X))[:, :m], np.append(np.full(free, np.inf), mu)[:m]
     squares = 1 / mu
     if shift:  # the softest beside stiff ones
         squares = np.sign(mu) * pencil.energy(X).diagonal().real * (np.arange(m) >= free)
-    rounding = rounding_error(K, X, np.abs(squares + shift))
-    if rounding.max(initial=0.0) > 1e-2:
+    rounding = rounding_error(K, X, abs(squares + shift))
+    if max(rounding, default=0.0) > 1e-2:
         raise ValueError(
             f"the mesh of {pencil.rotor.n_elements} elements is too fine for float64: join neighbouring "
             "elements, 50 to 200 are ample for a rotor"
@@ -746,7 +745,7 @@ def lowest_modes(pencil: Pencil, m: int) -> Spectrum:
 
 def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     """A sentence where fewer than six digits are sure."""
-    worst = float(rounding.max(initial=0.0))
+    worst = max(rounding, default=0.0)
     if worst < 1e-6:
         return ()
     return (
@@ -757,22 +756,27 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
 
 def _largest(T: AnyArray, m: int, energy: AnyArray | None = None) -> tuple[FloatArray, AnyArray]:
     """The m eigenvalues of largest size of a Hermitian matrix, and their vectors of length, or energy, 1."""
-    from scipy.linalg import lapack
+    from scipy.linalg.lapack import dormqr, dstev, dsygv, dsytrd, zhegv
 
     real, info = np.isrealobj(T), 1
     if energy is not None:
-        mu, Q, info = (lapack.dsygv if real else lapack.zhegv)(T, energy)
+        mu, Q, info = (dsygv if real else zhegv)(T, energy)
         if info:
             raise ValueError(_UNSTABLE)
-    elif real:  # tridiagonal first: few vectors take half as long as all
-        packed, d, e, tau, _ = lapack.dsytrd(T, lower=True)
-        mu, size = lapack.dsterf(d, e)[0], np.full(d.size, d.size)
-        mu = mu[-m:] if mu[0] + mu[-m] > 0 else mu  # all where large ones may be negative
-        Q, info = lapack.dstein(d, e, mu, size // d.size, size)
-        Q[1:] = lapack.dormqr("L", "N", packed[1:, :-1], tau, Q[1:], T.size)[0]
+    elif real:  # tridiagonal first, large entries ahead: the largest need but its first rows
+        packed, d, e, tau, _ = dsytrd(T, lower=True)
+        rows = min(2 * m + 8, d.size)
+        mu, V, info = dstev(d[:rows], e[: rows - 1])
+        others = math.hypot(*d[rows:].tolist(), *e[rows - 1 :].tolist())
+        if others:
+            least, mu, V = mu[0], mu[-m:], V[:, -m:]
+            info = info or max(-least, 20 * others, 1e13 * others * max(map(abs, V[-1]))) > mu[0]
+        Q = np.zeros((d.size, mu.size), order="F")
+        Q[:rows] = V
+        Q[1:] = dormqr("L", "N", packed[1:, : rows - 1], tau[: rows - 1], Q[1:], T.size)[0]
     if info:
         mu, Q = np.linalg.eigh(T)
-    order = np.argsort(-np.abs(mu), kind="stable")[:m]
+    order = (-abs(mu)).argsort(kind="stable")[:m]
     return mu[order], Q[:, order]
 
 
@@ -808,12 +812,12 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> tuple[AnyA
                 continue
             mu, Q = _largest(basis.conj().T @ image, most)
             # What the operator adds outside the basis; on fine meshes rounding stops it before the tolerance.
-            outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / np.abs(mu[:m])
+            outside = np.linalg.norm(beta @ Q[-block:, :m], axis=0) / abs(mu[:m])
             last, residual = residual, outside.max(initial=0.0)
             if residual < 1e-9 or last / 3 < residual < 1e-5:
                 X = tbtrs(U, image @ Q)[0]
                 return X, multiply(pencil.mass, X)
     M, R = dense(pencil.mass), dense(U)  # the triangle above the diagonal of R counts
     half = trsm(1.0, R, M - rigid @ rigid.conj().T if rigid.size else M, trans_a=2)
-    X = tbtrs(U, _largest(trsm(1.0, R, half, side=1), most)[1])[0]
+    X = tbtrs(U, _largest(trsm(1.0, R, half, side=1, overwrite_b=True), most)[1])[0]
     return X, M @ X

@@ -188,10 +188,11 @@ def _answers(
     dynamic += K[:, None]
     loads = np.broadcast_to(loads, dynamic.shape[:-1])[..., None]
     try:
-        return np.asarray(np.linalg.solve(dynamic, loads)[..., 0])
+        answers = np.linalg.solve(dynamic, loads)
     except np.linalg.LinAlgError:  # singular to the last bit all the same: moved by rounding
-        moved = dynamic + 1e-14 * np.abs(dynamic).max() * np.eye(len(M))
-        return np.asarray(np.linalg.solve(moved, loads)[..., 0])
+        dynamic += 1e-14 * abs(dynamic).max() * np.eye(len(M))
+        answers = np.linalg.solve(dynamic, loads)
+    return np.asarray(answers[..., 0])
 
 
 def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:

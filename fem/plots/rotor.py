@@ -144,7 +144,7 @@ def smooth_shapes(modes: Modes) -> tuple[FloatArray, FloatArray]:
 
     nodes = np.arange(modes.positions.size)
     x = np.interp(np.arange(_PARTS * nodes[-1] + 1) / _PARTS, nodes, modes.positions)
-    return x, np.asarray(CubicHermiteSpline(modes.positions, modes.shapes, modes.slopes)(x))
+    return x, CubicHermiteSpline(modes.positions, modes.shapes, modes.slopes)(x)
 
 
 def draw_deflected_shape(response: Response, k: int, ax: Axes | None = None) -> Axes:
