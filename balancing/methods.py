@@ -452,8 +452,7 @@ def _fit_weighted(job: Job) -> Solution:
         first = step(Y + further + W @ D)
         off, previous = np.concatenate((previous, first)) - mean, first[-1:]
         off *= norm(D) / np.fmax(norm(off, axis=1, keepdims=True), norm(D))
-        both = (off[1:] + off[:-1])[..., None]
-        drawn = D + first + step(((W - bounds.W) @ both)[..., 0])
+        drawn = D + first + step(((W - bounds.W) @ (off[1:] + off[:-1])[..., None])[..., 0])
         again = partial(nearest, root=root, tolerance=DRAWN)
         return _within_limits(bounds, W, Y, drawn, again)
 
