@@ -49,8 +49,8 @@ def test_every_number_is_that_of_the_command(shared, name, options, path, count)
     state = served.settled()
     numbers = state["numbers"]
     agree(numbers, command(served.job, *options))
-    if path == "corrections":  # it prints ± 31 g·mm, ± 6.0°
-        assert "left add 423.0 168.9° 31 6.0" in state["words"]
+    if path == "corrections":  # it prints ± 31 g·mm, ± 5.8°
+        assert "left add 423.0 168.9° 31 5.8" in state["words"]
     assert len([key for key in numbers if key.startswith(path)]) == count
 
 
