@@ -29,7 +29,7 @@ def table(text):
     for line in lines:
         if not line.strip(BLANKS + ';,"'):
             continue
-        begins = line.strip(BLANKS).startswith("#")
+        begins = line.strip(BLANKS).startswith(("#",) if rows else ("#", "//"))
         if begins and (not rows or separator not in line):
             comments.append(line.strip(BLANKS + "#"))
             continue
@@ -42,7 +42,7 @@ def table(text):
         if line.count('"') % 2:
             return None
         rows.append([cell.strip(BLANKS) for cell in next(csv.reader([line], delimiter=separator))])
-    if len(rows) < 1:
+    if not rows:
         return None
     header, *body = rows
     while header and not header[-1]:
@@ -57,11 +57,7 @@ def table(text):
         body = [[cell.replace(",", ".") if COMMA.fullmatch(cell) else cell for cell in row] for row in body]
     keep = [i for i, name in enumerate(header) if not name.casefold().startswith(("note", "comment"))]
     keep = [i for i in keep if header[i] or any(row[i] for row in body)]
-    return (
-        comments,
-        [header[i] for i in keep],
-        [[row[i] for i in keep] for row in body],
-    )
+    return comments, [header[i] for i in keep], [[row[i] for i in keep] for row in body]
 
 
 def table_sense(read):
