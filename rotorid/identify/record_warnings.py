@@ -65,9 +65,8 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         estimate, r = prior.apart(estimate), -prior.data.residuals  # of the data alone
     seen = len(r) >= FEWEST and not _rounding_only(problem, r)
     rho, chance, factor = _correlated(problem, r) if seen else (None, 1.0, 1.0)
-    poor, cause, wrong = misfit(problem, estimate, r, loss), "", False
-    if seen and path.converged and linear:
-        cause, wrong = _hum(problem, J, r)
+    poor = misfit(problem, estimate, r, loss)
+    cause, wrong = _hum(problem, J, r) if seen and path.converged and linear else ("", False)
     words += [poor, cause, path.bound_warning]
     if problem.integrator in STEPWISE:
         words.append(f"± do not count what a step of {problem.integrator} from sample to sample is off")
@@ -104,15 +103,15 @@ def misfit(problem: Problem, estimate: Estimate, r: FloatArray, loss: str) -> st
     if estimate.dof <= 0 or _rounding_only(problem, r):
         return ""
     if problem.stated:
-        far = loss == "linear" and float(r @ r) > MISFIT * estimate.dof
+        far = loss == "linear" and r @ r > MISFIT * estimate.dof
         why = estimate.misfit() if far else ""
         return f"{why}: {HINT}" if why else ""
     for name, rows in problem.series:
         data, part = problem.data[rows], r[rows]
         if loss != "linear":  # without outliers
-            limit = 3 * 1.4826 * float(np.median(np.abs(part)))
+            limit = 3 * 1.4826 * np.median(np.abs(part))
             part = np.clip(part, -limit, limit)
-        share = float(part @ part) / max(float(np.sum((data - data.mean()) ** 2)), 1e-300)
+        share = part @ part / max(np.sum((data - data.mean()) ** 2), 1e-300)
         left = f"the model leaves {100 * share:.2g} % of the variance of {name}"
         if len(part) < FEWEST:
             if share > 4 * UNEXPLAINED and len(part) > 2 and np.ptp(data) > 0:
@@ -132,18 +131,20 @@ def _rounding_only(problem: Problem, r: FloatArray) -> bool:
 
 
 def _correlated(problem: Problem, r: FloatArray, only: Sequence[slice] = ()) -> tuple[float, float, float]:
-    """Correlation of neighbours over all series, each in its own unit; the probability of such correlations
-    up to the tenth neighbour in white residuals (Box and Pierce 1970); and how many times too narrow
-    intervals are, with correlations that fade as the first.
+    """Correlation of neighbours over all series, each in its own unit; the probability that the ten before
+    predict white residuals so well (F test); and how many times too narrow intervals are, with correlations
+    that fade as the first.
     """
-    from scipy.special import chdtrc
+    from scipy.linalg import solve_toeplitz
+    from scipy.special import betainc
 
     parts = [r[rows] for rows in only or [rows for _, rows in problem.series]]
     size, most = sum(map(len, parts)), min(LAGS, max(1, min(map(len, parts)) // 5))
     sums = [np.correlate(np.append(part, np.zeros(most)), part) for part in parts]
     rho = np.sum([len(x) / (c[0] or 1.0) * c[1:] for x, c in zip(parts, sums, strict=True)], axis=0) / size
-    factor = np.sqrt((1 + rho[0]) / (1 - rho[0])) if 0 < rho[0] < 1 else 1.0
-    return float(rho[0]), float(chdtrc(len(rho), size * float(rho @ rho))), float(factor)
+    factor = max(1.0, np.sqrt((1 + rho[0]) / (1 - rho[0])))
+    left = 1 - rho @ solve_toeplitz([1, *rho[:-1]], rho)
+    return float(rho[0]), float(betainc(size / 2, most / 2, max(left, 0))), float(factor)
 
 
 def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
@@ -158,7 +159,7 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
     t, (Q, R) = problem.by_time([record.t for record in problem.records]), np.linalg.qr(J)
     Q, G = Q.T, gain(R, rcond=JACOBIAN_RCOND)
     # of noise it is χ² of two
-    best, frequency, span, series = 20.0 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
+    best, frequency, span, series = 20 * float(r @ r) / len(r), 0.0, 1.0, slice(0)
     for _, rows in problem.series:
         times, size, n = t[rows], problem.scale[rows], rows.stop - rows.start
         if n < FEWEST:
@@ -175,7 +176,8 @@ def _hum(problem: Problem, J: FloatArray, r: FloatArray) -> tuple[str, bool]:
             frequency = (4 + int(np.argmax(power))) / (4 * n) * (n - 1) / span
     for mains in (50.0, 60.0):
         whole = mains * max(1, round(frequency / mains))
-        frequency = whole if abs(whole - frequency) < 0.5 / span else frequency
+        if abs(whole - frequency) < 0.5 / span:
+            frequency = whole
     C, waves = np.zeros((len(r), 2)), np.exp(2j * np.pi * frequency * t[series])
     C[series] = problem.scale[series, None] * np.column_stack((waves.real, waves.imag))
     outside, free = C - Q.T @ (Q @ C), len(r) - len(Q) - 2
@@ -265,8 +267,8 @@ def combined(problem: Problem, estimate: Estimate) -> Estimate:
         table = Compiled(by, jacobian([expression], by), (1 + len(by),)).one(theta.tolist())
         value, slope = float(table[0]), table[1:]
         gradient = slope * scale / np.linalg.norm(slope * scale)
-        seen = np.linalg.norm(null @ gradient) <= 1e-5
-        if seen and np.linalg.matrix_rank([*rows, gradient], tol=1e-6) > len(rows):
+        independent = np.linalg.matrix_rank([*rows, gradient], tol=1e-6) > len(rows)
+        if independent and np.linalg.norm(null @ gradient) <= 1e-5:
             rows.append(gradient)
             words = str(usual(expression)).replace("**", "^").replace("*", "·")  # such as a·b^2/c
             chosen.append(estimate.combination(words, value, slope))
