@@ -58,6 +58,7 @@ HEAVY = 1.28
 _ALIKE = 0.8  # MAC of a mode with itself a step further
 _NEARER = 3.0  # times as far as from itself, in 1 − MAC, a mode is from every other one
 _HARDLY = 0.3  # MAC below which two modes are not one
+_ITSELF = 0.999  # product of shapes above which two searches ended at one mode
 _NARROW = 1e-4  # of the highest speed: steps that are not halved
 _DENSE = 8  # times the speeds asked for: so many are computed at most
 _SWINGS = 14.0  # log decrement above which a critical speed has no meaning
@@ -207,8 +208,8 @@ class Campbell(Result):
         """
         fine = campbell(refined(self.rotor, 2), self.speeds, self.frequencies.shape[1], heavy=self.heavy)
         frequencies = nearest_modes(self.frequencies, fine.frequencies)
-        change = np.where(self.log_decrements <= self.heavy, np.abs(frequencies / self.frequencies - 1), 0.0)
-        apart = np.abs(fine.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
+        change = np.where(self.log_decrements <= self.heavy, abs(frequencies / self.frequencies - 1), 0.0)
+        apart = abs(fine.critical_speeds / self.critical_speeds[:, None] - 1).min(axis=1, initial=np.inf)
         return float(np.nanmax(change)), float(apart.max(initial=0.0))
 
 
@@ -252,7 +253,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None, *, heavy: fl
     listed, decrements = {}, decrements_of(lam)
     for window in windows:
         k = int(np.searchsorted(speeds, window.first))
-        apart = np.where(decrements[k] < 0, np.abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
+        apart = np.where(decrements[k] < 0, abs(lam[k].imag - (window.frequency or np.nan)), np.nan)
         if not np.isnan(apart).all():
             listed[window] = replace(window, mode=int(np.nanargmin(apart)) + 1)
     texts = [listed.get(window, window).sentence() for window in windows]
@@ -299,16 +300,17 @@ def _crossings(paths: _Paths) -> _Crossings:
     f = off_synchronous(paths.values, paths.speeds)
     k, mode = np.nonzero(((f[:-1] < 0) != (f[1:] < 0)) & np.isfinite(f[:-1] * f[1:]))
     steps = np.array((k, k + 1))
-    near = k + np.abs(f[steps, mode]).argmin(axis=0)
+    near = k + abs(f[steps, mode]).argmin(axis=0)
     value, vector = paths.values[near, mode], paths.vectors[near, mode]
 
     def excess(speeds: FloatArray) -> FloatArray:
         nonlocal value, vector
         value, vector = polish(paths.whirl.Q, speeds, np.arange(k.size), value, vector)
-        return np.abs(value.imag) - speeds
+        return abs(value.imag) - speeds
 
     speed, rest = roots(excess, paths.speeds[steps], f[steps, mode])
-    lost = ~(np.abs(rest) <= _VANISHES * speed)
+    same = np.isclose(speed[:, None], speed, _VANISHES) & (abs(vector.conj() @ vector.T) > _ITSELF)
+    lost = ~(abs(rest) <= _VANISHES * speed) | np.triu(same, 1).any(axis=0)
     paths.doubtful[k[lost], mode[lost]] = True
     order = np.lexsort((mode, np.round(speed / paths.speeds[-1], 9)))  # equal but for rounding: by mode
     order = order[~lost[order] & (decrements_of(value[order]) <= _SWINGS)]
@@ -317,7 +319,7 @@ def _crossings(paths: _Paths) -> _Crossings:
 
 def off_synchronous(lam: ComplexArray, speeds: FloatArray) -> FloatArray:
     """Whirl frequencies less the speed, of modes (S, …)."""
-    return np.abs(lam.imag) - speeds[:, None]
+    return abs(lam.imag) - speeds[:, None]
 
 
 def _words(direction: FloatArray, there: FloatArray) -> AnyArray:
@@ -363,8 +365,8 @@ def _chained(
 
     S, m = values.shape
     lam = np.nan_to_num(values, nan=1.0)[..., None]
-    states = np.concatenate((X, X * lam / np.abs(lam)), axis=2) / np.sqrt(2)
-    mac = np.nan_to_num(np.abs(states[:-1].conj() @ states[1:].swapaxes(1, 2))) ** 2
+    states = np.concatenate((X, X * lam / abs(lam)), axis=2) / np.sqrt(2)
+    mac = np.nan_to_num(abs(states[:-1].conj() @ states[1:].swapaxes(1, 2))) ** 2
     partner = np.array([linear_sum_assignment(one, maximize=True)[1] for one in mac], np.intp).reshape(-1, m)
     mac = np.take_along_axis(mac, partner[:, None], axis=2)
     best, rivals = mac.diagonal(axis1=1, axis2=2), mac * (1 - np.eye(m))
@@ -397,7 +399,7 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     that are heavily damped at half of the speeds, and where they cross the line, come last.
     """
     light, there = decrements_of(values) <= heavy, np.isfinite(values)
-    size = np.where(there, np.abs(values.imag), 1e9 * speeds[-1])
+    size = np.where(there, abs(values.imag), 1e9 * speeds[-1])
     gap = size - speeds[:, None]
     below = light & (gap <= 0)
     below[1:] |= light[:-1] & (gap[1:] <= 0)  # lightly damped before, or after
@@ -407,7 +409,7 @@ def _choice(speeds: FloatArray, values: ComplexArray, n: int, heavy: float) -> I
     last = (light.mean(axis=0) < 0.5) & np.isinf(meets)
     begins = there.argmax(axis=0)
     start = values[begins, np.arange(begins.size)].imag  # in a complex coordinate negative of backward whirl
-    start = np.abs(start) * (1 + _PAIR * (start > 0))
+    start = abs(start) * (1 + _PAIR * (start > 0))
     best = np.lexsort((start, size.mean(axis=0), meets, last))[:n]
     best = best[there[:, best].any(axis=0)]
     return best[np.lexsort((start[best], begins[best]))]
@@ -417,7 +419,7 @@ def _cut(paths: _Paths) -> str:
     """A warning where modes that are not listed have critical speeds in the range, or may have."""
     speeds, lam = paths.speeds, paths.others
     f = np.where(decrements_of(lam) <= _SWINGS, off_synchronous(lam, speeds), np.nan)
-    computed = np.fmax.reduce(np.abs(np.hstack((paths.values, lam)).imag), axis=1)
+    computed = np.fmax.reduce(abs(np.hstack((paths.values, lam)).imag), axis=1)
     more = (f[:-1] * f[1:] < 0).any(axis=1) | (computed < speeds)[1:]
     if not (lam.size and more.any()):
         return ""

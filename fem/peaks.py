@@ -252,12 +252,12 @@ def response_peaks(
     def short(more: float, speed: float, level: float) -> float:
         """By how much the reading stays below a level; a sharp peak needs all digits of what is added."""
         try:
-            return level - float(np.abs(response.solve(np.array([speed + more])).at(sensor)[0]))
+            return level - float(abs(response.solve(np.array([speed + more])).at(sensor)[0]))
         except ValueError:
             return -1e300  # undamped, and critical
 
     omega, peaks = response.speeds, []
-    A = np.where(response.steady & (omega > 0), np.abs(response.at(sensor)), np.nan)
+    A = np.where(response.steady & (omega > 0), abs(response.at(sensor)), np.nan)
     for k in np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:])) + 1:
         middle = float(omega[k])
         bounds, options = omega[[k - 1, k + 1]] - middle, {"xatol": 1e-12 * middle}
@@ -334,7 +334,7 @@ def resolve_peaks(
     undamped = np.array([peak.speed for peak in every if peak.undamped])
     added = np.append(finer.speeds, [peak.speed for peak in every])
     # Beside undamped peaks the amplitude has no limit and no meaning.
-    near = (np.abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
+    near = (abs(added[:, None] - undamped) <= 1e-2 * undamped).any(axis=1)
     warnings = (*finer.warnings, *[UNDAMPED] * bool(undamped.size))
     return _with(replace(response, windows=finer.windows, warnings=warnings), added[~near]), peaks
 
@@ -346,9 +346,9 @@ def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response
     """
     for _ in range(_ROUNDS):
         omega, Z = response.speeds[response.steady], response.readings(sensors)[response.steady]
-        steps, size = np.diff(Z, axis=0), np.abs(Z)
-        bends = np.pad(np.abs(np.angle(steps[1:] * steps[:-1].conj())) > _BEND, ((1, 1), (0, 0)))
-        long = np.abs(steps) > _SHORT * np.maximum(size[1:], size[:-1]) + 1e-9 * size.max(initial=0.0)
+        steps, size = np.diff(Z, axis=0), abs(Z)
+        bends = np.pad(abs(np.angle(steps[1:] * steps[:-1].conj())) > _BEND, ((1, 1), (0, 0)))
+        long = abs(steps) > _SHORT * np.maximum(size[1:], size[:-1]) + 1e-9 * size.max(initial=0.0)
         wanted = (long & (bends[1:] | bends[:-1])).any(axis=1)
         coarse, response = response, _with(response, ((omega[1:] + omega[:-1]) / 2)[wanted])
         if response is coarse or response.speeds.size > _MANY:

@@ -129,12 +129,12 @@ class Response(Result):
     @property
     def major(self) -> FloatArray:
         """Longer half axis of each orbit, m, shape (S, K)."""
-        return np.abs(self.amplitudes) + np.abs(self.backward)
+        return abs(self.amplitudes) + abs(self.backward)
 
     @property
     def minor(self) -> FloatArray:
         """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
-        return np.abs(self.amplitudes) - np.abs(self.backward)
+        return abs(self.amplitudes) - abs(self.backward)
 
     def column(self, node: str | int) -> int:
         """Which column of the amplitudes belongs to a node.
@@ -179,7 +179,7 @@ class Response(Result):
             {
                 "speeds_rad_s": self.speeds,
                 "sensors": [label(sensor) for sensor in sensors],
-                "amplitude_m": np.abs(Z),
+                "amplitude_m": abs(Z),
                 "phase_deg": phase_deg(Z),
                 "unstable_speeds": [window.to_dict() for window in self.windows],
                 "warnings": self.warnings,
@@ -319,7 +319,7 @@ class InfluenceCoefficients(Result):
         if not steady.any():
             return (every,)
         W, speeds = self.W[steady].reshape(-1, C * P), self.speeds[steady]
-        at = np.abs(W).argmax(axis=0)
+        at = abs(W).argmax(axis=0)
         size, phase = polar("µm per g·mm", "phase lead, deg", W[at, np.arange(C * P)])
         largest = (
             Column("sensor", list(map(str, sensors))),
@@ -327,7 +327,7 @@ class InfluenceCoefficients(Result):
             replace(size, shown="{:.4g}".format),
             replace(phase, shown="{:.2f}".format),
             Column("at rpm", speeds[at] * RPM, "{:.6g}".format),
-            Column("least", np.abs(W).min(axis=0), "{:.4g}".format),
+            Column("least", abs(W).min(axis=0), "{:.4g}".format),
         )
         return (Table("largest influence coefficients", largest), every)
 
@@ -356,7 +356,7 @@ def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
     -------
     Size in the unit of Z, and phase in degrees.
     """
-    return Column(size, np.abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
+    return Column(size, abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
 
 
 def speed_range(speeds: FloatArray) -> str:
@@ -425,7 +425,7 @@ def unbalance_response(
         for part, H in receptance.parts(running):
             Z = speeds[part] ** 2 * np.einsum("pabs,b->pas", H, phasors)
             both[: len(Z), part] = Z[:, kept - 1].swapaxes(1, 2)
-            size = np.abs(Z).sum(axis=0)
+            size = abs(Z).sum(axis=0)
             largest[part], where[part] = size.max(axis=0), size.argmax(axis=0) + 1
         warnings = receptance.warnings
         return Response(speeds, both[0], masses, rotor, warnings, both[1], largest, where, kept, solve)
@@ -569,7 +569,7 @@ class Receptance:
         system = system.reshape(planes * s, b + planes * s, omega.size)
         for k, row in enumerate(system):
             row[b + k] += 1.0
-            lost |= ~(np.abs(row[b + k]) >= PIVOT)
+            lost |= ~(abs(row[b + k]) >= PIVOT)
             row *= 1 / row[b + k]
             for other in {*range(len(system))} - {k}:
                 system[other] -= system[other, b + k] * row
@@ -597,7 +597,7 @@ class Receptance:
         X = np.array([band.factor(1j * speed, speed)(rhs) for speed in omega.tolist()])
         X = X.reshape(-1, A.size, planes, b).swapaxes(0, 1)
         inertia = (X.conj() * multiply(A.mass, X.reshape(A.size, -1)).reshape(X.shape)).real.sum(axis=(0, 2))
-        work = np.abs(np.einsum("ib,isb->sb", loads, X[:, :, 0]))
+        work = abs(np.einsum("ib,isb->sb", loads, X[:, :, 0]))
         wrong = ~(work >= NEAR * omega[:, None] ** 2 * inertia).all(axis=1)
         if free_motions(self.rotor, {support.node for support in self.rotor.supports}):
             wrong |= omega == 0
@@ -623,7 +623,7 @@ class Series:
         while True:
             m = min(m, available)
             modes = lowest_modes(whole, m)
-            size = np.abs(modes.squares + modes.shift)
+            size = abs(modes.squares + modes.shift)
             highest = top * top + modes.shift
             if m == available or highest < size[-1] / 16:
                 break
@@ -644,12 +644,12 @@ class Series:
         self.factors = np.concatenate(factors, axis=2)  # (rows, columns, modes and powers)
         self.squares = modes.squares[:, None]
         # Rigid motions have λ = 0 without rounding.
-        self.margin = NEAR * (np.abs(self.squares) + modes.shift) * (self.squares != 0)
+        self.margin = NEAR * (abs(self.squares) + modes.shift) * (self.squares != 0)
 
     def at(self, squared: AnyArray) -> tuple[AnyArray, BoolArray]:
         """Receptance where ω² is given, shape (rows, columns, S); nonsense where the second is true."""
         gap = self.squares - squared
-        near: BoolArray = (np.abs(gap) <= self.margin).any(axis=0)
+        near: BoolArray = (abs(gap) <= self.margin).any(axis=0)
         gap[:, near] = 1.0
         rows, columns, n = self.factors.shape
         powers = np.vander(squared + self.modes.shift, n - len(gap), increasing=True).T

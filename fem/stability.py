@@ -9,7 +9,8 @@ this level, moved back to Re λ = 0 on the mode that grows.
 Which motions may grow is bounded. Multiplied by the conjugate velocity the equations show that on positive
 stiffness and damping a growing motion of frequency ω takes work q from circulating forces and gives c ω to
 the damping, so that ω < q / c for one of them at least: kxy − kyx = 2 q at a support, ω < Ω for material and
-other damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments do no work.
+other damping that turns with the shaft (c z' − i Ω c z). Gyroscopic moments do no work. Where no bound is low
+enough, modes up to twice the highest speed are looked at.
 """
 
 from __future__ import annotations
@@ -213,9 +214,9 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     bound = speeds * bool(rotor.material_damping.any() or internal_damping(rotor))
     for support in rotor.supports:
         k, c = support.table if support.constant else support.at(speeds)
-        tiny, slack = (_SLACK * np.abs(one).max(axis=(1, 2)) for one in (k, c))
+        tiny, slack = (_SLACK * abs(one).max(axis=(1, 2)) for one in (k, c))
         stiffness, damping = (np.linalg.eigvalsh((one + one.swapaxes(1, 2)) / 2)[:, 0] for one in (k, c))
-        driving = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
+        driving = abs(k[:, 0, 1] - k[:, 1, 0]) / 2
         highest = np.where(driving > tiny, driving / np.maximum(damping, _NO_DAMPING), 0.0)
         bound = np.maximum(bound, np.where((stiffness < -tiny) | (damping < -slack), np.inf, highest))
     return bound
@@ -235,7 +236,7 @@ def covering(whirl: Whirl) -> Whirl:
     P, speeds, n = whirl.Q.P, whirl.speeds, whirl.values.shape[1]
     bound, available = growth_bound(P.rotor, speeds), available_modes(P.rotor)
     while n < available:
-        top = np.nan_to_num(np.abs(whirl.values.imag), nan=np.inf).max(axis=1)
+        top = np.nan_to_num(abs(whirl.values.imag), nan=np.inf).max(axis=1)
         size, columns = whirl.Q.basis.shape
         if (bound < top).all() or (columns < size and top.min() > _TIMES * speeds[-1]):
             break
@@ -249,7 +250,7 @@ def fastest(whirl: Whirl) -> tuple[ComplexArray, FloatArray]:
 
     That of what does not oscillate by the scale.
     """
-    rates = np.nan_to_num(whirl.values.real / np.abs(whirl.values), nan=-1.0)
+    rates = np.nan_to_num(whirl.values.real / abs(whirl.values), nan=-1.0)
     rows, k = np.arange(len(rates)), rates.argmax(axis=1)
     away = _BESIDE * (_largest_real(whirl) - AWAY)
     value = np.where(away > rates[rows, k], _largest_real(whirl) * whirl.scale, whirl.values[rows, k])
@@ -312,7 +313,7 @@ def roots(
         h = function(new)
         stays = (h < 0) == (g < 0)
         old, f, g = np.where(stays, old, last), np.where(stays, f / 2, g), h
-        if (np.abs(new - last) <= _EXACT * new).all():
+        if (abs(new - last) <= _EXACT * new).all():
             break
     return new, g
 
@@ -340,7 +341,7 @@ def _mode(whirl: Whirl, speed: float, value: complex) -> tuple[int, float, float
     if not value.imag:
         return None, None, None
     pairs = whirl.at(speed)
-    k = int(np.nanargmin(np.abs(pairs.values[0] - value)))
+    k = int(np.nanargmin(abs(pairs.values[0] - value)))
     lam, direction = whirling(whirl.Q, pairs.values[0], pairs.vectors[0])
     rank = lam.imag * (1 + _PAIR * direction)
     return int((rank <= rank[k]).sum()), float(lam[k].imag), float(direction[k])

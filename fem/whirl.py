@@ -117,11 +117,11 @@ def solve_modes(Q: Reduced, speeds: FloatArray, m: int, scale: float) -> Whirl:
     """
     D, K = Q.at(speeds)
     lam = _eigenvalues(Q.M, D, K, scale)
-    size = np.abs(lam)
+    size = abs(lam)
     still = size < _STILL * scale
-    oscillates = ~still & (np.abs(lam.imag) > _REAL * size)
+    oscillates = ~still & (abs(lam.imag) > _REAL * size)
     modes = np.where(oscillates & ((lam.imag > 0) | (Q.P.planes == 1)), lam, NONE)
-    order = np.argsort(np.abs(modes.imag), axis=1, kind="stable")[:, :m]
+    order = np.argsort(abs(modes.imag), axis=1, kind="stable")[:, :m]
     values = np.take_along_axis(modes, order, axis=1)
     missing = np.isnan(values)
     values[missing] = 1j * scale
@@ -171,7 +171,7 @@ def _eigenvalues(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> Compl
     )
     mu = np.linalg.eigvals(A).astype(complex)
     # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
-    size = np.abs(mu)
+    size = abs(mu)
     massless = size <= _INFINITE * size.max(axis=1, keepdims=True)
     mu[massless] = 1.0
     return np.where(massless, -np.inf, scale * (_SHIFT + 1 / mu))
@@ -197,7 +197,7 @@ def _answers(
 
 def _by_work(M: FloatArray, D: AnyArray, K: AnyArray, values: ComplexArray, X: ComplexArray) -> ComplexArray:
     """Values (S, m) whose small real parts have the digits of what damps and drives them."""
-    quiet = np.abs(values.real) < _QUIET * np.abs(values)
+    quiet = abs(values.real) < _QUIET * abs(values)
     if not quiet.any():
         return values
 
@@ -238,7 +238,7 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
         spectrum, scale = reference(P, speeds, modes)
         whirl = _in_basis(P, spectrum, scale, speeds, m)
         # Rigid-body motions and overdamped ones take room, too; and modes near the next ones feel them.
-        if modes == most or (np.abs(whirl.values) ** 2 < spectrum.squares[-1]).all():
+        if modes == most or (abs(whirl.values) ** 2 < spectrum.squares[-1]).all():
             return whirl
         modes = min(2 * modes, most)
 
@@ -279,12 +279,12 @@ def _in_basis(P: Planes, spectrum: Spectrum, scale: float, speeds: FloatArray, m
         whirl = solve_modes(Q, some, m, scale)
         x, r = _vectors_and_loads(whirl, spectrum.shift)
         missing = -r @ triangle.T
-        error = float((np.abs(missing) ** 2).sum(axis=(2, 3)).max())
+        error = float((abs(missing) ** 2).sum(axis=(2, 3)).max())
         if error > _TOLERANCE and Y.shape[1] < A.size:
             parts = np.concatenate((x[..., kept:], missing), axis=3)
             columns = parts.reshape(-1, parts.shape[3])
             directions = np.linalg.eigh((columns.conj().T @ columns).real)[1]
-            dropped = (np.abs(parts @ directions) ** 2).sum(axis=2).cumsum(axis=2).max(axis=(0, 1))
+            dropped = (abs(parts @ directions) ** 2).sum(axis=2).cumsum(axis=2).max(axis=(0, 1))
             new = np.hstack((Y[:, kept:], outside)) @ directions[:, dropped > 0.8 * _TOLERANCE]
             Y = np.linalg.qr(np.hstack((Y[:, :kept], new)))[0]
             kept = Y.shape[1]
@@ -414,7 +414,7 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
             f"the rotor has no oscillating mode at {speed:.6g} rad/s: all motions are overdamped"
         )
     values, x, y = in_both_planes(whirl.values[0, there], whirl.Q.nodes(whirl.vectors[0, there]))
-    size = np.hypot(np.abs(x), np.abs(y)).max(axis=1)
+    size = np.hypot(abs(x), abs(y)).max(axis=1)
     real = whirl.real[0]
     warnings = missing_modes(real, int(whirl.still[0]), values.size, n)
     return WhirlModes(float(speeds[0]), values, x.T / size, y.T / size, real, whirl.error, rotor, warnings)
@@ -432,7 +432,7 @@ def decrements_of(lam: ComplexArray) -> FloatArray:
     -------
     Decrements, of that shape.
     """
-    return np.where(np.abs(lam.real) <= GROWTH * np.abs(lam), 0.0, -2 * np.pi * lam.real / np.abs(lam.imag))
+    return np.where(abs(lam.real) <= GROWTH * abs(lam), 0.0, -2 * np.pi * lam.real / abs(lam.imag))
 
 
 def whirling(Q: Reduced, values: ComplexArray, vectors: ComplexArray) -> tuple[ComplexArray, FloatArray]:
@@ -450,7 +450,7 @@ def in_both_planes(
     # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
     z, way = shapes[..., 0, :], np.copysign(1.0, values.imag)[..., None]
     x = z.real + 1j * way * z.imag
-    return values.real + 1j * np.abs(values.imag), x, -1j * way * x
+    return values.real + 1j * abs(values.imag), x, -1j * way * x
 
 
 def missing_modes(real: FloatArray, still: int, count: int, n: int) -> tuple[str, ...]:
