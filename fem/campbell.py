@@ -309,7 +309,7 @@ def _crossings(paths: _Paths) -> _Crossings:
         return abs(value.imag) - speeds
 
     speed, rest = roots(excess, paths.speeds[steps], f[steps, mode])
-    same = np.isclose(speed[:, None], speed, _VANISHES) & (abs(vector.conj() @ vector.T) > _ITSELF)
+    same = np.isclose(value[:, None], value, _VANISHES) & (abs(vector.conj() @ vector.T) > _ITSELF)
     lost = ~(abs(rest) <= _VANISHES * speed) | np.triu(same, 1).any(axis=0)
     paths.doubtful[k[lost], mode[lost]] = True
     order = np.lexsort((mode, np.round(speed / paths.speeds[-1], 9)))  # equal but for rounding: by mode
