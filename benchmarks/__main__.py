@@ -19,7 +19,7 @@ PAGE = """# Benchmarks
 
 `make bench` runs rotorid and its peers side by side on five tasks; `make bench-all` makes this page. Answers
 are compared before anything is timed; times are the shortest of several calls in one thread, each on a fresh
-model.
+model. The exponent is p of cost ∝ size^p.
 
 Measured with {machine}.
 
