@@ -23,7 +23,7 @@ model. The exponent is p of cost ∝ size^p.
 
 Measured with {machine}.
 
-| task | ms | compared with | its ms | ratio | difference |
+|task|ms|compared with|its ms|ratio|difference|
 |---|--:|---|--:|--:|--:|
 """
 
@@ -56,8 +56,8 @@ def main() -> int:
             )
     if options.page is not None:
         lines = [
-            f"| {row.task} | {1e3 * row.our_seconds:.3g} | {row.peer} | {1e3 * row.peer_seconds:.3g} | "
-            f"{row.ratio:.3g} | {row.difference:.1e} |\n"
+            f"|{row.task}|{1e3 * row.our_seconds:.3g}|{row.peer}|{1e3 * row.peer_seconds:.3g}|"
+            f"{row.ratio:.3g}|{row.difference:.1e}|\n"
             for row in rows
         ]
         options.page.write_text(PAGE.format(machine=machine) + "".join(lines))

@@ -70,9 +70,7 @@ def test_random_systems_keep_eigenvalues_and_receptance(drawn):
     dynamic = motion.K + 1j * w * motion.C - w * w * motion.M
     H = frequency_response(model, omega)
     unit = abs(H @ dynamic - np.eye(len(motion.M)))
-    assert (
-        unit.max(axis=(1, 2)) < 1e-10 * abs(H).max(axis=(1, 2)) * abs(dynamic).max(axis=(1, 2))
-    ).all()
+    assert (unit.max(axis=(1, 2)) < 1e-10 * abs(H).max(axis=(1, 2)) * abs(dynamic).max(axis=(1, 2))).all()
 
 
 def test_a_rotor_with_massless_pedestals_and_shaft():
