@@ -190,7 +190,7 @@ def _answers(
     try:
         answers = np.linalg.solve(dynamic, loads)
     except np.linalg.LinAlgError:  # singular to the last bit all the same: moved by rounding
-        dynamic += 1e-14 * abs(dynamic).max() * np.eye(len(M))
+        dynamic += 1e-14 * abs(dynamic).max(axis=3, keepdims=True) * np.eye(len(M))  # each in its scale
         answers = np.linalg.solve(dynamic, loads)
     return np.asarray(answers[..., 0])
 
