@@ -195,8 +195,7 @@ def missed(rotor, asked):
     extra = there - abs(np.diff(above))
     wrong = np.flatnonzero((extra < 0) | (extra % 2 != 0))
     # Heavy ones come and go, by rounding alone where they are double: what passes there must be light.
-    passed = [light_crossings(*lam[k : k + 2], speeds[k : k + 2]) for k in wrong.tolist()]
-    return sum(n > there[k] for n, k in zip(passed, wrong.tolist(), strict=True))
+    return sum(light_crossings(*lam[k : k + 2], speeds[k : k + 2]) > there[k] for k in wrong.tolist())
 
 
 def light_crossings(one, other, speeds):
@@ -214,5 +213,7 @@ def test_no_damped_crossing_is_missed_in_drawn_tables():
 
 def test_searches_of_two_crossings_that_end_at_one_are_told_apart():
     rng = np.random.default_rng(16)
-    rotor, asked = [on_tables(rng) for _ in range(89)][-1]
-    np.testing.assert_allclose(fem.campbell(rotor, asked, 12).critical_speeds, [120.099968, 121.670216], 1e-8)
+    tables = [on_tables(rng) for _ in range(115)]
+    # In the last one a matrix is singular to the last bit, beside others of much larger entries.
+    for k, expected in ((88, [120.09996837, 121.67021609]), (114, [41.51229148, 43.1761842])):
+        np.testing.assert_allclose(fem.campbell(*tables[k], 12).critical_speeds, expected, 1e-8)
