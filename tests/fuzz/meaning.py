@@ -24,8 +24,9 @@ def table(text):
     declared = re.fullmatch(r'"?sep=(.)"?[;,\t]*', lines[0])
     if declared:
         lines = lines[1:]
-    separator = declared[1] if declared else None
-    comments, rows = [], []
+    bare = [re.sub(r'"[^"]*"', "", line) for line in lines if line.strip()]
+    usual = next((sign for sign in "\t;," if 2 * sum(sign in line for line in bare) > len(bare)), ",")
+    separator, comments, rows = declared[1] if declared else usual, [], []
     for line in lines:
         if not line.strip(BLANKS + ';,"'):
             continue
@@ -36,9 +37,6 @@ def table(text):
         if line.startswith('"#') and (not rows or separator not in re.sub('"[^"]*"', "", line)):
             comments.append(line.strip(BLANKS + '"#;,'))
             continue
-        if separator is None:
-            outside = re.sub(r'"[^"]*"', "", line)
-            separator = next((sign for sign in "\t;," if sign in outside), ",")
         if line.count('"') % 2:
             return None
         rows.append([cell.strip(BLANKS) for cell in next(csv.reader([line], delimiter=separator))])
