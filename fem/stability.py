@@ -380,12 +380,12 @@ def unstable_windows(whirl: Whirl, asked: FloatArray) -> tuple[Window, ...]:
     Raises
     ------
     ValueError
-        If the rotor is pushed aside by negative stiffness at every speed.
+        If negative stiffness, or too large cross-coupling, pushes the rotor aside at every speed.
     """
     if runs_away(whirl).all():
         raise ValueError(
             "the rotor on its supports is statically unstable at these speeds: a support has negative "
-            "stiffness; check its sign and size"
+            "stiffness, or cross-coupling that exceeds its own; check signs and sizes"
         )
     return tuple(window for window in windows_of(covering(whirl)) if within((window,), asked).any())
 
@@ -407,7 +407,7 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
     Raises
     ------
     ValueError
-        If the rotor is pushed aside by negative stiffness at every speed.
+        If negative stiffness, or too large cross-coupling, pushes the rotor aside at every speed.
     """
     asked = np.unique(speeds)
     try:

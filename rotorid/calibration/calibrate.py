@@ -6,8 +6,9 @@ tells whether the model explains the data.
 
 Numbers that are taken as exact, but may be off by a standard deviation each, move the estimate: with K the
 derivatives of data and priors by the estimated numbers and H those by the exact ones, times their deviations,
-the estimate is off by −K⁺ H δ, δ ~ N(0, 1), so that its covariance is (KᵀK)⁻¹ + (K⁺H)(K⁺H)ᵀ ("consider
-covariance", Schmidt 1966).
+the estimated numbers differ from the true ones by K⁺ H δ, δ ~ N(0, 1), so that their covariance is
+(KᵀK)⁻¹ + (K⁺H)(K⁺H)ᵀ ("consider covariance", Schmidt 1966). The rotor keeps that of both together: what the
+estimate makes of wrong exact numbers largely cancels in what weights do.
 """
 
 from __future__ import annotations
@@ -193,20 +194,21 @@ def _judged(
     chi_square, dof = mismatch(theta), r.size + len(prior) - spent - fit.estimate.rank
     chance, covariance = _of_errors(equations, prior, fit, chi_square)
     times = max(chi_square / dof, 1.0) if chance < LEVEL else 1.0
-    covariance *= times
-    if off := {number.path: number.prior for number in exact if number.prior}:
-        both = values | {path: value for path, (value, _) in off.items()}
-        parts = [each.jacobian(*each.data.coefficients(rotor, both, [*off])) for each in rows]
-        H = np.vstack((*parts, np.zeros((len(prior), len(off))))) * [std for _, std in off.values()]
-        moved = solution(prior.below(K), H)
-        covariance = covariance + moved @ moved.T
-    to = as_they_stand(rotor, values)
+    off = {number.path: number.prior for number in exact if number.prior}
+    std = np.array([std for _, std in off.values()])
+    every = values | {path: value for path, (value, _) in off.items()}
+    parts = [each.jacobian(*each.data.coefficients(rotor, every, [*off])) for each in rows]
+    H = np.vstack((*parts, np.zeros((len(prior), len(off))))) * std
+    moved = np.vstack((-solution(prior.below(K), H), np.diag(std)))
+    joint = block_diag(times * covariance, np.zeros((len(off),) * 2)) + moved @ moved.T
+    covariance = joint[: theta.size, : theta.size]
+    to = as_they_stand(rotor, every)
     lack = _lack_of_fit(equations, theta) if chance < LEVEL else 0.0
     explained = chance >= LEVEL and fit.converged and fit.estimate.full_rank
     calibration = Calibration(
-        names=tuple(equations.paths),
-        values=theta,
-        covariance=to @ covariance @ to.T,
+        names=tuple(every),
+        values=np.array([*every.values()]),
+        covariance=to @ joint @ to.T,
         lack_of_fit=lack,
         needs_trial_run=not explained,
     )

@@ -190,8 +190,10 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     ------
     ValueError
         As `model_places`.
+    UndeterminedError
+        For a calibrated rotor that its data contradict and that is not stable.
     """
-    from balancing import model_influence
+    from balancing import UndeterminedError, model_influence
     from rotorid.commands.model_places import model_places
     from rotorid.commands.one_shot import calibrated
 
@@ -200,21 +202,26 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     labels = job.trials.labels
     if stations is not None:
         labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
-    computed = model_influence(
-        job.rotor,
-        places.nodes,
-        places.sensors,
-        job.trials.speeds,
-        radii=places.radii,
-        relative_error=error_percent / 100,
-        quantity=places.quantity,
-        key_phasor=job.key_phasor,
-        labels=labels,
-    )
-    if job.rotor.calibration is None:
+    calibration = job.rotor.calibration
+    contradicted = calibration is not None and calibration.needs_trial_run
+    try:
+        computed = model_influence(
+            job.rotor,
+            places.nodes,
+            places.sensors,
+            job.trials.speeds,
+            radii=places.radii,
+            relative_error=error_percent / 100,
+            quantity=places.quantity,
+            key_phasor=job.key_phasor,
+            labels=labels,
+        )
+    except ValueError as problem:
+        raise UndeterminedError(f"{NEEDS_TRIAL}: {problem}") if contradicted else problem from None
+    if calibration is None:
         return computed
     computed = calibrated(computed, job, places)
     warnings = computed.remarks.warnings
-    if job.rotor.calibration.needs_trial_run:
+    if contradicted:
         warnings = *warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
     return replace(computed, remarks=computed.remarks._replace(warnings=warnings))

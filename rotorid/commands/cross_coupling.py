@@ -137,4 +137,4 @@ def mid_span(rotor: fem.Rotor) -> int:
     ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
     ends = ends or [rotor.positions[-1]]
     middle = (min(ends) + max(ends)) / 2 if ends[1:] else ends[0] / 2
-    return int(np.argmin(np.abs(rotor.positions - middle))) + 1
+    return int(np.argmin(abs(rotor.positions - middle))) + 1

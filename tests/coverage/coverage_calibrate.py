@@ -295,7 +295,7 @@ def one_machine(
             nothing > 0,
             False,
             found.chance,
-            True,
+            not found.explained,
             words,
             nothing,
         )

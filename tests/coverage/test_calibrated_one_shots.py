@@ -58,9 +58,8 @@ def test_good_models_are_seldom_said_to_lack_something(four, single):
 
 
 def test_numbers_wrongly_taken_as_exact(exact):
-    assert np.mean([one.told or one.check for one in exact]) >= lowest_share(len(exact), 0.95)
-    soft = exact[-(len(exact) // 3) :]  # on pedestals that matter
-    assert np.mean([one.told for one in soft]) >= lowest_share(len(soft), 0.95)
+    for holds in ([one.told or one.inside for one in exact], [one.told or one.check for one in exact]):
+        assert np.mean(holds) >= lowest_share(len(exact), 0.95)
 
 
 def test_a_third_bearing_is_recognised():

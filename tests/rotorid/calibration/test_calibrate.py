@@ -279,4 +279,8 @@ def test_errors_count_what_numbers_taken_as_exact_may_be_off():
     expected = plain.covariance + np.outer(moved, moved)
     assert wide.covariance == pytest.approx(expected, rel=1e-2, abs=1e-3 * np.abs(expected).max())
     assert (wide.std > 1.1 * plain.std).any()
+    joint = wide.rotor.calibration
+    assert joint.names == ("bearing[1].kxx", "bearing[1].cxx", "disc[1].scale")
+    assert joint.covariance[:2, 2] == pytest.approx(0.01 * moved, rel=1e-2)  # together with its disc
+    assert joint.std[2] == pytest.approx(0.01)
     assert "± count what 1 number taken as exact may be off" in outcome(wide, {}).answer.notes

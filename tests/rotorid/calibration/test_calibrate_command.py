@@ -36,13 +36,13 @@ def test_the_calibrated_rotor_is_written_with_its_errors(cli, folder):
     assert told.code == 0, told.err
     rotor = read_rotor(folder / "new.toml")
     found = told.json["parameters"]
-    assert rotor.calibration.names == tuple(TWO.split(","))
+    assert rotor.calibration.names == (*TWO.split(","), *told.json["exact"])
     was = read_rotor(COMPRESSOR)
     for path, support, old in zip(TWO.split(","), rotor.supports, was.supports, strict=False):
         ratio = np.array(support.stiffness)[:, 0, 0] / np.array(old.stiffness)[:, 0, 0]
         assert ratio == pytest.approx(found[path]["value"], rel=1e-9)
     relative = [found[path]["std"] / found[path]["value"] for path in TWO.split(",")]
-    assert rotor.calibration.std == pytest.approx(relative, rel=1e-4)
+    assert rotor.calibration.std[:2] == pytest.approx(relative, rel=1e-4)
     assert told.json["rotor"] == "new.toml"
 
 

@@ -93,3 +93,16 @@ def test_a_model_that_contradicts_its_data_asks_for_a_trial_run(tmp_path):
     assert any("make a trial run" in warning for warning in found.result.warnings)
     stated = balance(FOLDER / "later.toml", BalanceOptions(coefficients="computed"))
     assert not any("trial run, which" in warning for warning in stated.result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("contradicted", "first"), [("true", "the calibrated model does not"), ("false", "the rotor on its")]
+)
+def test_a_model_without_a_steady_response_gives_no_weights(contradicted, first, tmp_path):
+    flag = ("needs_trial_run = false", f"needs_trial_run = {contradicted}")
+    path = edited(tmp_path, calibrated__toml=flag)
+    seal = "seal = [\n", "seal = [\n    { node = 12, kxx_N_per_m = -1e10, kyy_N_per_m = -1e10 },\n"
+    rotor = path.parent / "calibrated.toml"
+    rotor.write_text(rotor.read_text(encoding="utf-8").replace(*seal), encoding="utf-8")
+    with pytest.raises(ValueError, match=first + ".*statically unstable.*cross-coupling"):
+        balance(path)
