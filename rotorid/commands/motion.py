@@ -251,8 +251,6 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     ValueError
         For a model or options that cannot be; where a journal touches its wall, with time and node.
     """
-    import numpy as np
-
     from rotorid.motion.plots import FIGURES
     from rotorid.motion.run import run
     from rotorid.motion.steady import begin, steady_end
