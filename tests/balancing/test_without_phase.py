@@ -38,15 +38,15 @@ def turned(degrees):
 
 def misfit(T, a, s, places):
     """χ² where a weight at a place leaves nothing, in the best scale."""
-    g, a = np.abs(T - np.asarray(places)[..., None]) / s, a / s
+    g, a = abs(T - np.asarray(places)[..., None]) / s, a / s
     return a @ a - (g @ a) ** 2 / (g * g).sum(axis=-1)
 
 
 def holds(answer, weights):
     """Whether the intervals of the first solution hold sizes and angles of weights."""
     low, high, angle = answer.solutions[0].intervals
-    off = np.abs(np.angle(weights / answer.weights))
-    return ((low <= np.abs(weights)) & (np.abs(weights) <= high) & (off <= angle)).all()
+    off = abs(np.angle(weights / answer.weights))
+    return ((low <= abs(weights)) & (abs(weights) <= high) & (off <= angle)).all()
 
 
 def polar(weight):
@@ -79,7 +79,7 @@ def test_two_points_as_printed():
     """
     rng = np.random.default_rng(20)
     for mass, size, place, scale in rng.uniform((0.5, 0.5, 0, 1), (2, 2, 2 * np.pi, 20), (20, 4)):
-        a, b, c = scale * np.abs(np.array([0, mass, -mass]) - size * np.exp(1j * place))
+        a, b, c = scale * abs(np.array([0, mass, -mass]) - size * np.exp(1j * place))
         d = np.sqrt(2 * b**2 + 2 * c**2 - 4 * a**2)
         turn = np.exp(1j * np.arccos((a**2 + d**2 / 4 - b**2) / (a * d)))
         answer = balance_without_phase(job([a, b, c], AT[180], mass, errors=ReadingErrors(0.02)))
@@ -109,7 +109,7 @@ def drawn_job(rng):
     if rng.random() < 0.3:
         T = T.real * np.exp(2j * np.pi * rng.random())
     D = np.exp(rng.uniform(-1, 1) + 2j * np.pi * rng.random())
-    a = np.abs(np.abs(T - D) * (1 + rng.choice([0.0, 0.1]) * rng.standard_normal(R)))
+    a = abs(abs(T - D) * (1 + rng.choice([0.0, 0.1]) * rng.standard_normal(R)))
     return T, a / a.max()
 
 
@@ -118,17 +118,17 @@ def test_no_place_of_a_grid_fits_better():
     for _ in range(60):
         T, a = drawn_job(rng)
         s = 0.1 * np.maximum(a, 0.02)
-        assert Fit(T[:, None] / np.abs(T).max(), a, s).chi_square[0] <= brute(T, a, s) + 1e-5
+        assert Fit(T[:, None] / abs(T).max(), a, s).chi_square[0] <= brute(T, a, s) + 1e-5
 
 
 def test_two_solutions_differ_and_their_intervals_are_those_of_a_grid():
     """Places 1/D̄ of D have nearly the same distances from weights on a circle around the origin."""
     T = np.array([0, *turned(np.arange(0, 360, 60))])
-    a = np.abs(T - 0.8j) * (1 + 0.1 * np.random.default_rng(4).standard_normal(7))
+    a = abs(T - 0.8j) * (1 + 0.1 * np.random.default_rng(4).standard_normal(7))
     first, second = balance_without_phase(job(a, range(0, 360, 60), errors=ReadingErrors(0.1))).solutions
     grid = np.geomspace(0.2, 5, 601)[:, None] * turned(np.arange(0, 360, 0.5))
-    own = np.abs(np.log(grid / first.weights)) < np.abs(np.log(grid / second.weights))
-    size = np.abs(grid[own & (misfit(T, a, 0.1 * a, grid) <= first.chi_square + 5.0)])
+    own = abs(np.log(grid / first.weights)) < abs(np.log(grid / second.weights))
+    size = abs(grid[own & (misfit(T, a, 0.1 * a, grid) <= first.chi_square + 5.0)])
     assert np.ravel(first.intervals[:2]) == pytest.approx((size.min(), size.max()), abs=0.02)
 
 
@@ -136,7 +136,7 @@ def test_several_sensors_and_speeds_are_one_fit():
     rng, T, D = np.random.default_rng(3), np.array([0, 1, *turned([120, 240])])[:, None], 0.7 * np.exp(1j)
     W = complex_normal(rng, (2, 3))
     Y = -W * D + 0.05 * complex_normal(rng, (2, 3))
-    runs = trials(np.abs(Y + W * T[..., None]), T, speeds=(100, 200), errors=ReadingErrors(0.01))
+    runs = trials(abs(Y + W * T[..., None]), T, speeds=(100, 200), errors=ReadingErrors(0.01))
     best = np.linalg.lstsq(W.reshape(-1, 1), -Y.ravel(), None)[0]
     answer = balance_without_phase(runs)
     assert answer.weights == pytest.approx(best, abs=1e-5)
@@ -153,13 +153,13 @@ def two_planes(runs=7):
 def test_two_planes_take_seven_runs():
     rng, D = np.random.default_rng(8), np.array([0.6 * np.exp(1j), 0.9 * np.exp(-2j)])
     W = complex_normal(rng, (3, 2))
-    read = np.abs((two_planes() - D) @ W.T)
+    read = abs((two_planes() - D) @ W.T)
     answer = balance_without_phase(trials(read, two_planes(), errors=ReadingErrors(0.01)))
     assert answer.weights == pytest.approx(D, abs=1e-5)
     assert holds(answer, D)
     limits = Limits(np.array([0.5, 2.0]), np.full((1, 3), np.inf), ((), ()))
     limited = balance_without_phase(trials(read, two_planes(), errors=ReadingErrors(0.01)), limits=limits)
-    assert np.abs(limited.weights) == pytest.approx([0.5, 0.9], abs=1e-5)
+    assert abs(limited.weights) == pytest.approx([0.5, 0.9], abs=1e-5)
     with pytest.raises(UndeterminedError, match=r"seven.* 6 with .*in plane 'B'"):
         balance_without_phase(trials(read[:6], two_planes(6)))
 
@@ -181,7 +181,7 @@ def test_errors_are_stated_assumed_or_estimated():
     assert (stated.scatter.relative, stated.scatter.origin) == (pytest.approx(0.05), "stated")
     assert stated.solutions[0].left < 0.7 * assumed.solutions[0].left
     rng, T = np.random.default_rng(0), np.array([0, *turned(np.arange(0, 360, 18))])[:, None]
-    read = np.abs(T - 0.7j) * (1 + 0.04 * rng.standard_normal((21, 1)))
+    read = abs(T - 0.7j) * (1 + 0.04 * rng.standard_normal((21, 1)))
     many = balance_without_phase(trials(read, T))
     assert many.scatter.origin == "estimated"
     assert 0.02 < many.scatter.relative < 0.06
@@ -195,7 +195,7 @@ def test_trial_weights_that_did_nothing_ask_for_heavier_ones():
 
 def test_a_sensor_that_reads_nothing_is_named_and_a_second_baseline_does_no_harm():
     T = np.array([0, 0, 1, *turned([120, 240])])[:, None]
-    read = np.abs(T - 0.7j) * [[1.0, 0.0]]
+    read = abs(T - 0.7j) * [[1.0, 0.0]]
     with pytest.raises(ValueError, match="'s1' reads 0 in every run: leave it out"):
         balance_without_phase(trials(read, T))
     answer = balance_without_phase(trials(read[:, :1], T, errors=ReadingErrors(0.02)))

@@ -238,7 +238,7 @@ def least_std(machine, truth, data, bare, numbers):
     _, dW = data.coefficients(machine.rotor, truth.numbers, [one.path for one in numbers])
     each, *common = (of_runs(kind, Y, Y) for kind in ("independent", "common at a speed", "common to a run"))
     run = RUN.relative / np.sqrt(3) * np.concatenate((each, *common))
-    free = 0 * Y + 100 * np.abs(Y).max() * np.eye(bare.size).reshape(-1, 1, *bare.shape)
+    free = 0 * Y + 100 * abs(Y).max() * np.eye(bare.size).reshape(-1, 1, *bare.shape)
     along = np.concatenate(
         (READING.amplitude * each, 1j * READING.phase * each, run, 1j * run, free, 1j * free)
     )
@@ -381,8 +381,8 @@ def intervals(name, found):
     known = ~np.isnan(z)
     ratios = width[known & (seen > 0)]
     columns = [
-        np.abs(z[known]) < NORMAL,
-        np.abs(z[known & (seen > 0)]) < NORMAL,
+        abs(z[known]) < NORMAL,
+        abs(z[known & (seen > 0)]) < NORMAL,
         [one.joint < chdtri(np.sum(~np.isnan(one.numbers)), 0.05) for one in found],
         [one.inside for one in found],
         [inside for one in found for inside in one.readings],

@@ -84,7 +84,7 @@ def line(name, drawn):
         some = [one for one in drawn if bool(one[3]) == warned]
         given = [(error, ci, bound) for error, ci, bound, _ in some if ci is not None]
         half = [np.ptp(ci, axis=1) / 2 for _, ci, _ in given]
-        holds = [np.abs(error) <= reach for (error, *_), reach in zip(given, half, strict=True)]
+        holds = [abs(error) <= reach for (error, *_), reach in zip(given, half, strict=True)]
         ratios = [reach / (1.96 * bound) for (*_, bound), reach in zip(given, half, strict=True)]
         ratio = f"{np.median(ratios):.2f}" if given else "–"
         shares += f"{percent(holds):>9}{ratio:>8}{len(given):6d}{len(some) - len(given):6d}"

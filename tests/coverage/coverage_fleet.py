@@ -75,7 +75,7 @@ def draw(rng, kind, machines=MACHINES):
 
 def record(m, W):
     """Coefficients as they were measured, and their covariance."""
-    return MachineRecord(f"M{m + 1}", str(m), W, RUN * np.abs(W))
+    return MachineRecord(f"M{m + 1}", str(m), W, RUN * abs(W))
 
 
 def shots(rng, drawn, kind, m):
@@ -121,7 +121,7 @@ def judged(
     """Against the truth, and a check run."""
     off = stretch((check - found.after).ravel()).reshape(-1, 2, 1)
     far = (np.swapaxes(off, 1, 2) @ np.linalg.solve(found.after_covariance.reshape(-1, 2, 2), off)).ravel()
-    size = np.sqrt(np.mean(np.abs(check) ** 2))
+    size = np.sqrt(np.mean(abs(check) ** 2))
     readings = np.mean(far < NORMAL_RADIUS**2)
     weights = found.region().holds(D)
     return Shot(left, weights, readings, size < found.check_rms, bool(found.warnings), foreign)

@@ -130,9 +130,9 @@ def repeat(case: Case, method: str, repetitions: int, *, stated: bool = True) ->
             reach[i] = std * stdtrit(fit.estimate.dof, 0.975)  # by what the rows leave, whatever is stated
     exact = readings(case.model, truth.tolist(), case.frequencies, case.inputs, stated=case.errors)
     least = np.ptp(identify(case.model, exact, start=dict(case.truth)).ci95, axis=1) / 2
-    std, inside = values.std(axis=0), np.abs(values - truth) <= reach
+    std, inside = values.std(axis=0), abs(values - truth) <= reach
     bias = (values.mean(axis=0) - truth) / std
-    return Figures(inside.mean(axis=0), bias, std / np.abs(truth), np.median(reach, axis=0) / least)
+    return Figures(inside.mean(axis=0), bias, std / abs(truth), np.median(reach, axis=0) / least)
 
 
 def main(repetitions: int = 2000) -> None:

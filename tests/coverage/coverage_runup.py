@@ -125,7 +125,7 @@ def line(rate: float, word: str, found: Sequence[Outcome]) -> str:
     """Shares of intervals that hold the truth, and the median of the steady fit's bias."""
     if not found:
         return f"{rate:5.0f} {word:<8}{0:5d}"
-    held = [np.abs(one.errors) < NORMAL for one in found]  # no value holds nothing
+    held = [abs(one.errors) < NORMAL for one in found]  # no value holds nothing
     shares = "".join(f"{100 * share:8.1f}" for share in np.mean(held, axis=0))
     bias = "".join(f"{100 * off:9.2f}" for off in np.nanmedian([one.steady for one in found], axis=0))
     return f"{rate:5.0f} {word:<8}{len(found):5d}{shares}  {bias}"

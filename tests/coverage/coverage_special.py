@@ -49,7 +49,7 @@ def turned(rng: np.random.Generator, count: int, *, before: bool) -> tuple[Influ
     C = max(int(rng.integers(2, 7)), P // S + 1)
     W, kind = normal(rng, S, C, P), str(rng.choice(KINDS[:-1]))
     rotor, arbor = normal(rng, P), normal(rng, P)
-    size = np.exp(rng.uniform(np.log(0.3), np.log(1.5), P)) * np.abs(rotor)
+    size = np.exp(rng.uniform(np.log(0.3), np.log(1.5), P)) * abs(rotor)
     T = np.diag(size * np.exp(2j * np.pi * rng.random(P)))
     position = 2 * np.pi * np.arange(count) / count
 

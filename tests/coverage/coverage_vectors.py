@@ -85,7 +85,7 @@ class Errors:
 def errors(run: Machine, times: Array, vector: Array, seconds: float = SECONDS) -> Errors:
     """Of vectors at these times."""
     exact = run.vector(times)
-    error = np.abs(vector - exact) / peak(run, seconds) * 100
+    error = abs(vector - exact) / peak(run, seconds) * 100
     inside = (times > 2) & (times < seconds - 2)
     return Errors(
         rms=float(np.sqrt(np.mean(error[inside] ** 2))),
@@ -97,7 +97,7 @@ def errors(run: Machine, times: Array, vector: Array, seconds: float = SECONDS) 
 
 def peak(run: Machine, seconds: float = SECONDS) -> float:
     """Largest size of the exact vector."""
-    return float(np.abs(run.vector(np.linspace(0, seconds, 5000))).max())
+    return float(abs(run.vector(np.linspace(0, seconds, 5000))).max())
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,8 @@ def accuracy(run: Machine, seed: int, seconds: float = SECONDS) -> Accuracy:
     turned = (vector - exact) * np.exp(-1j * np.angle(exact))
     return Accuracy(
         **asdict(errors(run, found.times, vector, seconds)),
-        along=float(np.mean(np.abs(turned.real) < 1.96 * found.radial[:, 0, 0])),
-        across=float(np.mean(np.abs(turned.imag) < 1.96 * found.tangential[:, 0, 0])),
+        along=float(np.mean(abs(turned.real) < 1.96 * found.radial[:, 0, 0])),
+        across=float(np.mean(abs(turned.imag) < 1.96 * found.tangential[:, 0, 0])),
         seconds=took,
     )
 

@@ -27,11 +27,11 @@ def check_run(rng, source, kind):
     W, D, sizes = job.W, job.D, np.exp(rng.uniform(np.log(0.1), 0.0, 2))
     weights = D * (1 + sizes[0] * balance.normal(rng, len(D)) / np.sqrt(2))
     made = what_if(influence, dict(zip(influence.planes, weights, strict=True)))
-    true, effect = W @ (weights - D), W * np.sqrt(np.mean(np.abs(D) ** 2))
+    true, effect = W @ (weights - D), W * np.sqrt(np.mean(abs(D) ** 2))
     read = true + errors[1] * balance.between_runs(rng, kind, true[None], effect)[0]
     along, across = errors[0] * rng.standard_normal((2, *read.shape))
     read = read * (1 + along) * np.exp(1j * across)
-    within = np.abs(read - made.after) <= made.within / made.labels.vibration_scale
+    within = abs(read - made.after) <= made.within / made.labels.vibration_scale
     off = abs(rms(read) - rms(made.after)) <= made.rms_within
     return within.ravel(), [off], [rms(read) <= made.check_rms], *rises(job, 10 * sizes[1] ** 2 * D, rng)
 
@@ -45,7 +45,7 @@ def rises(job, scale, rng):
     made = correct(
         estimate_influence(replace(trials, readings=trials.readings + further)), speeds=trials.speeds[:1]
     )
-    old, new = np.abs(further - W @ D), np.abs(further + W @ (made.weights - D))
+    old, new = abs(further - W @ D), abs(further + W @ (made.weights - D))
     said = "".join(made.decision.elsewhere)
     named = [
         f"at {made.labels.speed_words(v)} " in said and f"worse: {s} " in said

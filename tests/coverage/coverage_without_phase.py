@@ -36,8 +36,8 @@ def draw(rng, runs, planes, sensors, scatter, stated):
         T[1 + p * each : 1 + (p + 1) * each, p] = size * np.exp(2j * np.pi * turns)
     real, imaginary = rng.standard_normal((2, sensors, planes))
     W = real + 1j * imaginary
-    truth = np.abs((T - D) @ W.T)
-    read = np.abs(truth * (1 + scatter * rng.standard_normal(truth.shape)))
+    truth = abs((T - D) @ W.T)
+    read = abs(truth * (1 + scatter * rng.standard_normal(truth.shape)))
     names = [tuple(map(str, range(n))) for n in (runs, sensors, planes)]
     errors = ReadingErrors(scatter) if stated else None
     return Trials(names[0], [100.0], *names[1:], read[:, None], T, errors, amplitudes_only=True), D, W
@@ -46,8 +46,8 @@ def draw(rng, runs, planes, sensors, scatter, stated):
 def held(solution, D):
     """Whether the intervals of a solution hold size and angle of each plane's weight, (2, P)."""
     low, high, angle = solution.intervals
-    off = np.abs(np.angle(D * solution.weights.conj()))
-    return np.array([(low <= np.abs(D)) & (np.abs(D) <= high), off <= angle])
+    off = abs(np.angle(D * solution.weights.conj()))
+    return np.array([(low <= abs(D)) & (abs(D) <= high), off <= angle])
 
 
 def least_width(T, D, sensors, scatter):

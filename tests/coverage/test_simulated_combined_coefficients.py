@@ -35,7 +35,7 @@ def test_combining_reduces_the_error_where_both_are_right():
         measured = estimate_influence(replace(made, readings=readings, errors=ReadingErrors(0.03, 0.03)))
         model = computed(W * (1 + 0.05 * complex_normal(rng, W.shape)), 0.05)
         both = combine(measured, model)
-        squares += [np.sum(np.abs(i.W - W) ** 2) for i in (measured, model, both)]
+        squares += [np.sum(abs(i.W - W) ** 2) for i in (measured, model, both)]
         warned += any("measured and computed" in words for words in both.remarks.warnings)
         error = (both.W - W).view(float)[..., None]
         chi.append(np.mean(np.swapaxes(error, -1, -2) @ np.linalg.solve(both.channels()[..., 2:, 2:], error)))

@@ -69,7 +69,7 @@ def draw(rng):
     trials = Trials(runs, speeds, sensors, names, machine.read(rng, T)[None], T, errors=errors)
     limits = None
     if rng.random() < 0.5:
-        most = np.full((S, C), rng.uniform(0.05, 0.4) * np.abs(W @ D).max())
+        most = np.full((S, C), rng.uniform(0.05, 0.4) * abs(W @ D).max())
         limits = Limits(np.full(P, np.inf), most, ((),) * P)
     sizes = 1e-3 * np.array([0.5, 1.0, 2.0, 5.0] if rng.random() < 0.5 else [2.0, 4.0])
     holes = {name: from_list(equal_holes(int(rng.integers(8, 25))), sizes) for name in names}
@@ -130,7 +130,7 @@ def play(seed):
     last, covered = balance(final), None
     with suppress(UndeterminedError):  # more runs may show that planes act alike
         covered = balance(final, BalanceOptions(refine=True)).result.region().holds(machine.D)
-    kept = None if job.limits is None else bool((np.abs(again.mean[0]) <= job.limits.residual).all())
+    kept = None if job.limits is None else bool((abs(again.mean[0]) <= job.limits.residual).all())
     before, *left = (np.linalg.norm(machine.left(weights)) for weights in (0 * there, there, now))
     return Way(
         (first.check.explained, last.check.explained),
@@ -197,7 +197,7 @@ def mistaken(seed):
     if np.linalg.norm(white) < MATTERS:
         return None
     change = answer.check.change
-    return change is not None and bool((np.abs(np.delete(change, p)) < 0.1 * abs(change[p])).all())
+    return change is not None and bool((abs(np.delete(change, p)) < 0.1 * abs(change[p])).all())
 
 
 def test_mistakes_that_matter_are_named_with_their_plane():

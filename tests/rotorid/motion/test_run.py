@@ -38,7 +38,7 @@ def test_run_up_from_rest_and_run_down_from_steady_motion(zeta, speeds, alpha, s
     made = jeffcott(zeta)
     start = REST if speeds[0] == 0 else begin(made, speeds[0], "steady")[:2]
     motion = run(made, speeds, abs(speeds[1] - speeds[0]) / alpha, start, tolerance=1e-8)
-    sizes = np.abs(motion.z[:, 0])
+    sizes = abs(motion.z[:, 0])
     k = int(sizes.argmax())
     t = motion.time[k - 2 : k + 3]
     curve = np.polynomial.Polynomial.fit(t, sizes[k - 2 : k + 3], 4)
@@ -51,7 +51,7 @@ def test_the_error_falls_with_the_fifth_root_of_the_work():
     """Order 5 of the method, 4 of its estimate."""
     exact = run(jeffcott(0.05), (0.0, 3.0), 30.0, REST, tolerance=1e-13, rate=20.0)
     runs = [run(jeffcott(0.05), (0.0, 3.0), 30.0, REST, tolerance=e, rate=20.0) for e in (1e-5, 1e-9)]
-    errors, steps = [np.abs(one.z - exact.z).max() for one in runs], [one.steps for one in runs]
+    errors, steps = [abs(one.z - exact.z).max() for one in runs], [one.steps for one in runs]
     assert 4.5 < np.log(errors[0] / errors[1]) / np.log(steps[1] / steps[0]) < 6.0
     assert errors[1] < 1e-8
 
@@ -72,10 +72,10 @@ def test_the_steady_end_on_linear_supports_is_the_response():
     x, y = (part[0][[2, 4]] for part in (steady.x, steady.y))
     last = np.exp(1j * motion.turned[-64:, None])
     expected = (x * last).real + 1j * (y * last).real
-    np.testing.assert_allclose(motion.z[-64:], expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(motion.z[-64:], expected, atol=1e-6 * abs(expected).max())
     at, X = synchronous_part(motion)
     assert at == pytest.approx(speed)
-    np.testing.assert_allclose(X[-1], x, atol=1e-5 * np.abs(x).max())
+    np.testing.assert_allclose(X[-1], x, atol=1e-5 * abs(x).max())
     end = steady_end(motion)
     assert end.periodic
     assert end.period * speed == pytest.approx(2 * np.pi)
@@ -105,7 +105,7 @@ def test_a_run_through_knots_of_a_bearing_table():
         slope, (0, 2), np.zeros(4), "DOP853", motion.time, rtol=1e-11, atol=1e-14, max_step=0.01
     )
     z = exact.y[0] + 1j * exact.y[1]
-    np.testing.assert_allclose(motion.z[:, 0], z, atol=1e-7 * np.abs(z).max())
+    np.testing.assert_allclose(motion.z[:, 0], z, atol=1e-7 * abs(z).max())
 
 
 SPEED, CLEARANCE = 100.0, 1e-4
@@ -214,7 +214,7 @@ def test_a_shaft_that_touches_its_wall_stops_the_motion():
     motion = run(made, (400.0, 400.0), 5.0, (np.array([1e-5, 0.0]), np.zeros(2)))
     assert "touches the wall of the annular seal 'labyrinth' at node 1 after" in motion.stopped
     assert "at 3819.72 rpm" in motion.stopped
-    assert np.abs(motion.z).max() == pytest.approx(2e-4, rel=0.05)
+    assert abs(motion.z).max() == pytest.approx(2e-4, rel=0.05)
     touches = float(motion.stopped.split(" after ")[1].split(" s")[0])
     assert motion.time[-1] <= touches <= motion.time[-1] + motion.time[1] < 1.0
     beyond = run(rigid(7.0), (SPEED, SPEED), 1.0, (np.array([1.2e-4, 0.0]), np.zeros(2)))

@@ -63,7 +63,7 @@ def test_reference_rotor_is_followed_as_in_the_compliance_form_of_the_book():
     alpha, m = fem.compliance(rotor23(), NODES), np.diag(small.small.masses[small.small.masses > 0])
     w2 = cost.speeds[:, None, None] ** 2
     W = np.linalg.solve(np.linalg.inv(alpha) - w2 * m, w2 * np.eye(3))
-    difference = np.abs(W - cost.full) / np.abs(cost.full).max(axis=(1, 2))[:, None, None]
+    difference = abs(W - cost.full) / abs(cost.full).max(axis=(1, 2))[:, None, None]
     used = difference[~cost.excluded].max(axis=(1, 2))
     assert cost.sizes["largest"] == pytest.approx(used.max(), rel=1e-8)
     assert cost.sizes["median"] == pytest.approx(np.median(used), rel=1e-8)
@@ -77,7 +77,7 @@ def test_bands_about_critical_speeds_are_left_out():
     cost = compare_response(book(), np.linspace(0.0, 600.0, 601), bands=0.1)
     criticals = fem.critical_speeds(rotor23(), 2).frequencies
     assert cost.criticals == pytest.approx(criticals)
-    near = np.any([np.abs(cost.speeds / w - 1) < 0.1 for w in criticals], axis=0)
+    near = np.any([abs(cost.speeds / w - 1) < 0.1 for w in criticals], axis=0)
     np.testing.assert_array_equal(cost.excluded, near | (cost.speeds == 0))
     assert cost.bands == 0.1
     assert np.isnan(cost.relative_difference[0]).all()
@@ -92,8 +92,8 @@ def test_masses_that_are_lumped(kind):
     small = lumped(BEARINGS[kind], material=1e-5 if kind == "whirling" else 0.0)
     cost = compare_response(small, np.linspace(3.0, 700.0, 60), bands=0.05)
     assert cost.sizes["largest"] < 1e-8
-    size = np.abs(cost.full).max(axis=(1, 2))[:, None, None]
-    assert np.nanmax(np.abs(cost.small - cost.full) / size) < 1e-6  # in the bands, too
+    size = abs(cost.full).max(axis=(1, 2))[:, None, None]
+    assert np.nanmax(abs(cost.small - cost.full) / size) < 1e-6  # in the bands, too
     assert cost.full.shape[1] == (3 if small.rotor.symmetric else 6)
 
 
@@ -137,7 +137,7 @@ def one_mass(*supports, material=0.0, modal=()):
 def growth(pair, speed):
     """Largest Re λ / |λ| of the state space's eigenvalues: another way than the search's."""
     values = pair.eigenvalues(speed)
-    return float((values.real / np.abs(values)).max())
+    return float((values.real / abs(values)).max())
 
 
 def test_modal_damping_is_external():
@@ -209,7 +209,7 @@ def test_thresholds_of_random_rotors(rotor, seed):
         assert max(growth(pair, speed) for speed in [*grid[grid < before], before]) < 1e-7
         assert growth(pair, at * (1 + 1e-6)) > 0
         if result.frequency is not None:
-            away = np.abs(pair.eigenvalues(at) - 1j * result.frequency)
+            away = abs(pair.eigenvalues(at) - 1j * result.frequency)
             assert away.min() < 1e-6 * result.frequency
 
 
@@ -224,10 +224,10 @@ def test_no_motion_is_left_out():
     )
     pair = small_rotor(rotor, (2, 3, 4), [20.0] * 3)
     values = pair.eigenvalues(500.0)
-    expected = values[values.imag > 0.1 * np.abs(values)]
+    expected = values[values.imag > 0.1 * abs(values)]
     whirl = whirl_of(pair, np.array([500.0])).values[0]
     whirl = whirl[np.isfinite(whirl)]
     assert expected.size == whirl.size == 7
     both_ways = np.where(whirl.imag > 0, whirl, whirl.conj())
-    distance = np.abs(both_ways[:, None] - expected) / np.abs(expected)
+    distance = abs(both_ways[:, None] - expected) / abs(expected)
     assert distance.min(axis=0) == pytest.approx(0.0, abs=1e-9)

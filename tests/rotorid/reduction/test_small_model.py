@@ -59,15 +59,15 @@ def test_a_rotor_that_is_a_few_masses_is_its_own_small_model(rotor, speed):
     # the finite element model as plain matrices, every eigenvalue; and the program's own whirl solver
     theirs = state_space(fem.equations_of_motion(rotor, speed=speed), inputs=(), outputs=()).eigenvalues
     # material damping without mass beside it decays with 1/β = 1e5 1/s: of the nodes left out only
-    limit = min(1e3 * np.abs(mine).min(), 3e4)
+    limit = min(1e3 * abs(mine).min(), 3e4)
     for some, others in ((mine, theirs), (theirs, mine)):
-        for value in some[np.abs(some) < limit]:
-            assert np.abs(others - value).min() < 1e-8 * abs(value)
+        for value in some[abs(some) < limit]:
+            assert abs(others - value).min() < 1e-8 * abs(value)
     omega = np.array([speed + 40.0])
     unbalance = {node: 1e-3 * np.exp(2j * node) for node in nodes}
     mine = small.deflections(omega, unbalance)[0]
     full = exactly(fem.unbalance_response, rotor, unbalance, omega, nodes=nodes)
-    n, size = len(nodes), np.abs(full.major).max()
+    n, size = len(nodes), abs(full.major).max()
     np.testing.assert_allclose(mine[:n], full.x[0], rtol=0, atol=1e-8 * size)
     np.testing.assert_allclose(mine[len(small.nodes) :][:n], full.y[0], rtol=0, atol=1e-8 * size)
 
@@ -102,7 +102,7 @@ def test_static_slopes_make_gyroscopic_terms_right_to_first_order_in_speed():
 
     def error(model, speed):
         mine, theirs = eigenvalues(model, speed), whirl_exactly(rotor, speed, 4).eigenvalues
-        return np.array([np.abs(mine - value).min() / abs(value) for value in theirs])
+        return np.array([abs(mine - value).min() / abs(value) for value in theirs])
 
     slow, fast = error(small, 60.0), error(small, 120.0)
     np.testing.assert_allclose(fast / slow, 4.0, rtol=0.08)

@@ -34,7 +34,7 @@ def test_the_angle_is_far_more_exact_than_an_edge():
     assert tacho.jitter_deg == pytest.approx(
         360 * np.median(12 + 2 * tacho.times) / RATE / np.sqrt(12), rel=0.06
     )
-    assert np.abs(offsets(tacho)).max() * 360 < 0.25
+    assert abs(offsets(tacho)).max() * 360 < 0.25
     assert np.all(np.diff(tacho.turns) == 1)
     assert tacho.warnings == ()
 
@@ -52,7 +52,7 @@ def test_the_angle_is_far_more_exact_than_an_edge():
 def test_edges_of_a_mark_and_of_a_notch(edge, zero, low):
     for samples in (pulses(), *[5.0 - pulses()] * low):
         tacho = read(samples, edge=edge)
-        assert np.abs(offsets(tacho, zero)).max() * 360 < 0.25
+        assert abs(offsets(tacho, zero)).max() * 360 < 0.25
         assert tacho.warnings == ()
 
 
@@ -76,7 +76,7 @@ def damaged(missing=0, double=0, seed=1):
 @pytest.mark.parametrize(("missing", "double"), [(12, 0), (0, 12), (12, 12)])
 def test_missing_and_double_pulses_are_bridged_and_counted(missing, double, seed):
     tacho = read(damaged(missing, double, seed))
-    assert np.abs(offsets(tacho)).max() * 360 < 0.5
+    assert abs(offsets(tacho)).max() * 360 < 0.5
     (words,) = tacho.warnings
     assert "missing" in words if missing else "too many" in words
     # a pulse too many in the turn of a missing one may stand for it, off by a part of a turn
@@ -88,10 +88,10 @@ def test_even_pulses_leave_the_turn_open_and_uneven_ones_do_not():
     even = read(pulses((0, 0.5)), pulses=2)
     assert not even.indexed
     assert "multiples of 180°" in even.warnings[0]
-    assert min(np.abs(offsets(even, zero)).max() for zero in (0, 0.5)) * 360 < 0.3
+    assert min(abs(offsets(even, zero)).max() for zero in (0, 0.5)) * 360 < 0.3
     uneven = read(pulses((0, 0.4)), pulses=2)
     assert uneven.indexed
-    assert np.abs(offsets(uneven)).max() * 360 < 0.3  # the gap from 0.4 to 1 is the longest
+    assert abs(offsets(uneven)).max() * 360 < 0.3  # the gap from 0.4 to 1 is the longest
 
 
 def test_a_wheel_that_lacks_a_tooth():
@@ -99,7 +99,7 @@ def test_a_wheel_that_lacks_a_tooth():
     tacho = read(teeth, pulses=12, edge="rising")
     assert tacho.indexed
     assert len(tacho.missing) == 0
-    assert np.abs(offsets(tacho)).max() * 360 < 0.3
+    assert abs(offsets(tacho)).max() * 360 < 0.3
 
 
 def test_pulses_between_samples_are_an_offset_that_no_mean_takes_away():
@@ -152,5 +152,5 @@ def test_a_magnetic_pickup_is_read_where_it_is_steep(polarity, edge):
     ):
         read(signal)
     tacho = read(signal, edge=edge)
-    assert np.abs(offsets(tacho)).max() * 360 < 0.1
+    assert abs(offsets(tacho)).max() * 360 < 0.1
     assert tacho.warnings == ()
