@@ -332,4 +332,4 @@ def _alike(a: Correction, b: Correction) -> bool:
     one, two = (
         m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b))
     )
-    return bool(np.abs(one - two).max() <= 1e-6 * np.abs(one).max())
+    return bool(abs(one - two).max() <= 1e-6 * abs(one).max())

@@ -251,8 +251,6 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
     ValueError
         For a model or options that cannot be; where a journal touches its wall, with time and node.
     """
-    import numpy as np
-
     from rotorid.motion.plots import FIGURES
     from rotorid.motion.run import run
     from rotorid.motion.steady import begin, steady_end
@@ -275,8 +273,10 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Ou
         until = f" (--time {0.999 * fine.time[-1]:.4g} shows it until then)" if fine.time[-1] else ""
         raise ValueError(fine.stopped + until)
     k = min(fine.time.size, rough.time.size)
-    moved = np.abs(fine.z - fine.z[0]).max()
-    error = float(np.abs(fine.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(fine.z).max(), 1e-300))
+    error = float(
+        abs(fine.z[:k] - rough.z[:k]).max()
+        / max(abs(fine.z - fine.z[0]).max(), 1e-4 * abs(fine.z).max(), 1e-300)
+    )
     result = Motion(fine, steady_end(fine), error)
     warnings = (*unsettled, *_warnings(fine, error, bool(shift)))
     bearings = [force.name or f"node {force.node}" for force, _ in fine.bearings]

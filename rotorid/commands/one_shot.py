@@ -34,8 +34,7 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     calibration = job.rotor.calibration
     assert calibration is not None
     W, dW = _derivatives(places.of_runs(_bare_run(influence), job.key_phasor), job.rotor)
-    L = calibration.columns()
-    columns = np.einsum("nscp,nm->mscp", dW, L)
+    columns = np.einsum("nscp,nm->mscp", dW, calibration.columns())
     lack = np.full(W.shape[:2], calibration.lack_of_fit)
     none = Gaussian.none(*W.shape).noise
     errors = Gaussian(none.blocks[0], none.columns, influence.reading, run_errors(job.trials))
